@@ -1,0 +1,18 @@
+//! High-speed film of markers on rigid links in, one row per frame and node out.
+//!
+//! ```text
+//! video ─source─▶ Frame ─detect─▶ Detections ─track─▶ Observation ─table─▶ NodeTable
+//! ```
+//!
+//! Arrows go right only: `detect` knows nothing of `track`, and nothing here knows of pendulums or metres.
+//! One function, [`pipeline`]'s `run`, calls the four in that order; every front end calls it.
+//!
+//! Image coordinates: x right, y down, pixel centres at integers, the first pixel is (0, 0). Times are integer
+//! ticks with a time base until they are written.
+
+pub mod detect;
+pub mod error;
+pub mod frame;
+pub mod rig;
+pub mod store;
+pub mod track;

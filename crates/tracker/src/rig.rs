@@ -1,0 +1,241 @@
+//! The rig: nodes, bodies, joints, reference frame; and its TOML form.
+//!
+//! Owns: [`Rig`] and what makes one valid. Must not: look at a recording (`discover` does).
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use crate::error::{Error, Fault, Place, Result};
+
+/// Version of the rig file's form; a file with a higher one is refused.
+pub const RIG_SCHEMA: u32 = 1;
+
+/// One marker.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Node {
+    /// `n0`, `n1`, ... or what the user calls it.
+    pub name: String,
+    /// Name of its body.
+    pub body: String,
+    /// Centre in the reference frame, px.
+    pub x_px: f64,
+    /// Centre in the reference frame, px.
+    pub y_px: f64,
+}
+
+/// A rigid set of nodes (a link).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Body {
+    /// Its name, `upper` and `lower` for a double pendulum.
+    pub name: String,
+}
+
+/// A point that two bodies share, or, with one body, the fixed pivot.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Joint {
+    /// Its name, e.g. `pivot`, `elbow`.
+    pub name: String,
+    /// The one body that turns about a fixed point, or the two that share the point.
+    pub bodies: Vec<String>,
+    /// Place in the reference frame, px.
+    pub x_px: f64,
+    /// Place in the reference frame, px.
+    pub y_px: f64,
+}
+
+/// Part of the image in which markers are looked for.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "snake_case")]
+pub enum Region {
+    /// First and last pixel, both inside: `[x0, y0, x1, y1]`.
+    Rectangle([f64; 4]),
+    /// Corners in order; the last joins the first.
+    Polygon(Vec<[f64; 2]>),
+}
+
+/// OpenCV's pinhole model with distortion, applied to centres, not to images.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Lens {
+    /// Rows of the 3 x 3 camera matrix, px.
+    pub camera_matrix: [[f64; 3]; 3],
+    /// k1, k2, p1, p2 and, if given, k3 and on, as OpenCV orders them.
+    pub distortion: Vec<f64>,
+}
+
+/// Nodes, bodies, joints and the frame in which they stand so.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Rig {
+    /// Version of this form, [`RIG_SCHEMA`].
+    pub schema: u32,
+    /// Width and height of the recording, px; a recording of another size is refused.
+    pub image_px: [u32; 2],
+    /// Index of the frame in which every node is at its place; `None` if the places come from elsewhere.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reference_frame: Option<u64>,
+    /// Where markers are looked for; `None` is the whole image.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub region: Option<Region>,
+    /// The lens; `None` is none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lens: Option<Lens>,
+    /// Bodies, from the pivot outwards.
+    #[serde(rename = "body", default)]
+    pub bodies: Vec<Body>,
+    /// Nodes, by body, along it.
+    #[serde(rename = "node", default)]
+    pub nodes: Vec<Node>,
+    /// Joints, the pivot first.
+    #[serde(rename = "joint", default)]
+    pub joints: Vec<Joint>,
+}
+
+impl Rig {
+    /// Reads and checks a rig file.
+    ///
+    /// # Errors
+    /// [`Error::Rig`] naming the file and the line or key.
+    pub fn read(path: &Path) -> Result<Self> {
+        let name = path.display().to_string();
+        let text = std::fs::read_to_string(path).map_err(|e| {
+            Error::Rig(
+                Fault::new(&name, format!("the rig file cannot be read ({e})"))
+                    .advice("Give a rig made by `tracker setup`"),
+            )
+        })?;
+        Self::parse(&text, &name)
+    }
+
+    /// Reads and checks the text of a rig file; `name` is for messages.
+    ///
+    /// # Errors
+    /// [`Error::Rig`] naming the line or key.
+    pub fn parse(text: &str, name: &str) -> Result<Self> {
+        let rig: Rig = toml::from_str(text).map_err(|e| {
+            let line =
+                e.span().map_or(1, |s| text[..s.start.min(text.len())].matches('\n').count() as u64 + 1);
+            Error::Rig(
+                Fault::new(name, e.message().to_string())
+                    .at(Place::Line(line))
+                    .advice("The form is the one that `tracker setup` writes"),
+            )
+        })?;
+        rig.check(name)?;
+        Ok(rig)
+    }
+
+    /// The rig as TOML.
+    ///
+    /// # Errors
+    /// [`Error::Rig`] if a value has no TOML form.
+    pub fn to_toml(&self) -> Result<String> {
+        toml::to_string_pretty(self).map_err(|e| Error::Rig(Fault::new("rig", e.to_string())))
+    }
+
+    /// Index of a body by its name.
+    pub fn body_index(&self, name: &str) -> Option<usize> {
+        self.bodies.iter().position(|b| b.name == name)
+    }
+
+    /// For each node the index of its body.
+    pub fn node_bodies(&self) -> Vec<usize> {
+        // A checked rig has every body; an unchecked one is refused before it gets here.
+        self.nodes.iter().map(|n| self.body_index(&n.body).unwrap_or(usize::MAX)).collect()
+    }
+
+    /// Checks that names are unique and known and numbers finite and inside the image.
+    ///
+    /// # Errors
+    /// [`Error::Rig`] naming the first key at fault.
+    pub fn check(&self, name: &str) -> Result<()> {
+        let fault = |key: String, problem: String, advice: &str| {
+            Err(Error::Rig(Fault::new(name, problem).at(Place::Key(key)).advice(advice)))
+        };
+        if self.schema == 0 || self.schema > RIG_SCHEMA {
+            return fault(
+                "schema".into(),
+                format!("version {} is not known, this program reads up to {RIG_SCHEMA}", self.schema),
+                "Use a newer tracker",
+            );
+        }
+        if self.nodes.is_empty() {
+            return fault(
+                "node".into(),
+                "the rig has no nodes".into(),
+                "Add [[node]] entries or run `tracker setup`",
+            );
+        }
+        for (i, b) in self.bodies.iter().enumerate() {
+            if b.name.is_empty() || self.bodies[..i].iter().any(|o| o.name == b.name) {
+                return fault(
+                    format!("body {i}"),
+                    format!("the name {:?} is empty or given twice", b.name),
+                    "Give each body its own name",
+                );
+            }
+        }
+        let [w, h] = self.image_px.map(f64::from);
+        for (i, n) in self.nodes.iter().enumerate() {
+            if n.name.is_empty() || self.nodes[..i].iter().any(|o| o.name == n.name) {
+                return fault(
+                    format!("node {i}"),
+                    format!("the name {:?} is empty or given twice", n.name),
+                    "Give each node its own name",
+                );
+            }
+            if self.body_index(&n.body).is_none() {
+                return fault(
+                    format!("node {}", n.name),
+                    format!("its body {:?} is not in the rig", n.body),
+                    "Add a [[body]] of that name",
+                );
+            }
+            // Outside by half a pixel is outside: pixel centres are at integers.
+            if !(n.x_px >= -0.5 && n.y_px >= -0.5 && n.x_px <= w - 0.5 && n.y_px <= h - 0.5) {
+                return fault(
+                    format!("node {}", n.name),
+                    format!("({}, {}) px is outside the image of {w} x {h} px", n.x_px, n.y_px),
+                    "Give its centre in the reference frame",
+                );
+            }
+        }
+        for b in &self.bodies {
+            if !self.nodes.iter().any(|n| n.body == b.name) {
+                return fault(
+                    format!("body {}", b.name),
+                    "it has no nodes".into(),
+                    "Give it a node or leave it out",
+                );
+            }
+        }
+        for j in &self.joints {
+            if j.bodies.is_empty() || j.bodies.len() > 2 {
+                return fault(
+                    format!("joint {}", j.name),
+                    format!("it names {} bodies", j.bodies.len()),
+                    "Name one body (a fixed pivot) or two",
+                );
+            }
+            if let Some(b) = j.bodies.iter().find(|b| self.body_index(b).is_none()) {
+                return fault(
+                    format!("joint {}", j.name),
+                    format!("its body {b:?} is not in the rig"),
+                    "Name bodies of the rig",
+                );
+            }
+            if !(j.x_px.is_finite() && j.y_px.is_finite()) {
+                return fault(
+                    format!("joint {}", j.name),
+                    "its place is not finite".into(),
+                    "Give its place in the reference frame",
+                );
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,62 @@
+"""The command line ``pydpend``: one module per command, this dispatcher, and nothing else.
+
+A command's module has ``HELP`` (one line), ``add_arguments(parser)`` and ``run(args) -> int``.
+Exit status: 0 done; 1 done, but something was left out and said; 2 an error, in one line on stderr;
+130 interrupted.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import os
+import sys
+from importlib.metadata import version
+
+from pydpend.errors import PydpendError
+
+COMMANDS: tuple[str, ...] = ()
+
+
+def parser() -> argparse.ArgumentParser:
+    """The whole command line. Imports each command's module, which imports nothing heavy at its top."""
+    top = argparse.ArgumentParser(
+        prog="pydpend",
+        description="From node tables and angles to encoder comparison, damping and a report.",
+    )
+    top.add_argument("--version", action="version", version=f"pydpend {version('pydpend')}")
+    commands = top.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    for name in COMMANDS:
+        module = importlib.import_module(f"pydpend.cli.{name}")
+        sub = commands.add_parser(
+            name,
+            help=module.HELP,
+            description=module.__doc__,
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        module.add_arguments(sub)
+        sub.set_defaults(run=module.run)
+    return top
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Runs one command and returns its exit status."""
+    args = parser().parse_args(argv)
+    try:
+        status: int = args.run(args)
+        sys.stdout.flush()
+        return status
+    except PydpendError as error:
+        print(f"pydpend: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("pydpend: interrupted", file=sys.stderr)
+        return 130
+    except BrokenPipeError:
+        # The reader (head, less) has gone; nothing is lost that anyone wants.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
