@@ -6,6 +6,7 @@ hanging down, unwrapped over turns.
 
 from __future__ import annotations
 
+from pydpend.angles import LinkAngles, read_angles, write_angles
 from pydpend.errors import (
     AnglesError,
     DetectError,
@@ -27,6 +28,7 @@ __all__ = [
     "EncoderError",
     "FilmError",
     "FitError",
+    "LinkAngles",
     "ModelError",
     "PydpendError",
     "RigError",
@@ -34,4 +36,6 @@ __all__ = [
     "SourceError",
     "TableError",
     "TrackerError",
+    "read_angles",
+    "write_angles",
 ]

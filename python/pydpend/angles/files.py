@@ -1,0 +1,254 @@
+"""Reading and writing angles tables.
+
+Owns: the file forms of :class:`~pydpend.angles.table.LinkAngles`: Parquet and CSV with units in the column
+names, and the folder of ``.npy`` files in which the paper's authors published theirs.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from pydpend.angles.table import Floats, LinkAngles, check_table
+from pydpend.columns import Columns, read_columns
+from pydpend.errors import AnglesError, fault
+
+META_KEY = "pydpend_angles"
+"""Key of the JSON that :func:`write_angles` puts into a Parquet file's metadata."""
+
+
+def read_angles(
+    path: str | Path,
+    *,
+    columns: Mapping[str, str] | None = None,
+    hanging_rad: float | tuple[float, float] = 0.0,
+    clockwise: bool = False,
+    unwrap: bool = False,
+    name: str | None = None,
+) -> LinkAngles:
+    """Reads an angles table, or a folder in the form in which the paper's authors published theirs.
+
+    ``path``: Parquet or CSV with ``time_s``, ``phi1_rad`` (or ``phi1_deg``) and, if there is a second link,
+    ``phi2_*``; ``frame`` and ``sigma1_*``, ``sigma2_*`` are optional; empty where not seen. Or a folder with
+    ``DPmean_data_RB0.npy``, ... (rows: s, degrees) and, for the sigmas, ``DPstd_data_RB0.npy``, ....
+
+    ``columns`` names the file's columns where they differ, ours first:
+    ``{"time_s": "t_s", "phi1_rad": "theta1_rad"}``. ``hanging_rad`` is what the file's angles read when the
+    link hangs (one number, or one per link); it is taken off. ``clockwise=True`` if the file counts clockwise
+    positive. ``unwrap=True`` if it keeps angles within one turn: neighbouring rows are then taken to be less
+    than half a turn apart, also over gaps.
+
+    Raises :class:`~pydpend.errors.AnglesError` naming file, line (or row) and column.
+    """
+    path = Path(path)
+    label = name if name is not None else (path.name if path.is_dir() else path.stem)
+    if path.is_dir():
+        t, phi, sigma = _read_published(path)
+        frame, meta, table = None, {"source": str(path), "form": "published npy"}, None
+    else:
+        t, phi, sigma, frame, meta, table = _read_table(path, dict(columns or {}))
+    hanging = np.broadcast_to(np.asarray(hanging_rad, dtype=np.float64), (phi.shape[1],))
+    phi = (phi - hanging) * (-1.0 if clockwise else 1.0)
+    if unwrap:
+        for k in range(phi.shape[1]):
+            seen = np.isfinite(phi[:, k])
+            phi[seen, k] = np.unwrap(phi[seen, k])
+    ours = dict(columns or {})
+
+    def place(row: int, column: str) -> str:
+        theirs = ours.get(column, column)
+        return f"row {row}, column {theirs}" if table is None else table.place(row, theirs)
+
+    check_table(str(path), t, phi, sigma, frame, place)
+    return LinkAngles(t, phi, sigma, frame, meta, label)
+
+
+_TableParts = tuple[Floats, Floats, Floats, "NDArray[np.int64] | None", dict[str, Any], Columns]
+
+
+def _read_table(path: Path, columns: dict[str, str]) -> _TableParts:
+    ours = ["time_s", "frame"] + [
+        f"{q}{k}_{u}" for k in (1, 2) for q in ("phi", "sigma") for u in ("rad", "deg")
+    ]
+    for key in columns:
+        if key not in ours:
+            raise AnglesError(
+                fault(str(path), f"columns names {key!r}, which is not ours", f"Ours are {', '.join(ours)}")
+            )
+    theirs = {c: columns.get(c, c) for c in ours}
+    table = read_columns(
+        path,
+        [theirs["time_s"], *(columns[c] for c in columns if c != "time_s")],
+        [theirs[c] for c in ours if c not in columns and c != "time_s"],
+        error=AnglesError,
+    )
+    if table.rows == 0:
+        raise AnglesError(fault(str(path), "the table has a header and no rows", "Give one row per instant"))
+
+    def column(quantity: str, link: int) -> Floats | None:
+        rad, deg = (theirs[f"{quantity}{link}_{unit}"] for unit in ("rad", "deg"))
+        if rad in table.values and deg in table.values:
+            raise AnglesError(fault(str(path), f"both {rad} and {deg} are there", "Keep one of them"))
+        if rad in table.values:
+            return table.values[rad]
+        return np.radians(table.values[deg]) if deg in table.values else None
+
+    found = [column("phi", k) for k in (1, 2)]
+    if found[0] is None:
+        raise AnglesError(
+            fault(
+                str(path),
+                "there is no column phi1_rad or phi1_deg",
+                f"The columns are {', '.join(table.header)}; say with `columns` which holds the angle",
+            )
+        )
+    phis = [f for f in found if f is not None]
+    absent = np.full(table.rows, np.nan)
+    sigmas = [column("sigma", k + 1) for k in range(len(phis))]
+    frame = None
+    if theirs["frame"] in table.values:
+        raw = table.values[theirs["frame"]]
+        bad = np.flatnonzero(~np.isfinite(raw) | (raw != np.rint(raw)))
+        if bad.size:
+            raise AnglesError(
+                fault(
+                    str(path),
+                    f"{raw[bad[0]]} is not a frame's index",
+                    "Give whole numbers, or leave the column out",
+                    place=table.place(int(bad[0]), theirs["frame"]),
+                )
+            )
+        frame = raw.astype(np.int64)
+    return (
+        table.values[theirs["time_s"]],
+        np.column_stack(phis),
+        np.column_stack([absent if s is None else s for s in sigmas]),
+        frame,
+        _read_meta(path, table),
+        table,
+    )
+
+
+def _read_meta(path: Path, table: Columns) -> dict[str, Any]:
+    text = table.metadata.get(META_KEY)
+    side = path.with_name(path.name + ".json")
+    if text is None and table.lines is not None and side.is_file():
+        text = side.read_text(encoding="utf-8")
+    if text is None:
+        return {"source": str(path)}
+    try:
+        meta = json.loads(text)
+    except json.JSONDecodeError as problem:
+        raise AnglesError(
+            fault(str(side if table.lines is not None else path), f"its metadata is not JSON ({problem})")
+        ) from problem
+    return meta if isinstance(meta, dict) else {"source": str(path)}
+
+
+def _read_published(folder: Path) -> tuple[Floats, Floats, Floats]:
+    """``DPmean_data_RB{k}.npy`` and ``DPstd_data_RB{k}.npy`` of a folder: s, rad, rad."""
+    t: Floats | None = None
+    phis: list[Floats] = []
+    sigmas: list[Floats] = []
+    for k in (0, 1):
+        mean = folder / f"DPmean_data_RB{k}.npy"
+        if not mean.is_file():
+            break
+        when, degrees = _read_pair(mean)
+        if t is None:
+            t = when
+        elif not np.array_equal(t, when):
+            raise AnglesError(
+                fault(
+                    str(mean), "its times are not those of DPmean_data_RB0.npy", "Give one recording's files"
+                )
+            )
+        phis.append(np.radians(degrees))
+        spread = folder / f"DPstd_data_RB{k}.npy"
+        if spread.is_file():
+            when, degrees = _read_pair(spread)
+            if not np.array_equal(t, when):
+                raise AnglesError(
+                    fault(
+                        str(spread),
+                        "its times are not those of DPmean_data_RB0.npy",
+                        "Give one recording's files",
+                    )
+                )
+            sigmas.append(np.radians(degrees))
+        else:
+            sigmas.append(np.full(t.size, np.nan))
+    if t is None:
+        raise AnglesError(
+            fault(
+                str(folder),
+                "the folder has no DPmean_data_RB0.npy",
+                "Give an angles table (Parquet or CSV) or a folder in the authors' form",
+            )
+        )
+    return t, np.column_stack(phis), np.column_stack(sigmas)
+
+
+def _read_pair(path: Path) -> tuple[Floats, Floats]:
+    try:
+        array = np.load(path, allow_pickle=False)
+    except (OSError, ValueError, EOFError) as problem:
+        raise AnglesError(
+            fault(str(path), f"the file is not a NumPy array ({problem})", "Copy it again")
+        ) from problem
+    if (
+        not isinstance(array, np.ndarray)
+        or array.ndim != 2
+        or array.shape[0] != 2
+        or array.dtype.kind not in "fiu"
+    ):
+        raise AnglesError(
+            fault(
+                str(path),
+                f"expected an array of numbers of shape (2, T), found {getattr(array, 'shape', type(array))}",
+                "Row 0 is the time in s, row 1 the angle in degrees",
+            )
+        )
+    return array[0].astype(np.float64), array[1].astype(np.float64)
+
+
+def write_angles(angles: LinkAngles, path: str | Path) -> None:
+    """Writes the table as Parquet or CSV, by the ending; empty (null) where a link was not seen.
+
+    ``meta`` and ``name`` go into the Parquet metadata, or beside a CSV into ``PATH.json``. Numbers read back
+    bit for bit. The file appears whole or not at all.
+
+    Raises :class:`~pydpend.errors.AnglesError` for another ending or a path that cannot be written.
+    """
+    path = Path(path)
+    meta = json.dumps({**angles.meta, "name": angles.name}, sort_keys=True)
+    columns = angles.to_columns()
+    temporary = path.with_name(f".{path.name}.part")
+    try:
+        if path.suffix == ".parquet":
+            table = pa.table({k: pa.array(v, from_pandas=True) for k, v in columns.items()})
+            pq.write_table(table.replace_schema_metadata({META_KEY: meta}), temporary)
+        elif path.suffix == ".csv":
+            with temporary.open("w", encoding="utf-8", newline="") as file:
+                file.write(",".join(columns) + "\n")
+                for row in zip(*(v.tolist() for v in columns.values()), strict=True):
+                    file.write(",".join("" if v != v else repr(v) for v in row) + "\n")
+            side = path.with_name(path.name + ".json")
+            side.write_text(meta + "\n", encoding="utf-8")
+        else:
+            raise AnglesError(
+                fault(str(path), f"the ending {path.suffix!r} is not known", "Use .parquet or .csv")
+            )
+        temporary.replace(path)
+    except OSError as problem:
+        temporary.unlink(missing_ok=True)
+        raise AnglesError(
+            fault(str(path), f"the file cannot be written ({problem.strerror})", "Check the folder")
+        ) from problem

@@ -1,0 +1,204 @@
+"""The angles of the links over time: :class:`LinkAngles`, and what makes one valid.
+
+Its file forms are in ``files``; how angles come from nodes is in the other files beside this one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pydpend.errors import AnglesError, fault
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class LinkAngles:
+    """Angles of one or two links at T instants.
+
+    ``t_s`` (T,): s, finite, strictly increasing. ``phi_rad`` (T, L), L = 1 or 2: absolute angle of each
+    link to the downward vertical, **counter-clockwise positive, zero hanging down**, unwrapped over turns,
+    NaN where the link was not seen. ``sigma_rad`` (T, L): standard uncertainty of each, NaN where not seen
+    or not known. ``frame`` (T,): index in the recording, or ``None``. ``meta``: how they were had, JSON-like.
+    ``name``: the recording's, for messages and legends.
+
+    Raises :class:`~pydpend.errors.AnglesError` if the shapes, times or uncertainties cannot be right.
+    """
+
+    t_s: Floats
+    phi_rad: Floats
+    sigma_rad: Floats
+    frame: NDArray[np.int64] | None = None
+    meta: dict[str, Any] = field(default_factory=dict)
+    name: str = "angles"
+
+    def __post_init__(self) -> None:
+        t = np.ascontiguousarray(self.t_s, dtype=np.float64)
+        phi = np.ascontiguousarray(self.phi_rad, dtype=np.float64)
+        sigma = np.ascontiguousarray(self.sigma_rad, dtype=np.float64)
+        if t.ndim != 1 or t.size == 0:
+            raise AnglesError(
+                fault(self.name, f"times of shape {t.shape}, not (T,) with T > 0", "Give one time a row")
+            )
+        if phi.shape not in ((t.size, 1), (t.size, 2)) or sigma.shape != phi.shape:
+            raise AnglesError(
+                fault(
+                    self.name,
+                    f"angles of shape {phi.shape} and sigmas of shape {sigma.shape} for {t.size} times",
+                    "Both must be (T, 1) or (T, 2)",
+                )
+            )
+        if self.frame is not None:
+            frame = np.ascontiguousarray(self.frame, dtype=np.int64)
+            if frame.shape != t.shape:
+                raise AnglesError(
+                    fault(self.name, f"{frame.size} frames for {t.size} times", "Give one frame a row")
+                )
+            object.__setattr__(self, "frame", frame)
+        sigma = np.where(np.isnan(phi), np.nan, sigma)
+        for key, value in (("t_s", t), ("phi_rad", phi), ("sigma_rad", sigma)):
+            object.__setattr__(self, key, value)
+        check_table(self.name, t, phi, sigma, self.frame, lambda row, column: f"row {row}, column {column}")
+
+    @property
+    def links(self) -> int:
+        """Number of links, 1 or 2."""
+        return int(self.phi_rad.shape[1])
+
+    @property
+    def seen(self) -> NDArray[np.bool_]:
+        """Where each link has an angle, (T, L)."""
+        return np.isfinite(self.phi_rad)
+
+    @property
+    def step_s(self) -> float:
+        """Median time between rows, s; NaN for a single row."""
+        return float(np.median(np.diff(self.t_s))) if self.t_s.size > 1 else math.nan
+
+    def between(self, start_s: float | None = None, stop_s: float | None = None) -> LinkAngles:
+        """The rows with ``start_s <= t <= stop_s``; raises :class:`AnglesError` if there are none."""
+        keep = np.ones(self.t_s.size, dtype=bool)
+        if start_s is not None:
+            keep &= self.t_s >= start_s
+        if stop_s is not None:
+            keep &= self.t_s <= stop_s
+        if not keep.any():
+            raise AnglesError(
+                fault(
+                    self.name,
+                    f"there is nothing between {start_s} s and {stop_s} s",
+                    f"The recording is from {self.t_s[0]:.6g} s to {self.t_s[-1]:.6g} s",
+                )
+            )
+        return replace(
+            self,
+            t_s=self.t_s[keep],
+            phi_rad=self.phi_rad[keep],
+            sigma_rad=self.sigma_rad[keep],
+            frame=None if self.frame is None else self.frame[keep],
+        )
+
+    def to_columns(self) -> dict[str, NDArray[Any]]:
+        """The table's columns by name, in the order of the file."""
+        out: dict[str, NDArray[Any]] = {}
+        if self.frame is not None:
+            out["frame"] = self.frame
+        out["time_s"] = self.t_s
+        for k in range(self.links):
+            out[f"phi{k + 1}_rad"] = self.phi_rad[:, k]
+        for k in range(self.links):
+            out[f"sigma{k + 1}_rad"] = self.sigma_rad[:, k]
+        return out
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """The table as a pandas frame (pandas must be installed)."""
+        import pandas as pd
+
+        return pd.DataFrame(self.to_columns())
+
+
+def check_table(
+    name: str,
+    t: Floats,
+    phi: Floats,
+    sigma: Floats,
+    frame: NDArray[np.int64] | None,
+    place: Callable[[int, str], str],
+) -> None:
+    """Times finite and rising, angles not infinite, sigmas not negative, no wrap between neighbours."""
+    bad = np.flatnonzero(~np.isfinite(t))
+    if bad.size:
+        raise AnglesError(
+            fault(
+                name,
+                f"the time {t[bad[0]]} is not a number",
+                "Give every row a time",
+                place=place(int(bad[0]), "time_s"),
+            )
+        )
+    bad = np.flatnonzero(np.diff(t) <= 0) + 1
+    if bad.size:
+        i = int(bad[0])
+        raise AnglesError(
+            fault(
+                name,
+                f"the time {t[i]:.9g} s does not come after {t[i - 1]:.9g} s",
+                "Sort the rows by time and remove repeats",
+                place=place(i, "time_s"),
+            )
+        )
+    if frame is not None:
+        bad = np.flatnonzero(np.diff(frame) <= 0) + 1
+        if bad.size:
+            i = int(bad[0])
+            raise AnglesError(
+                fault(
+                    name,
+                    f"frame {frame[i]} does not come after frame {frame[i - 1]}",
+                    "Sort the rows by frame and remove repeats",
+                    place=place(i, "frame"),
+                )
+            )
+    for k in range(phi.shape[1]):
+        bad = np.flatnonzero(np.isinf(phi[:, k]))
+        if bad.size:
+            raise AnglesError(
+                fault(
+                    name,
+                    "the angle is infinite",
+                    "Leave the field empty where the link was not seen",
+                    place=place(int(bad[0]), f"phi{k + 1}_rad"),
+                )
+            )
+        bad = np.flatnonzero((sigma[:, k] < 0) | np.isinf(sigma[:, k]))
+        if bad.size:
+            i = int(bad[0])
+            raise AnglesError(
+                fault(
+                    name,
+                    f"the standard uncertainty {sigma[i, k]:.6g} rad cannot be",
+                    "Give a finite one that is not negative, or none",
+                    place=place(i, f"sigma{k + 1}_rad"),
+                )
+            )
+        step = np.abs(np.diff(phi[:, k]))
+        bad = np.flatnonzero(step > math.pi) + 1
+        if bad.size:
+            i = int(bad[0])
+            raise AnglesError(
+                fault(
+                    name,
+                    f"the angle jumps by {step[i - 1]:.4g} rad from one row to the next: it is not unwrapped",
+                    "Read it with unwrap=True",
+                    place=place(i, f"phi{k + 1}_rad"),
+                )
+            )
