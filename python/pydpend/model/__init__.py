@@ -1,0 +1,32 @@
+"""The double pendulum's constants and damping coefficients: what every computation on it starts from."""
+
+from __future__ import annotations
+
+from pydpend.model.laws import UNITS, Damping
+from pydpend.model.pendulum import CONSTANTS, Model, uniform_bar
+from pydpend.model.reduce import (
+    G_MM_S2,
+    TABLE_7,
+    ModelWarning,
+    derived,
+    from_parts,
+    jacobian,
+    published,
+    reduced_constants,
+)
+
+__all__ = [
+    "CONSTANTS",
+    "G_MM_S2",
+    "TABLE_7",
+    "UNITS",
+    "Damping",
+    "Model",
+    "ModelWarning",
+    "derived",
+    "from_parts",
+    "jacobian",
+    "published",
+    "reduced_constants",
+    "uniform_bar",
+]
