@@ -117,8 +117,8 @@ def test_table_8_as_a_file_of_parts_gives_the_same_constants() -> None:
     model = Model.from_toml(Path(__file__).parents[1] / "docs" / "model-a.toml")
     right = derived("A")
     np.testing.assert_allclose(model.constants(), right.constants(), rtol=1e-12)
-    # The file's numbers are independent where Table 8's identical parts are fully correlated: the upper bearing's
-    # balls add 2e3 g mm2 to psi, with an uncertainty of 700 against 3.7e4.
+    # The file's numbers are independent where Table 8's identical parts are fully correlated, but the upper
+    # bearings' balls are 16 g mm2 of psi's 3.4e6.
     assert model.covariance is not None
     assert right.covariance is not None
     np.testing.assert_allclose(np.diag(model.covariance), np.diag(right.covariance), rtol=1e-3)
