@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
 from pydpend.errors import SimulationError
 from pydpend.model import Damping, derived
 from pydpend.simulate import simulate

@@ -290,7 +290,7 @@ class _System:
 
             def g(_: float, y: Array, j: int = j) -> float:
                 if mode[j] == 0.0:
-                    _, n, torque = self.motion(y, mode)
+                    _a, n, torque = self.motion(y, mode)
                     return float(self.capacity(n)[j] - abs(torque[j]))
                 rate = y[2] if j == 0 else y[3] - y[2]
                 return float((mode[j] or 0.0) * rate)
@@ -312,7 +312,7 @@ class _System:
                 choices.append((float(np.sign(rate[j])),))
             else:
                 choices.append((0.0, 1.0, -1.0))
-        best, worst = None, np.inf
+        best, worst = None, float("inf")
         for c in product(*choices):
             candidate = (c[0], c[1])
             a, n, torque = self.motion(y, candidate)
@@ -323,13 +323,13 @@ class _System:
                 if len(choices[j]) == 1:
                     continue
                 if candidate[j] == 0.0:
-                    over = abs(torque[j]) - hold[j]
+                    over = float(abs(torque[j]) - hold[j])
                     # the joint that has just broken loose must not be put back
                     if joint == j and mode[j] == 0.0:
                         over = np.inf
                     gap = max(gap, over)
                 else:
-                    gap = max(gap, -(candidate[j] or 0.0) * accel[j])
+                    gap = max(gap, float(-(candidate[j] or 0.0) * accel[j]))
             if gap <= 0:
                 return candidate
             if gap < worst:
