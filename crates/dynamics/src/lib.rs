@@ -16,9 +16,13 @@
 //! 2 lambda a2 + (zeta + A3 cos d) a1 - A3 sin d w1^2 + kappa sin(phi2) = Q2
 //! ```
 
+pub mod contact;
+pub mod dop853;
 pub mod motion;
 pub mod parameters;
 pub mod scalar;
+pub mod simulate;
+mod tableau;
 pub mod terms;
 
 pub use motion::{Contact, Motion, State, accelerations, energies, mass_matrix, normal_forces};

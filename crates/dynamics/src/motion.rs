@@ -81,7 +81,7 @@ pub fn mass_matrix<S: Real>(p: &Parameters<S>, phi: [S; 2]) -> [S; 3] {
 /// Joint forces `[Tx1, Ty1, Tx2, Ty2]`, N (Eq. 33 corrected, erratum 15): affine in the accelerations.
 fn joint_forces<S: Real>(p: &Parameters<S>, x: &State<S>, t: &Trig<S>, a: [S; 2]) -> [S; 4] {
     let g = p.fixed.g_m_s2;
-    let (ga, gk) = (p.get(Field::Sigma) * (1.0 / g), p.get(Field::Kappa) * (1.0 / g));
+    let (ga, gk) = (p.get(Field::Sigma) * inverse(g), p.get(Field::Kappa) * inverse(g));
     let b1 = p.fixed.m2_kg * p.fixed.l1_m;
     let f = |i: usize| t.c[i] * a[i] - t.s[i] * x[2 + i] * x[2 + i];
     let h = |i: usize| t.s[i] * a[i] + t.c[i] * x[2 + i] * x[2 + i];
@@ -92,6 +92,11 @@ fn joint_forces<S: Real>(p: &Parameters<S>, x: &State<S>, t: &Trig<S>, a: [S; 2]
         f1 * b1 + gk * f2,
         h1 * b1 + gk * h2 + p.fixed.m2_kg * g,
     ]
+}
+
+/// First moments of mass are weight moments over g; without gravity they are not known from them and taken as zero.
+fn inverse(g: f64) -> f64 {
+    if g > 0.0 { 1.0 / g } else { 0.0 }
 }
 
 fn norm<S: Real>(x: S, y: S) -> S {
@@ -135,6 +140,8 @@ struct Balance<'a, S> {
     q: [S; 2],
     sign: [S; 2],
     contact: [Contact; 2],
+    /// Power each term takes out, without the load-dependent ones.
+    power: [S; TERMS.len()],
 }
 
 impl<'a, S: Real> Balance<'a, S> {
@@ -159,17 +166,40 @@ impl<'a, S: Real> Balance<'a, S> {
         let sign = signs(x, contact);
         let zero = S::constant(0.0);
         let k = Kinematics { w: [w1, w2], cos_d: t.c_d, normal: [zero, zero], sign };
-        for term in TERMS.iter().filter(|term| matches!(term.kind, Kind::Drag | Kind::Dry | Kind::Drive)) {
+        let mut power = [zero; TERMS.len()];
+        for (term, watt) in TERMS.iter().zip(&mut power) {
             // The load-dependent terms see no load here; they are added with the accelerations.
-            if matches!(term.field, Field::Rmu1 | Field::Rmu2) || !p.is_active(term.field) {
+            if !p.is_active(term.field)
+                || matches!(term.field, Field::Rmu1 | Field::Rmu2)
+                || !matches!(term.kind, Kind::Drag | Kind::Dry | Kind::Drive)
+            {
                 continue;
             }
             let f = term.unit_force(&k, &p.fixed);
             let c = p.get(term.field);
             q[0] -= c * f[0];
             q[1] -= c * f[1];
+            *watt = c * (f[0] * w1 + f[1] * w2);
         }
-        Self { p, x, t, m, q, sign, contact }
+        Self { p, x, t, m, q, sign, contact, power }
+    }
+
+    /// Normal forces and dry torques that belong to these accelerations.
+    fn motion(&self, a: [S; 2]) -> Motion<S> {
+        let (r, normal) = self.imbalance(a);
+        let capacity = [
+            self.p.get(Field::Rmu1) * normal[0] + self.p.get(Field::TauC1),
+            self.p.get(Field::Rmu2) * normal[1] + self.p.get(Field::TauC2),
+        ];
+        // Where a joint is stuck, the imbalance left is what its constraint must give.
+        let sliding = |j: usize| self.sign[j] * capacity[j];
+        let dry = match (self.contact[0] == Contact::Stuck, self.contact[1] == Contact::Stuck) {
+            (false, false) => [sliding(0), sliding(1)],
+            (true, false) => [-r[0], sliding(1)],
+            (false, true) => [sliding(0), -r[1]],
+            (true, true) => [-r[0] - r[1], -r[1]],
+        };
+        Motion { a, normal, dry, capacity }
     }
 
     /// Inertia minus force on both links, without constraint torques, and the normal forces.
@@ -204,7 +234,8 @@ impl Balance<'_, f64> {
         let f = joint_forces(self.p, self.x, &self.t, a);
         let (t, p) = (&self.t, self.p);
         let g = p.fixed.g_m_s2;
-        let (ga, gk, b1) = (p.get(Field::Sigma) / g, p.get(Field::Kappa) / g, p.fixed.m2_kg * p.fixed.l1_m);
+        let (ga, gk) = (p.get(Field::Sigma) * inverse(g), p.get(Field::Kappa) * inverse(g));
+        let b1 = p.fixed.m2_kg * p.fixed.l1_m;
         let of = |x: f64, y: f64, k1: f64| {
             let n = x.hypot(y);
             if n > 0.0 {
@@ -227,11 +258,16 @@ impl Balance<'_, f64> {
 
     fn solve(&self) -> [f64; 2] {
         let mut a = [0.0; 2];
+        // Without friction by load the equations are linear, and Newton's first step is the solution.
+        let linear = !self.p.is_active(Field::Rmu1) && !self.p.is_active(Field::Rmu2);
         for _ in 0..50 {
             let (r, _) = self.imbalance(a);
             let e = self.equations(r, a);
             let step = solve2(self.slope(a), e);
             a = [a[0] - step[0], a[1] - step[1]];
+            if linear {
+                break;
+            }
             // Newton converges quadratically: after a step of 1e-7 relative the next would be below rounding.
             if step[0].abs() + step[1].abs() <= 1e-7 * (1.0 + a[0].abs() + a[1].abs()) {
                 break;
@@ -260,20 +296,24 @@ pub fn accelerations<S: Real>(p: &Parameters<S>, x: &State<S>, contact: [Contact
     let (r, _) = balance.imbalance(a);
     let step = solve2(values.slope(start), balance.equations(r, a));
     a = [a[0] - step[0], a[1] - step[1]];
-    let (r, normal) = balance.imbalance(a);
-    let capacity = [
-        p.get(Field::Rmu1) * normal[0] + p.get(Field::TauC1),
-        p.get(Field::Rmu2) * normal[1] + p.get(Field::TauC2),
-    ];
-    // Where a joint is stuck, the imbalance left is what its constraint must give.
-    let sliding = |j: usize| balance.sign[j] * capacity[j];
-    let dry = match (contact[0] == Contact::Stuck, contact[1] == Contact::Stuck) {
-        (false, false) => [sliding(0), sliding(1)],
-        (true, false) => [-r[0], sliding(1)],
-        (false, true) => [sliding(0), -r[1]],
-        (true, true) => [-r[0] - r[1], -r[1]],
-    };
-    Motion { a, normal, dry, capacity }
+    balance.motion(a)
+}
+
+/// [`accelerations`] and [`dissipation`] in plain numbers and one pass: what a simulation evaluates at every stage.
+#[must_use]
+pub fn flow(p: &Parameters<f64>, x: &State<f64>, contact: [Contact; 2]) -> (Motion<f64>, [f64; TERMS.len()]) {
+    let balance = Balance::new(p, x, contact);
+    let motion = balance.motion(balance.solve());
+    let mut power = balance.power;
+    let rate = [x[2], x[3] - x[2]];
+    for (term, watt) in TERMS.iter().zip(&mut power) {
+        match term.field {
+            Field::Rmu1 => *watt = p.get(Field::Rmu1) * motion.normal[0] * balance.sign[0] * rate[0],
+            Field::Rmu2 => *watt = p.get(Field::Rmu2) * motion.normal[1] * balance.sign[1] * rate[1],
+            _ => {}
+        }
+    }
+    (motion, power)
 }
 
 /// Power each row of [`TERMS`] takes out of the motion, W; dry terms of a stuck joint take none. Their sum is

@@ -143,6 +143,7 @@ impl<const N: usize> Sub for Dual<N> {
 impl<const N: usize> Mul for Dual<N> {
     type Output = Self;
     #[inline]
+    #[expect(clippy::suspicious_arithmetic_impl, reason = "the product rule adds")]
     fn mul(self, o: Self) -> Self {
         let (a, b) = (self.v, o.v);
         self.zip(&o, a * b, |x, y| x * b + a * y)

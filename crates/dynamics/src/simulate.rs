@@ -1,0 +1,589 @@
+//! A motion with exact dry friction: DOP853 between located events, energies and works beside the state.
+
+use crate::contact::{Friction, Joints, rate};
+use crate::dop853::{Dense, Step, next_factor};
+use crate::motion::{Contact, State, energies, flow};
+use crate::parameters::Parameters;
+use crate::terms::TERMS;
+
+/// State and the work taken out by each of [`TERMS`].
+pub const SIZE: usize = 4 + TERMS.len();
+/// Points of each step at which contacts are examined, so that a joint that stops and turns back is not missed.
+const LOOKS: u32 = 8;
+/// A rate below this has not crossed zero, rad/s: rounding of rates of order 10 that cancel.
+const RATE_ZERO: f64 = 1e-13;
+/// Steps after which a run is given up.
+const MAX_STEPS: usize = 10_000_000;
+
+/// What a simulation is asked.
+#[derive(Clone, Copy, Debug)]
+pub struct Settings {
+    /// Local error allowed per step, relative to one radian, to the larger of the rate and 1 rad/s, and to the
+    /// energy's scale.
+    pub tolerance: f64,
+    /// Dry friction's law.
+    pub friction: Friction,
+    /// Whether joint 2 is pinned.
+    pub pinned: bool,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { tolerance: 3e-13, friction: Friction::Exact, pinned: false }
+    }
+}
+
+/// A change of contact.
+#[derive(Clone, Copy, Debug)]
+pub struct Event {
+    /// When, s.
+    pub t_s: f64,
+    /// Joint, 0 or 1.
+    pub joint: usize,
+    /// The contact it left.
+    pub from: Contact,
+    /// The contact it went into.
+    pub to: Contact,
+}
+
+/// How a simulation ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ending {
+    /// At the last time.
+    Done,
+    /// Both joints stuck for good before the last time; the rest of the samples are that rest.
+    AtRest,
+}
+
+/// One time of a simulation.
+#[derive(Clone, Copy, Debug)]
+pub struct Sample {
+    /// Angles and rates.
+    pub x: State<f64>,
+    /// Accelerations, rad/s^2.
+    pub a: [f64; 2],
+    /// Normal forces, N.
+    pub normal: [f64; 2],
+    /// Dry torques, N m.
+    pub dry: [f64; 2],
+    /// Kinetic plus potential energy, J.
+    pub energy: f64,
+    /// Work taken out since the start by each of [`TERMS`], J.
+    pub works: [f64; TERMS.len()],
+}
+
+/// A simulated motion.
+#[derive(Clone, Debug)]
+pub struct Run {
+    /// One per time asked for.
+    pub samples: Vec<Sample>,
+    /// Changes of contact, in order.
+    pub events: Vec<Event>,
+    /// How it ended.
+    pub ending: Ending,
+    /// When it ended, s.
+    pub end_s: f64,
+    /// Steps taken.
+    pub steps: usize,
+}
+
+/// Why a simulation could not be done.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Failure {
+    /// The state is not finite, or a pinned joint turns.
+    #[error("state: {0}")]
+    State(String),
+    /// The times do not increase.
+    #[error("t_s, index {index}: {now} s does not come after {before} s")]
+    Times {
+        /// Where.
+        index: usize,
+        /// The time before.
+        before: f64,
+        /// The time there.
+        now: f64,
+    },
+    /// A setting out of range.
+    #[error("{0}")]
+    Settings(String),
+    /// The step became too small, or there were too many.
+    #[error("simulation, t = {t_s} s: {problem}. Check the coefficients and the tolerance")]
+    Stalled {
+        /// When.
+        t_s: f64,
+        /// What happened.
+        problem: String,
+    },
+}
+
+/// A pendulum on its way: the state, its contact, and the size of the next step.
+pub struct Flight<'a> {
+    p: &'a Parameters<f64>,
+    joints: Joints,
+    /// Time, s.
+    pub t_s: f64,
+    /// State and works.
+    pub y: [f64; SIZE],
+    /// Contact of each joint.
+    pub contact: [Contact; 2],
+    slope: [f64; SIZE],
+    h: f64,
+    tolerance: f64,
+    energy_scale: f64,
+    /// Steps accepted so far.
+    pub steps: usize,
+    idle: usize,
+}
+
+/// What one call of [`Flight::step`] did.
+pub struct Leg {
+    /// When it began, s.
+    pub from_s: f64,
+    /// How long it is, s.
+    pub h: f64,
+    /// The motion within.
+    pub dense: Dense<f64, SIZE>,
+    /// The contact during it.
+    pub contact: [Contact; 2],
+    /// The change of contact at its end, if it ended by one.
+    pub event: Option<Event>,
+}
+
+fn state(y: &[f64; SIZE]) -> State<f64> {
+    [y[0], y[1], y[2], y[3]]
+}
+
+fn derivative(p: &Parameters<f64>, y: &[f64; SIZE], contact: [Contact; 2]) -> [f64; SIZE] {
+    let x = state(y);
+    let (m, power) = flow(p, &x, contact);
+    let mut out = [0.0; SIZE];
+    out[..4].copy_from_slice(&[x[2], x[3], m.a[0], m.a[1]]);
+    out[4..].copy_from_slice(&power);
+    out
+}
+
+impl<'a> Flight<'a> {
+    /// Starts at `x` and `t_s`.
+    ///
+    /// # Errors
+    /// A state that is not finite, a pinned joint that turns, a tolerance that is not one.
+    pub fn new(
+        p: &'a Parameters<f64>,
+        x: State<f64>,
+        t_s: f64,
+        settings: &Settings,
+    ) -> Result<Self, Failure> {
+        if !x.iter().all(|v| v.is_finite()) {
+            return Err(Failure::State(format!("{x:?} is not finite")));
+        }
+        if settings.pinned && x[2] != x[3] {
+            return Err(Failure::State(format!(
+                "joint 2 is pinned, but w1 = {} and w2 = {} differ",
+                x[2], x[3]
+            )));
+        }
+        if !(1e-15..=1e-3).contains(&settings.tolerance) {
+            return Err(Failure::Settings(format!(
+                "tolerance is {}. Choose one from 1e-15 to 1e-3",
+                settings.tolerance
+            )));
+        }
+        if let Friction::Smooth(width) = settings.friction
+            && !(width > 0.0 && width.is_finite())
+        {
+            return Err(Failure::Settings(format!(
+                "the smooth law's width is {width} rad/s. Choose a positive one"
+            )));
+        }
+        let joints = Joints::new(p, settings.friction, settings.pinned);
+        let contact = joints.resolve(p, &x, None, None);
+        let mut y = [0.0; SIZE];
+        y[..4].copy_from_slice(&x);
+        let [kinetic, potential] = energies(p, &x);
+        let slope = derivative(p, &y, contact);
+        Ok(Self {
+            p,
+            joints,
+            t_s,
+            y,
+            contact,
+            slope,
+            h: 1e-3,
+            tolerance: settings.tolerance,
+            energy_scale: (kinetic + potential).abs().max(1e-3 * weight(p)),
+            steps: 0,
+            idle: 0,
+        })
+    }
+
+    /// Whether both joints are stuck at rest: nothing will ever change.
+    #[must_use]
+    pub fn at_rest(&self) -> bool {
+        self.contact == [Contact::Stuck; 2] && self.y[2] == 0.0 && self.y[3] == 0.0
+    }
+
+    /// One step, at most to `until_s`, ended early by a change of contact.
+    ///
+    /// # Errors
+    /// [`Failure::Stalled`].
+    pub fn step(&mut self, until_s: f64) -> Result<Leg, Failure> {
+        let contact = self.contact;
+        let p = self.p;
+        let mut f = |y: &[f64; SIZE]| derivative(p, y, contact);
+        let mut rejected = false;
+        let (mut step, h) = loop {
+            let last = self.t_s + self.h >= until_s;
+            let h = if last { until_s - self.t_s } else { self.h };
+            if h < 1e-13 * (1.0 + self.t_s.abs()) && !last {
+                return Err(self.stalled("the step became too small"));
+            }
+            let step = Step::take(&mut f, &self.y, &self.slope, h);
+            let error = step.error(&self.scale(&step.end));
+            if error <= 1.0 {
+                let factor = next_factor(error, rejected);
+                // A step cut short by the end says little about the next.
+                self.h = if last { self.h.max(h * factor) } else { h * factor };
+                break (step, h);
+            }
+            self.h = if error.is_finite() { h * next_factor(error, true) } else { h * 0.1 };
+            rejected = true;
+        };
+        self.steps += 1;
+        if self.steps > MAX_STEPS {
+            return Err(self.stalled("too many steps"));
+        }
+        let from_s = self.t_s;
+        let dense = step.dense(&mut f);
+        if let Some((fraction, joint)) = self.first_event(&dense) {
+            return self.stop_at(h, fraction, joint);
+        }
+        self.idle = 0;
+        self.t_s = if h == until_s - from_s { until_s } else { from_s + h };
+        self.y = step.end;
+        self.slope = step.slope;
+        Ok(Leg { from_s, h, dense, contact, event: None })
+    }
+
+    fn stalled(&self, problem: &str) -> Failure {
+        Failure::Stalled { t_s: self.t_s, problem: problem.to_owned() }
+    }
+
+    fn scale(&self, end: &[f64; SIZE]) -> [f64; SIZE] {
+        let mut scale = [self.tolerance; SIZE];
+        for i in 2..4 {
+            scale[i] *= self.y[i].abs().max(end[i].abs()).max(1.0);
+        }
+        for s in &mut scale[4..] {
+            *s *= self.energy_scale;
+        }
+        scale
+    }
+
+    /// Where the margin of `joint` is measured zero.
+    fn zero(&self, joint: usize) -> f64 {
+        match self.contact[joint] {
+            Contact::Slip(_) => -RATE_ZERO,
+            _ => -1e-13 * weight(self.p),
+        }
+    }
+
+    /// The first fraction of the step at which a contact ends, and the joint.
+    fn first_event(&self, dense: &Dense<f64, SIZE>) -> Option<(f64, usize)> {
+        let mut first: Option<(f64, usize)> = None;
+        for joint in 0..2 {
+            if !self.joints.watched(joint, self.contact[joint]) {
+                continue;
+            }
+            let margin = |x: f64| self.joints.margin(self.p, &dense.first::<4>(x), self.contact, joint);
+            let mut before = 0.0;
+            for look in 1..=LOOKS {
+                let here = f64::from(look) / f64::from(LOOKS);
+                if first.is_some_and(|(f, _)| before >= f) {
+                    break;
+                }
+                if margin(here) < self.zero(joint) {
+                    let root = bisect(before, here, margin);
+                    if first.is_none_or(|(f, _)| root < f) {
+                        first = Some((root, joint));
+                    }
+                    break;
+                }
+                before = here;
+            }
+        }
+        first
+    }
+
+    /// Goes to the event with a step of its own, and changes contact.
+    fn stop_at(&mut self, h: f64, fraction: f64, joint: usize) -> Result<Leg, Failure> {
+        let (from_s, contact, p) = (self.t_s, self.contact, self.p);
+        let mut f = |y: &[f64; SIZE]| derivative(p, y, contact);
+        let mut short = h * fraction;
+        let mut step = Step::take(&mut f, &self.y, &self.slope, short);
+        if let Contact::Slip(_) = contact[joint] {
+            // One Newton correction from the dense output's root to the step's own.
+            let v = rate(&state(&step.end), joint);
+            let push = if joint == 0 { step.slope[2] } else { step.slope[3] - step.slope[2] };
+            let better = short - v / push;
+            if better > 0.0 && (better - short).abs() < 0.01 * h {
+                short = better;
+                step = Step::take(&mut f, &self.y, &self.slope, short);
+            }
+        }
+        let dense = step.dense(&mut f);
+        if short <= 1e-12 {
+            self.idle += 1;
+            if self.idle > 20 {
+                return Err(self.stalled("contacts change without end"));
+            }
+        } else {
+            self.idle = 0;
+        }
+        self.t_s = from_s + short;
+        self.y = step.end;
+        let mut loose = None;
+        match contact[joint] {
+            Contact::Stuck => loose = Some(joint),
+            _ if joint == 0 => self.y[2] = 0.0,
+            _ => self.y[3] = self.y[2],
+        }
+        // A joint that stays stuck keeps its rate exactly.
+        if contact[0] == Contact::Stuck {
+            self.y[2] = 0.0;
+        }
+        if contact[1] == Contact::Stuck {
+            self.y[3] = self.y[2];
+        }
+        self.contact = self.joints.resolve(p, &state(&self.y), Some(contact), loose);
+        self.slope = derivative(p, &self.y, self.contact);
+        let event = Event { t_s: self.t_s, joint, from: contact[joint], to: self.contact[joint] };
+        Ok(Leg { from_s, h: short, dense, contact, event: Some(event) })
+    }
+}
+
+/// Weight moments: the scale of energies and torques.
+fn weight(p: &Parameters<f64>) -> f64 {
+    use crate::parameters::Field;
+    let w = p.get(Field::Sigma).abs() + p.get(Field::Kappa).abs();
+    if w > 0.0 { w } else { 1.0 }
+}
+
+/// Where `f` falls through zero between `a` (not below) and `b` (below).
+fn bisect(mut a: f64, mut b: f64, f: impl Fn(f64) -> f64) -> f64 {
+    for _ in 0..60 {
+        let middle = 0.5 * (a + b);
+        if middle <= a || middle >= b {
+            break;
+        }
+        if f(middle) < 0.0 { b = middle } else { a = middle }
+    }
+    0.5 * (a + b)
+}
+
+fn sample(p: &Parameters<f64>, y: &[f64; SIZE], contact: [Contact; 2]) -> Sample {
+    let x = state(y);
+    let (m, _) = flow(p, &x, contact);
+    let [kinetic, potential] = energies(p, &x);
+    Sample {
+        x,
+        a: m.a,
+        normal: m.normal,
+        dry: m.dry,
+        energy: kinetic + potential,
+        works: std::array::from_fn(|i| y[4 + i]),
+    }
+}
+
+/// The motion from `x` at `times[0]`, sampled at `times`.
+///
+/// # Errors
+/// [`Failure`]: a bad state, times that do not increase, or a run that cannot go on.
+pub fn simulate(
+    p: &Parameters<f64>,
+    x: State<f64>,
+    times: &[f64],
+    settings: &Settings,
+) -> Result<Run, Failure> {
+    for (i, pair) in times.windows(2).enumerate() {
+        if pair[1] <= pair[0] || pair[1].is_nan() {
+            return Err(Failure::Times { index: i + 1, before: pair[0], now: pair[1] });
+        }
+    }
+    let (Some(first), Some(last)) = (times.first(), times.last()) else {
+        return Err(Failure::Settings("no times were asked for".to_owned()));
+    };
+    if !first.is_finite() || !last.is_finite() {
+        return Err(Failure::Settings(format!("times from {first} to {last} s are not finite")));
+    }
+    let mut flight = Flight::new(p, x, *first, settings)?;
+    let mut run = Run {
+        samples: Vec::with_capacity(times.len()),
+        events: Vec::new(),
+        ending: Ending::Done,
+        end_s: *last,
+        steps: 0,
+    };
+    run.samples.push(sample(p, &flight.y, flight.contact));
+    let mut next = 1;
+    while next < times.len() {
+        if flight.at_rest() {
+            run.ending = Ending::AtRest;
+            run.end_s = flight.t_s;
+            let rest = sample(p, &flight.y, flight.contact);
+            run.samples.resize(times.len(), rest);
+            break;
+        }
+        let leg = flight.step(*last)?;
+        while next < times.len() && times[next] <= flight.t_s {
+            let y = leg.dense.at((times[next] - leg.from_s) / leg.h);
+            run.samples.push(sample(p, &y, leg.contact));
+            next += 1;
+        }
+        run.events.extend(leg.event);
+    }
+    run.steps = flight.steps;
+    Ok(run)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::parameters::{Field, Fixed};
+
+    pub fn pendulum(damped: bool) -> Parameters<f64> {
+        let fixed = Fixed {
+            m1_kg: 0.3057,
+            m2_kg: 0.1225,
+            l1_m: 0.1719,
+            g_m_s2: 9.81,
+            lower_inner_m: -0.0081,
+            lower_outer_m: 0.1511,
+        };
+        let mut p = Parameters::zero(fixed);
+        for (field, value) in [
+            (Field::Psi, 3.431e-3),
+            (Field::Lambda, 4.193e-4),
+            (Field::Zeta, 1.86e-8),
+            (Field::A3, 1.4257e-3),
+            (Field::Sigma, 0.4502),
+            (Field::Kappa, 0.08136),
+        ] {
+            p.set(field, value);
+        }
+        if damped {
+            for (field, value) in [
+                (Field::MuV1, 1.76e-5),
+                (Field::MuV2, 5e-6),
+                (Field::MuQ1, 1.4e-5),
+                (Field::Rmu1, 3e-5),
+                (Field::Rmu2, 3e-5),
+                (Field::TauC1, 4e-3),
+                (Field::TauC2, 1e-3),
+                (Field::StripDrag, 1e-6),
+            ] {
+                p.set(field, value);
+            }
+        }
+        p
+    }
+
+    fn drop() -> State<f64> {
+        [181f64.to_radians(), 181f64.to_radians(), 0.0, 0.0]
+    }
+
+    fn times(seconds: u32) -> Vec<f64> {
+        (0..=seconds * 100).map(|i| f64::from(i) / 100.0).collect()
+    }
+
+    fn balance(run: &Run) -> f64 {
+        let e0 = run.samples[0].energy;
+        run.samples
+            .iter()
+            .map(|s| (s.energy + s.works.iter().sum::<f64>() - e0).abs() / e0)
+            .fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn energy_balances_over_a_minute_of_stick_and_slip() {
+        let p = pendulum(true);
+        let run = simulate(&p, drop(), &times(60), &Settings::default()).unwrap();
+        assert!(balance(&run) < 1e-9, "{}", balance(&run));
+        assert!(run.events.iter().any(|e| e.to == Contact::Stuck));
+        assert!(run.events.iter().any(|e| e.from == Contact::Stuck));
+        assert_eq!(run.ending, Ending::AtRest);
+        // at rest the joints hold what gravity asks of them
+        let last = run.samples[run.samples.len() - 1];
+        let [s1, s2] = [last.x[0].sin() * p.get(Field::Sigma), last.x[1].sin() * p.get(Field::Kappa)];
+        assert!((last.dry[1] + s2).abs() < 1e-12 && (last.dry[0] + s1 + s2).abs() < 1e-12, "{last:?}");
+    }
+
+    #[test]
+    fn energy_is_kept_without_damping() {
+        let run = simulate(&pendulum(false), drop(), &times(60), &Settings::default()).unwrap();
+        assert!(balance(&run) < 1e-10, "{}", balance(&run));
+    }
+
+    #[test]
+    fn a_mirrored_start_gives_exactly_the_mirrored_motion() {
+        let p = pendulum(true);
+        let x = [2.9, -1.3, 0.4, 5.0];
+        let one = simulate(&p, x, &times(5), &Settings::default()).unwrap();
+        let other = simulate(&p, x.map(|v: f64| -v), &times(5), &Settings::default()).unwrap();
+        for (a, b) in one.samples.iter().zip(&other.samples) {
+            assert_eq!(a.x, b.x.map(|v: f64| -v));
+            assert_eq!(a.energy, b.energy);
+        }
+    }
+
+    #[test]
+    fn without_gravity_and_damping_angular_momentum_is_kept() {
+        let mut p = pendulum(false);
+        p.set(Field::Sigma, 0.0);
+        p.set(Field::Kappa, 0.0);
+        p.fixed.g_m_s2 = 0.0;
+        let momentum = |x: &State<f64>| {
+            let m = crate::motion::mass_matrix(&p, [x[0], x[1]]);
+            (m[0] + m[1]) * x[2] + (m[1] + m[2]) * x[3]
+        };
+        let fine = Settings { tolerance: 1e-14, ..Settings::default() };
+        let run = simulate(&p, [0.3, 1.9, 7.0, -11.0], &times(10), &fine).unwrap();
+        let l0 = momentum(&run.samples[0].x);
+        for s in &run.samples {
+            assert!((momentum(&s.x) / l0 - 1.0).abs() < 1e-12, "{}", momentum(&s.x) / l0 - 1.0);
+        }
+    }
+
+    #[test]
+    fn a_pinned_joint_makes_a_single_pendulum() {
+        let mut p = pendulum(true);
+        for field in [Field::MuV1, Field::MuQ1, Field::Rmu1, Field::TauC1, Field::StripDrag] {
+            p.set(field, 0.0);
+        }
+        let settings = Settings { pinned: true, ..Settings::default() };
+        let run = simulate(&p, [0.5, 0.9, 0.0, 0.0], &times(5), &settings).unwrap();
+        for s in &run.samples {
+            // the angle between the links is kept to rounding
+            assert!((s.x[1] - s.x[0] - 0.4).abs() < 1e-13 && s.x[2] == s.x[3]);
+        }
+        // nothing moves in joint 2, so nothing is lost
+        assert!(balance(&run) < 1e-10, "{}", balance(&run));
+    }
+
+    #[test]
+    fn bad_input_is_named() {
+        let p = pendulum(true);
+        let ask = |x: State<f64>, t: &[f64], settings: &Settings| {
+            simulate(&p, x, t, settings).unwrap_err().to_string()
+        };
+        let good = Settings::default();
+        assert!(ask([0.0, f64::NAN, 0.0, 0.0], &[0.0, 1.0], &good).contains("not finite"));
+        assert!(ask([0.0; 4], &[0.0, 1.0, 1.0], &good).contains("index 2"));
+        assert!(ask([0.0; 4], &[], &good).contains("no times"));
+        assert!(
+            ask([0.0, 0.0, 1.0, 0.0], &[0.0, 1.0], &Settings { pinned: true, ..good }).contains("pinned")
+        );
+        assert!(ask([0.0; 4], &[0.0, 1.0], &Settings { tolerance: 0.0, ..good }).contains("tolerance"));
+        let smooth = Settings { friction: Friction::Smooth(0.0), ..good };
+        assert!(ask([0.0; 4], &[0.0, 1.0], &smooth).contains("width"));
+    }
+}
