@@ -12,7 +12,9 @@
 
 pub mod detect;
 pub mod error;
+pub mod film;
 pub mod frame;
 pub mod rig;
+pub mod source;
 pub mod store;
 pub mod track;

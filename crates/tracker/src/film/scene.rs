@@ -1,0 +1,624 @@
+//! What is filmed: camera, light, links, markers and mishaps; and the TOML form of it.
+//!
+//! Owns: [`Scene`] and what makes one valid. Must not: move or draw anything.
+//!
+//! A link has coordinates of its own: `along` from its joint outwards, `across` to the right of a link that hangs
+//! down. At angle phi (counter-clockwise positive, 0 hanging down; image y down) they point to
+//! `(sin phi, cos phi)` and `(cos phi, -sin phi)`.
+
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use crate::error::{Error, Fault, Place, Result};
+use crate::frame::TimeBase;
+
+/// Version of the scene's form; a file with a higher one is refused.
+pub const SCENE_SCHEMA: u32 = 1;
+
+/// Everything that makes a film.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scene {
+    /// Version of this form, [`SCENE_SCHEMA`].
+    pub schema: u32,
+    /// Width and height, px.
+    pub image_px: [u32; 2],
+    /// Number of frames.
+    pub frames: u64,
+    /// Frames per second, exact as a fraction with a denominator up to 10000.
+    pub rate_hz: f64,
+    /// Seed of noise, hot pixels, glints and random motion.
+    #[serde(default)]
+    pub seed: u64,
+    /// The camera.
+    #[serde(default)]
+    pub camera: Camera,
+    /// The light and the ground behind everything.
+    #[serde(default)]
+    pub light: Light,
+    /// A table of link angles over time; links with a motion of their own do not use it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub motion: Option<MotionFile>,
+    /// Random glints.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub glints: Option<RandomGlints>,
+    /// Links, the first in front of the second and so on: the upper link hides what passes behind it.
+    #[serde(rename = "link", default)]
+    pub links: Vec<Link>,
+    /// Markers, in the order of the nodes.
+    #[serde(rename = "marker", default)]
+    pub markers: Vec<Marker>,
+    /// Things that stand still behind the links and look like markers: screws, the marks of a ruler.
+    #[serde(rename = "distractor", default, skip_serializing_if = "Vec::is_empty")]
+    pub distractors: Vec<Distractor>,
+    /// Things that stand still in front of everything.
+    #[serde(rename = "screen", default, skip_serializing_if = "Vec::is_empty")]
+    pub screens: Vec<Screen>,
+    /// Glints at stated places and times.
+    #[serde(rename = "glint", default, skip_serializing_if = "Vec::is_empty")]
+    pub glint_list: Vec<Glint>,
+    /// Bodies or markers that are not there for some frames.
+    #[serde(rename = "hidden", default, skip_serializing_if = "Vec::is_empty")]
+    pub hidden: Vec<Hidden>,
+    /// Black frames.
+    #[serde(rename = "dropout", default, skip_serializing_if = "Vec::is_empty")]
+    pub dropouts: Vec<Span>,
+}
+
+/// The camera and its noise; levels are grey levels of the recording.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Camera {
+    /// Significant bits: 8 is stored in one byte, 9 to 16 in two.
+    pub depth_bits: u32,
+    /// Time over which light is gathered, s, centred on the frame's time; 0 is no blur.
+    pub exposure_s: f64,
+    /// Level of no light.
+    pub black: f64,
+    /// Standard deviation of the noise that is always there, levels.
+    pub read_noise: f64,
+    /// Levels per photo-electron: shot noise has the variance `shot_gain * (level - black)`.
+    pub shot_gain: f64,
+    /// Highest level that can be recorded; `None` is the highest that the depth allows.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub saturation: Option<f64>,
+    /// Number of hot pixels, at random places that stay.
+    pub hot_pixels: u32,
+    /// What a hot pixel adds to its level.
+    pub hot_level: f64,
+}
+
+impl Default for Camera {
+    fn default() -> Self {
+        Self {
+            depth_bits: 8,
+            exposure_s: 0.0,
+            black: 0.0,
+            read_noise: 0.0,
+            shot_gain: 0.0,
+            saturation: None,
+            hot_pixels: 0,
+            hot_level: 0.0,
+        }
+    }
+}
+
+impl Camera {
+    /// Highest level recorded.
+    pub fn top(&self) -> f64 {
+        let full = f64::from((1u32 << self.depth_bits.clamp(1, 16)) - 1);
+        self.saturation.map_or(full, |s| s.min(full))
+    }
+}
+
+/// The light.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Light {
+    /// Level of the ground in the middle of the image.
+    pub background: f64,
+    /// What the ground gains from the left to the right border and from the top to the bottom one, levels.
+    pub background_gradient: [f64; 2],
+    /// What all light gains from left to right and from top to bottom, as a part of that in the middle.
+    pub uneven: [f64; 2],
+}
+
+impl Default for Light {
+    fn default() -> Self {
+        Self { background: 10.0, background_gradient: [0.0; 2], uneven: [0.0; 2] }
+    }
+}
+
+/// A table of link angles over time.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MotionFile {
+    /// CSV or Parquet with `time_s` and for link k `phik_rad` (`phi1_rad`, ...), for a free body also `xk_px`,
+    /// `yk_px`, its place. A relative name starts at the scene's folder.
+    pub file: PathBuf,
+    /// The table's time at frame 0, s; `None` is its first.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub start_s: Option<f64>,
+}
+
+/// How a link turns if no table says it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, tag = "kind", rename_all = "snake_case")]
+pub enum LinkMotion {
+    /// Stands at an angle.
+    Rest {
+        /// Angle, rad.
+        phi_rad: f64,
+    },
+    /// Turns at a constant rate.
+    Rotation {
+        /// Angle at frame 0, rad.
+        phi_rad: f64,
+        /// Rate, rad/s.
+        rate_rad_s: f64,
+    },
+    /// `phi + amplitude * exp(-decay t) * sin(2 pi f t + phase)`.
+    Swing {
+        /// Angle about which it swings, rad.
+        phi_rad: f64,
+        /// Amplitude, rad.
+        amplitude_rad: f64,
+        /// Frequency, Hz.
+        frequency_hz: f64,
+        /// Phase at frame 0, rad.
+        #[serde(default)]
+        phase_rad: f64,
+        /// Decay, 1/s.
+        #[serde(default)]
+        decay_per_s: f64,
+    },
+    /// Smooth random turning with many turns: a sum of twelve waves of random phase, from the seed.
+    Tumble {
+        /// Angle at frame 0, rad.
+        phi_rad: f64,
+        /// Root mean square of the rate, rad/s.
+        rate_rad_s: f64,
+        /// Highest frequency in the rate, Hz; the lowest is a twentieth of it.
+        frequency_hz: f64,
+    },
+}
+
+/// A rigid body: a bar with markers on it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Link {
+    /// The body's name.
+    pub name: String,
+    /// The link it hangs on, given before it; `None` hangs on the fixed pivot, or is a free body.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub parent: Option<String>,
+    /// Its joint: (along, across) on the parent, or x, y in the image.
+    pub joint_px: [f64; 2],
+    /// Constant velocity of a free body's joint, px/s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub velocity_px_s: Option<[f64; 2]>,
+    /// Extent of the bar along the link.
+    #[serde(default)]
+    pub along_px: [f64; 2],
+    /// Width of the bar; 0 is a body of markers only.
+    #[serde(default)]
+    pub width_px: f64,
+    /// Level of the bar.
+    #[serde(default)]
+    pub level: f64,
+    /// Light on the bar and its markers relative to the rest: 2 is twice as bright.
+    #[serde(default = "one")]
+    pub light: f64,
+    /// How it turns; `None` is by the table, or at rest hanging down if there is none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub motion: Option<LinkMotion>,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+/// A disc on a link.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Marker {
+    /// The node's name.
+    pub name: String,
+    /// The link it is on.
+    pub link: String,
+    /// Centre, (along, across) on the link.
+    pub at_px: [f64; 2],
+    /// Radius.
+    pub radius_px: f64,
+    /// Level.
+    pub level: f64,
+}
+
+/// A still disc behind the links.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Distractor {
+    /// Centre, x, y.
+    pub at_px: [f64; 2],
+    /// Radius.
+    pub radius_px: f64,
+    /// Level.
+    pub level: f64,
+}
+
+/// A still rectangle in front of everything.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Screen {
+    /// Left, top, right and bottom edge, px.
+    pub edges_px: [f64; 4],
+    /// Level.
+    pub level: f64,
+}
+
+/// A bright spot for a few frames.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Glint {
+    /// First frame.
+    pub first: u64,
+    /// Number of frames.
+    pub count: u64,
+    /// Centre, x, y.
+    pub at_px: [f64; 2],
+    /// Radius.
+    pub radius_px: f64,
+    /// What it adds, levels.
+    pub level: f64,
+}
+
+/// Glints at random places and times, from the seed.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RandomGlints {
+    /// Glints that begin per frame, on average.
+    pub per_frame: f64,
+    /// Longest duration, frames; each lasts 1 to that.
+    pub longest: u64,
+    /// Smallest and largest radius, px.
+    pub radius_px: [f64; 2],
+    /// Smallest and largest level added.
+    pub level: [f64; 2],
+}
+
+/// Frames in a row.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Span {
+    /// First frame.
+    pub first: u64,
+    /// Number of frames.
+    pub count: u64,
+}
+
+/// Bodies or markers that are not there for some frames.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Hidden {
+    /// First frame.
+    pub first: u64,
+    /// Number of frames.
+    pub count: u64,
+    /// Links that are hidden with all their markers.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub links: Vec<String>,
+    /// Single markers that are hidden.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub markers: Vec<String>,
+}
+
+/// Whether frame `index` is among `count` from `first`.
+pub(crate) fn within(index: u64, first: u64, count: u64) -> bool {
+    index >= first && index - first < count
+}
+
+impl Scene {
+    /// Reads and checks a scene file. A relative motion file is looked for beside it.
+    ///
+    /// # Errors
+    /// [`Error::Film`] naming the file and the line or key.
+    pub fn read(path: &Path) -> Result<Self> {
+        let name = path.display().to_string();
+        let text =
+            std::fs::read_to_string(path).map_err(|e| {
+                Error::Film(Fault::new(&name, format!("the scene cannot be read ({e})")).advice(
+                    "Give a scene in TOML, e.g. one that `tracker film --preset clean --scene` prints",
+                ))
+            })?;
+        let mut scene = Self::parse(&text, &name)?;
+        if let (Some(motion), Some(folder)) = (&mut scene.motion, path.parent()) {
+            motion.file = folder.join(&motion.file);
+        }
+        Ok(scene)
+    }
+
+    /// Reads and checks the text of a scene; `name` is for messages.
+    ///
+    /// # Errors
+    /// [`Error::Film`] naming the line or key.
+    pub fn parse(text: &str, name: &str) -> Result<Self> {
+        let scene: Scene = toml::from_str(text).map_err(|e| {
+            let line =
+                e.span().map_or(1, |s| text[..s.start.min(text.len())].matches('\n').count() as u64 + 1);
+            Error::Film(
+                Fault::new(name, e.message().replace('\n', " "))
+                    .at(Place::Line(line))
+                    .advice("`tracker film --preset clean --scene` prints a scene with every part"),
+            )
+        })?;
+        scene.check(name)?;
+        Ok(scene)
+    }
+
+    /// The scene as TOML.
+    ///
+    /// # Errors
+    /// [`Error::Film`] if a value has no TOML form (a seed above 2^63 has none).
+    pub fn to_toml(&self) -> Result<String> {
+        toml::to_string_pretty(self).map_err(|e| Error::Film(Fault::new("scene", e.to_string())))
+    }
+
+    /// Index of a link by its name.
+    pub fn link_index(&self, name: &str) -> Option<usize> {
+        self.links.iter().position(|l| l.name == name)
+    }
+
+    /// Seconds per frame as a fraction; a frame's ticks are its index.
+    ///
+    /// # Errors
+    /// [`Error::Film`] if the rate is not a fraction with a denominator up to 10000.
+    pub fn time_base(&self) -> Result<TimeBase> {
+        for q in 1..=10_000u64 {
+            let p = self.rate_hz * q as f64;
+            let whole = p.round();
+            if (1.0..1e15).contains(&whole) && (p - whole).abs() <= 1e-12 * p.abs() {
+                return Ok(TimeBase { numerator: q, denominator: whole as u64 });
+            }
+        }
+        Err(Error::Film(
+            Fault::new("scene", format!("{} frames per second is not a simple fraction", self.rate_hz))
+                .at(Place::Key("rate_hz".into()))
+                .advice("Give a rate above 0 with at most four decimals"),
+        ))
+    }
+
+    /// Checks that names are known and numbers make sense.
+    ///
+    /// # Errors
+    /// [`Error::Film`] naming the first key at fault.
+    pub fn check(&self, name: &str) -> Result<()> {
+        Checker { name }.scene(self)
+    }
+}
+
+/// Refuses with the key at fault.
+struct Checker<'a> {
+    name: &'a str,
+}
+
+impl Checker<'_> {
+    fn fault(&self, key: impl Into<String>, problem: impl Into<String>, advice: &str) -> Result<()> {
+        Err(Error::Film(Fault::new(self.name, problem).at(Place::Key(key.into())).advice(advice)))
+    }
+
+    /// A finite number that is at least `least`.
+    fn number(&self, key: &str, value: f64, least: f64) -> Result<()> {
+        if value.is_finite() && value >= least {
+            return Ok(());
+        }
+        let needed = if least == f64::NEG_INFINITY {
+            "a finite number is needed".to_string()
+        } else {
+            format!("at least {least} is needed")
+        };
+        self.fault(key, format!("{value} makes no sense, {needed}"), "Correct the value")
+    }
+
+    fn finite(&self, key: &str, values: &[f64]) -> Result<()> {
+        values.iter().try_for_each(|&v| self.number(key, v, f64::NEG_INFINITY))
+    }
+
+    fn radius(&self, key: &str, value: f64) -> Result<()> {
+        if value.is_finite() && value > 0.0 {
+            return Ok(());
+        }
+        self.fault(key, format!("a radius of {value} px makes no disc"), "Give a radius above 0")
+    }
+
+    fn scene(&self, s: &Scene) -> Result<()> {
+        if s.schema == 0 || s.schema > SCENE_SCHEMA {
+            return self.fault(
+                "schema",
+                format!("version {} is not known, this program reads up to {SCENE_SCHEMA}", s.schema),
+                "Use a newer tracker",
+            );
+        }
+        let [w, h] = s.image_px;
+        if w == 0 || h == 0 || w > 16384 || h > 16384 {
+            return self.fault(
+                "image_px",
+                format!("an image of {w} x {h} px cannot be made"),
+                "Give 1 to 16384 px",
+            );
+        }
+        if s.frames == 0 {
+            return self.fault("frames", "a film without frames", "Give at least 1");
+        }
+        s.time_base()?;
+        if s.seed > i64::MAX as u64 {
+            return self.fault("seed", format!("{} is too large for TOML", s.seed), "Give less than 2^63");
+        }
+        self.camera(s)?;
+        self.finite("light.background", &[s.light.background])?;
+        self.finite("light.background_gradient", &s.light.background_gradient)?;
+        self.finite("light.uneven", &s.light.uneven)?;
+        if s.light.uneven.iter().map(|u| u.abs()).sum::<f64>() > 2.0 {
+            return self.fault("light.uneven", "light would be negative in a corner", "Give less");
+        }
+        self.links(s)?;
+        self.markers(s)?;
+        self.mishaps(s)
+    }
+
+    fn camera(&self, s: &Scene) -> Result<()> {
+        let c = &s.camera;
+        if !(8..=16).contains(&c.depth_bits) {
+            return self.fault(
+                "camera.depth_bits",
+                format!("{} bits cannot be recorded", c.depth_bits),
+                "Give 8 to 16",
+            );
+        }
+        self.number("camera.exposure_s", c.exposure_s, 0.0)?;
+        if c.exposure_s > 1.000_001 / s.rate_hz {
+            return self.fault(
+                "camera.exposure_s",
+                format!("{} s is longer than the {} s between frames", c.exposure_s, 1.0 / s.rate_hz),
+                "Give at most the time between frames",
+            );
+        }
+        self.number("camera.black", c.black, 0.0)?;
+        self.number("camera.read_noise", c.read_noise, 0.0)?;
+        self.number("camera.shot_gain", c.shot_gain, 0.0)?;
+        self.number("camera.hot_level", c.hot_level, 0.0)?;
+        c.saturation.map_or(Ok(()), |v| self.number("camera.saturation", v, 1.0))
+    }
+
+    fn links(&self, s: &Scene) -> Result<()> {
+        for (i, l) in s.links.iter().enumerate() {
+            let key = |what: &str| format!("link {}, {what}", l.name);
+            if l.name.is_empty() || s.links[..i].iter().any(|o| o.name == l.name) {
+                return self.fault(
+                    format!("link {}", i + 1),
+                    format!("the name {:?} is empty or given twice", l.name),
+                    "Give each link its own name",
+                );
+            }
+            if let Some(p) = &l.parent {
+                if !s.links[..i].iter().any(|o| &o.name == p) {
+                    return self.fault(
+                        key("parent"),
+                        format!("no link {p:?} is given before it"),
+                        "Give links from the pivot outwards",
+                    );
+                }
+                if l.velocity_px_s.is_some() {
+                    return self.fault(
+                        key("velocity_px_s"),
+                        "a link that hangs on another has no velocity of its own",
+                        "Leave out the velocity or the parent",
+                    );
+                }
+            }
+            self.finite(&key("joint_px"), &l.joint_px)?;
+            self.finite(&key("along_px"), &l.along_px)?;
+            self.finite(&key("velocity_px_s"), &l.velocity_px_s.unwrap_or_default())?;
+            self.number(&key("width_px"), l.width_px, 0.0)?;
+            self.number(&key("light"), l.light, 0.0)?;
+            self.number(&key("level"), l.level, 0.0)?;
+            match &l.motion {
+                None => {}
+                Some(LinkMotion::Rest { phi_rad }) => self.finite(&key("motion"), &[*phi_rad])?,
+                Some(LinkMotion::Rotation { phi_rad, rate_rad_s }) => {
+                    self.finite(&key("motion"), &[*phi_rad, *rate_rad_s])?;
+                }
+                Some(LinkMotion::Swing { phi_rad, amplitude_rad, frequency_hz, phase_rad, decay_per_s }) => {
+                    self.finite(
+                        &key("motion"),
+                        &[*phi_rad, *amplitude_rad, *frequency_hz, *phase_rad, *decay_per_s],
+                    )?
+                }
+                Some(LinkMotion::Tumble { phi_rad, rate_rad_s, frequency_hz }) => {
+                    self.finite(&key("motion"), &[*phi_rad])?;
+                    self.number(&key("motion.rate_rad_s"), *rate_rad_s, 0.0)?;
+                    self.number(&key("motion.frequency_hz"), *frequency_hz, 1e-6)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn markers(&self, s: &Scene) -> Result<()> {
+        for (i, m) in s.markers.iter().enumerate() {
+            let key = |what: &str| format!("marker {}, {what}", m.name);
+            if m.name.is_empty() || s.markers[..i].iter().any(|o| o.name == m.name) {
+                return self.fault(
+                    format!("marker {}", i + 1),
+                    format!("the name {:?} is empty or given twice", m.name),
+                    "Give each marker its own name",
+                );
+            }
+            if s.link_index(&m.link).is_none() {
+                return self.fault(
+                    key("link"),
+                    format!("no link {:?} in the scene", m.link),
+                    "Name a link of the scene",
+                );
+            }
+            self.finite(&key("at_px"), &m.at_px)?;
+            self.radius(&key("radius_px"), m.radius_px)?;
+            self.number(&key("level"), m.level, 0.0)?;
+        }
+        Ok(())
+    }
+
+    fn mishaps(&self, s: &Scene) -> Result<()> {
+        for (i, d) in s.distractors.iter().enumerate() {
+            self.finite(&format!("distractor {}, at_px", i + 1), &d.at_px)?;
+            self.radius(&format!("distractor {}, radius_px", i + 1), d.radius_px)?;
+            self.number(&format!("distractor {}, level", i + 1), d.level, 0.0)?;
+        }
+        for (i, c) in s.screens.iter().enumerate() {
+            let [x0, y0, x1, y1] = c.edges_px;
+            self.finite(&format!("screen {}, edges_px", i + 1), &c.edges_px)?;
+            self.number(&format!("screen {}, level", i + 1), c.level, 0.0)?;
+            if x1 <= x0 || y1 <= y0 {
+                return self.fault(
+                    format!("screen {}, edges_px", i + 1),
+                    "it has no area",
+                    "Give left, top, right, bottom",
+                );
+            }
+        }
+        for (i, g) in s.glint_list.iter().enumerate() {
+            self.finite(&format!("glint {}, at_px", i + 1), &g.at_px)?;
+            self.radius(&format!("glint {}, radius_px", i + 1), g.radius_px)?;
+            self.number(&format!("glint {}, level", i + 1), g.level, 0.0)?;
+        }
+        if let Some(g) = &s.glints {
+            self.number("glints.per_frame", g.per_frame, 0.0)?;
+            if g.longest == 0 || g.per_frame > 1000.0 {
+                return self.fault(
+                    "glints",
+                    "no such glints can be made",
+                    "Give longest at least 1, at most 1000 per frame",
+                );
+            }
+            self.radius("glints.radius_px", g.radius_px[0])?;
+            self.number("glints.radius_px", g.radius_px[1], g.radius_px[0])?;
+            self.number("glints.level", g.level[0], 0.0)?;
+            self.number("glints.level", g.level[1], g.level[0])?;
+        }
+        for (i, h) in s.hidden.iter().enumerate() {
+            let unknown = h
+                .links
+                .iter()
+                .find(|l| s.link_index(l).is_none())
+                .or_else(|| h.markers.iter().find(|m| !s.markers.iter().any(|o| &o.name == *m)));
+            if let Some(u) = unknown {
+                return self.fault(
+                    format!("hidden {}", i + 1),
+                    format!("{u:?} is no link or marker of the scene"),
+                    "Name links under `links` and markers under `markers`",
+                );
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,81 @@
+//! A scene as a recording, without a file: what tests and benches read.
+
+use std::sync::Arc;
+
+use super::{Ending, FrameSource, SourceInfo};
+use crate::error::Result;
+use crate::film::{Film, Scene};
+use crate::frame::{Frame, PixelFormat, RateOrigin};
+
+/// Frames of a [`Film`], made when they are asked for.
+#[derive(Debug)]
+pub struct SyntheticSource {
+    film: Arc<Film>,
+    info: SourceInfo,
+    next: u64,
+}
+
+impl SyntheticSource {
+    /// The film of a scene.
+    ///
+    /// # Errors
+    /// As [`Film::new`].
+    pub fn new(scene: &Scene) -> Result<Self> {
+        Ok(Self::of(Arc::new(Film::new(scene)?)))
+    }
+
+    /// A film that may be shared with whoever asks it for the truth.
+    pub fn of(film: Arc<Film>) -> Self {
+        let scene = film.scene();
+        let time_base = film.time_base();
+        let info = SourceInfo {
+            name: "scene".into(),
+            container: "scene".into(),
+            codec: match film.format() {
+                PixelFormat::Gray16 => "gray 16 bit".into(),
+                _ => "gray 8 bit".into(),
+            },
+            width: scene.image_px[0],
+            height: scene.image_px[1],
+            format: film.format(),
+            depth_bits: scene.camera.depth_bits,
+            declared_frames: Some(scene.frames),
+            time_base,
+            rate_hz: Some(time_base.denominator as f64 / time_base.numerator as f64),
+            rate_origin: RateOrigin::TimeStamps,
+            converted_from: None,
+            size_bytes: None,
+            warnings: Vec::new(),
+        };
+        Self { film, info, next: 0 }
+    }
+
+    /// The film.
+    pub fn film(&self) -> &Arc<Film> {
+        &self.film
+    }
+}
+
+impl FrameSource for SyntheticSource {
+    fn info(&self) -> &SourceInfo {
+        &self.info
+    }
+
+    fn next_frame(&mut self) -> Result<Option<Frame>> {
+        if self.next >= self.film.frames() {
+            return Ok(None);
+        }
+        self.next += 1;
+        Ok(Some(self.film.frame(self.next - 1)))
+    }
+
+    fn ending(&self) -> Ending {
+        Ending::Complete
+    }
+
+    fn sample(&mut self, count: usize) -> Result<Vec<Frame>> {
+        let frames = self.film.frames();
+        let n = frames.min(count as u64);
+        Ok((0..n).map(|k| self.film.frame((2 * k + 1) * frames / (2 * n))).collect())
+    }
+}
