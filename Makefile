@@ -1,0 +1,55 @@
+# Two commands do everything, set-up included: `make demo` and `make test`.
+SHELL := /bin/bash
+PYTHON ?= python3
+PY := .venv/bin/python
+EXTENSION := python/pydpend/_tracker.abi3.so
+CARGO_FLAGS := --release --workspace --locked
+
+.PHONY: help demo test build check format bench validate fixtures clean
+help:
+	@echo "make demo      set up, build, and go from the bundled film to out/demo/report.html"
+	@echo "make test      set up, build, and run every test, Rust and Python"
+	@echo "make check     format, lint and type checks"
+	@echo "make validate  the long accuracy sweeps, into docs/validation.md's tables (about an hour)"
+	@echo "make bench     the speed figures (criterion), and the ratios beside them"
+	@echo "make fixtures  make the bundled recordings again from their seeds"
+	@echo "make format    rustfmt and ruff"
+
+.make/system: tools/system-packages.txt tools/system-packages.sh
+	@[ -n "$(SKIP_SYSTEM)" ] || tools/system-packages.sh
+	@command -v cargo >/dev/null || { echo "cargo is missing. Install Rust with rustup (https://rustup.rs)." >&2; exit 1; }
+	@mkdir -p .make && touch $@
+
+.make/venv: pyproject.toml tools/venv.sh | .make/system
+	@echo "Setting up .venv"
+	@PYTHON=$(PYTHON) tools/venv.sh
+	@mkdir -p .make && touch $@
+
+# Always the whole workspace: one choice of features, so that nothing is built twice.
+build: .make/system .make/venv
+	@cargo build $(CARGO_FLAGS)
+	@cmp -s target/release/lib_tracker.so $(EXTENSION) || \
+	    { cp target/release/lib_tracker.so $(EXTENSION).new && mv $(EXTENSION).new $(EXTENSION); }
+
+demo: build
+	@$(PY) tools/demo.py
+
+test: build
+	cargo test $(CARGO_FLAGS)
+	$(PY) -m pytest
+
+check: build
+	cargo fmt --all -- --check
+	cargo clippy $(CARGO_FLAGS) --all-targets -- -D warnings
+	.venv/bin/ruff check .
+	.venv/bin/ruff format --check .
+	.venv/bin/mypy
+	MYPYPATH=python .venv/bin/stubtest pydpend._tracker
+
+format: .make/venv
+	cargo fmt --all
+	.venv/bin/ruff check --fix .
+	.venv/bin/ruff format .
+
+clean:
+	rm -rf target out .make .venv $(EXTENSION)

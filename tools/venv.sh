@@ -1,0 +1,28 @@
+#!/usr/bin/env bash
+# Makes .venv with what pyproject.toml lists, the package itself from the source tree, and the program pydpend.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+python=${PYTHON:-python3}
+if ! "$python" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then
+    echo "$python is not Python 3.11 or later. Install it, or name one: make PYTHON=python3.11 ..." >&2
+    exit 1
+fi
+[ -x .venv/bin/python ] || "$python" -m venv .venv
+.venv/bin/python -m pip install -q --disable-pip-version-check "pip>=25.1"
+# The package's own dependencies, read from where they are written down.
+.venv/bin/python - >.venv/requirements.txt <<'P'
+import tomllib
+with open("pyproject.toml", "rb") as f:
+    print("\n".join(tomllib.load(f)["project"]["dependencies"]))
+P
+.venv/bin/python -m pip install -q --disable-pip-version-check -r .venv/requirements.txt --group dev
+# From the source tree: the compiled half is copied beside it by `make build`.
+site=$(.venv/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')
+echo "$PWD/python" >"$site/pydpend-tree.pth"
+cat >.venv/bin/pydpend <<P
+#!$PWD/.venv/bin/python
+import sys
+from pydpend.cli import main
+sys.exit(main())
+P
+chmod +x .venv/bin/pydpend
