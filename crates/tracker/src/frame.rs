@@ -144,6 +144,8 @@ pub struct SourceInfo {
     pub converted_from: Option<String>,
     /// Bytes of the file or files, if they are files.
     pub size_bytes: Option<u64>,
+    /// What else the recording says, word and value: camera, exposure, trigger frame, range of values.
+    pub details: Vec<(String, String)>,
     /// What a user should know: implausible stamps replaced, gaps in numbering, a size that does not match.
     pub warnings: Vec<String>,
 }

@@ -1,5 +1,145 @@
-//! Where frames come from.
+//! Where frames come from: one file per container, told apart by their first bytes.
+//!
+//! Owns: [`open`], [`OpenOptions`], [`Decoder`]. Must not: look at what is in a picture.
 
+pub mod clock;
+pub mod ffmpeg;
 pub mod synthetic;
 
+use std::fs::{self, File};
+use std::io::Read;
+use std::path::Path;
+
+use crate::error::{Error, Fault, Result};
 pub use crate::frame::{Ending, FrameSource, SourceInfo};
+
+/// Which decoder reads compressed film.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Decoder {
+    /// The one that fits the file.
+    #[default]
+    Auto,
+    /// FFmpeg's libraries.
+    Ffmpeg,
+    /// OpenCV's `VideoCapture`, a second and independent one.
+    Opencv,
+}
+
+/// What a user may say about reading a recording. The default says nothing.
+#[derive(Debug, Clone, Default)]
+pub struct OpenOptions {
+    /// Frames per second of recorded time; replaces all time stamps of the recording.
+    pub fps: Option<f64>,
+    /// Decoder.
+    pub decoder: Decoder,
+    /// Whether network addresses and devices may be opened.
+    pub allow_protocol: bool,
+    /// Decoding threads; 0 is one for each core.
+    pub threads: usize,
+}
+
+/// What a name stands for.
+pub(crate) enum Input {
+    /// A file that can be read again.
+    File(String),
+    /// Bytes that come once: standard input or a named pipe.
+    Pipe(String),
+    /// A network address or a device.
+    Address(String),
+}
+
+impl Input {
+    fn of(name: &str, options: &OpenOptions) -> Result<Self> {
+        if name == "-" {
+            return Ok(Input::Pipe("pipe:0".into()));
+        }
+        let Ok(facts) = fs::metadata(name) else {
+            return Self::address(name, options);
+        };
+        let kind = facts.file_type();
+        if facts.is_file() {
+            // With its protocol, a name is never taken for a pattern or an address.
+            return Ok(Input::File(format!("file:{name}")));
+        }
+        #[cfg(unix)]
+        if std::os::unix::fs::FileTypeExt::is_fifo(&kind) {
+            return Ok(Input::Pipe(format!("file:{name}")));
+        }
+        if options.allow_protocol && !kind.is_dir() {
+            return Ok(Input::Address(name.into()));
+        }
+        Err(Error::Source(
+            Fault::new(name, "not a file but a folder or a device").advice(
+                "Give a recording; for a device add `--allow-protocol`, for pictures a folder with PNG, TIFF or BMP files",
+            ),
+        ))
+    }
+
+    fn address(name: &str, options: &OpenOptions) -> Result<Self> {
+        let scheme = name.split_once(':').map_or("", |(s, _)| s);
+        let is_address = scheme.len() > 1 && scheme.chars().all(|c| c.is_ascii_alphanumeric() || c == '+');
+        if !is_address {
+            return Err(Error::Source(
+                Fault::new(name, "no such file").advice("Check the name and the folder you are in"),
+            ));
+        }
+        if !options.allow_protocol {
+            return Err(Error::Source(
+                Fault::new(name, format!("an address ({scheme}:), and these are not opened unasked"))
+                    .advice("Add `--allow-protocol` if you trust it"),
+            ));
+        }
+        Ok(Input::Address(name.into()))
+    }
+}
+
+/// Opens a recording by what its first bytes say it is, whatever its name; `-` is standard input.
+///
+/// # Errors
+/// [`Error::Source`] if there is no such file or nothing here reads it; [`Error::Argument`] for options that
+/// make no sense.
+pub fn open(name: &str, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
+    let input = Input::of(name, options)?;
+    if let Input::File(_) = &input {
+        refuse_lists(name)?;
+    }
+    Ok(Box::new(ffmpeg::FfmpegSource::open(name, &input, options)?))
+}
+
+/// The first bytes of a file, up to 4096.
+fn first_bytes(name: &str) -> Result<Vec<u8>> {
+    let unreadable = |e: std::io::Error| {
+        Error::Source(
+            Fault::new(name, format!("the file cannot be read ({e})")).advice("Check its permissions"),
+        )
+    };
+    let mut bytes = Vec::new();
+    File::open(Path::new(name))
+        .map_err(unreadable)?
+        .take(4096)
+        .read_to_end(&mut bytes)
+        .map_err(unreadable)?;
+    if bytes.is_empty() {
+        return Err(Error::Source(
+            Fault::new(name, "the file is empty").advice("Check that it was copied whole"),
+        ));
+    }
+    Ok(bytes)
+}
+
+/// Refuses text files that make a demuxer open other files or addresses.
+fn refuse_lists(name: &str) -> Result<()> {
+    let bytes = first_bytes(name)?;
+    let text = String::from_utf8_lossy(&bytes[..bytes.len().min(256)]);
+    let text = text.trim_start_matches(['\u{feff}', ' ', '\r', '\n', '\t']);
+    let is_list = text.starts_with("#EXTM3U")
+        || text.starts_with("ffconcat")
+        || text.starts_with("<?xml") && String::from_utf8_lossy(&bytes).contains("<MPD");
+    if is_list {
+        return Err(Error::Source(
+            Fault::new(name, "a list of other files, not a recording").advice("Give the recording itself"),
+        ));
+    }
+    Ok(())
+}

@@ -45,6 +45,7 @@ impl SyntheticSource {
             rate_origin: RateOrigin::TimeStamps,
             converted_from: None,
             size_bytes: None,
+            details: Vec::new(),
             warnings: Vec::new(),
         };
         Self { film, info, next: 0 }

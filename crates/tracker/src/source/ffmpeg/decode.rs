@@ -1,0 +1,183 @@
+//! A decoder with its own threads, and the frames it lends.
+//!
+//! Owns: [`Decoder`], [`Picture`]. Must not: know of files, or convert pixels.
+
+use std::ptr;
+
+use ffmpeg_next::ffi;
+
+use super::demux::{Demuxer, Packet};
+use super::{codec_name, message};
+use crate::error::{Error, Fault, Result};
+
+/// An open decoder of one stream.
+pub(super) struct Decoder {
+    context: *mut ffi::AVCodecContext,
+}
+
+// SAFETY: the context is owned by this value alone; libavcodec allows use from any one thread at a time.
+unsafe impl Send for Decoder {}
+
+/// What became of a request for a picture.
+pub(super) enum Received {
+    /// A picture, in display order.
+    Picture(Picture),
+    /// The decoder wants another packet.
+    Hungry,
+    /// All pictures are out.
+    End,
+    /// Something could not be decoded.
+    Damaged,
+}
+
+impl Decoder {
+    /// Opens a decoder for the demuxer's stream; `threads` 0 is one for each core.
+    pub(super) fn open(demuxer: &Demuxer, name: &str, threads: usize) -> Result<Self> {
+        let parameters = demuxer.parameters();
+        // SAFETY: a look-up by a value that libavformat gave.
+        let codec = unsafe { ffi::avcodec_find_decoder(parameters.codec_id) };
+        if codec.is_null() {
+            return Err(Error::Source(
+                Fault::new(name, format!("no decoder for {} is installed", codec_name(parameters.codec_id)))
+                    .advice("Install FFmpeg's libraries with it, or convert the recording with `-c:v ffv1`"),
+            ));
+        }
+        // SAFETY: allocation only; null is checked.
+        let context = unsafe { ffi::avcodec_alloc_context3(codec) };
+        if context.is_null() {
+            return Err(Error::Source(Fault::new(name, "out of memory")));
+        }
+        let decoder = Self { context };
+        // SAFETY: the context is allocated and not yet open; parameters and stream live during the calls.
+        let code = unsafe {
+            let code = ffi::avcodec_parameters_to_context(context, parameters);
+            (*context).pkt_timebase = demuxer.stream().time_base;
+            (*context).thread_count = i32::try_from(threads).unwrap_or(0);
+            (*context).thread_type = ffi::FF_THREAD_FRAME | ffi::FF_THREAD_SLICE;
+            // Cropping is exact to the pixel only with unaligned planes; we read bytes, so any place will do.
+            (*context).flags |= ffi::AV_CODEC_FLAG_UNALIGNED as i32;
+            if code < 0 { code } else { ffi::avcodec_open2(context, codec, ptr::null_mut()) }
+        };
+        if code < 0 {
+            return Err(Error::Source(Fault::new(
+                name,
+                format!(
+                    "the decoder of {} does not open ({})",
+                    codec_name(parameters.codec_id),
+                    message(code)
+                ),
+            )));
+        }
+        Ok(decoder)
+    }
+
+    /// Gives a packet to the decoder, or with `None` says that there are no more. A failure shows later, as a
+    /// picture that does not come.
+    pub(super) fn send(&mut self, packet: Option<&Packet>) {
+        // SAFETY: the context is open; a null packet starts draining.
+        unsafe { ffi::avcodec_send_packet(self.context, packet.map_or(ptr::null(), Packet::as_ptr)) };
+    }
+
+    /// Takes the next picture.
+    pub(super) fn receive(&mut self) -> Result<Received> {
+        let picture = Picture::new()?;
+        // SAFETY: context and frame are valid and owned.
+        let code = unsafe { ffi::avcodec_receive_frame(self.context, picture.0) };
+        Ok(match code {
+            0 => Received::Picture(picture),
+            ffi::AVERROR_EOF => Received::End,
+            c if c == ffi::AVERROR(libc_eagain()) => Received::Hungry,
+            _ => Received::Damaged,
+        })
+    }
+
+    /// Forgets everything, after a seek.
+    pub(super) fn flush(&mut self) {
+        // SAFETY: the context is open.
+        unsafe { ffi::avcodec_flush_buffers(self.context) };
+    }
+}
+
+impl Drop for Decoder {
+    fn drop(&mut self) {
+        // SAFETY: allocated by avcodec_alloc_context3 and freed once.
+        unsafe { ffi::avcodec_free_context(&mut self.context) };
+    }
+}
+
+/// The value of `EAGAIN`.
+fn libc_eagain() -> i32 {
+    ffmpeg_next::error::EAGAIN
+}
+
+/// A decoded picture: a reference to buffers that the decoder may still read but no longer writes.
+pub(super) struct Picture(*mut ffi::AVFrame);
+
+// SAFETY: the frame is owned by this value alone, and its buffers' counts are atomic.
+unsafe impl Send for Picture {}
+// SAFETY: nothing is changed through a shared reference, and the decoder does not write into a picture it gave.
+unsafe impl Sync for Picture {}
+
+impl Picture {
+    fn new() -> Result<Self> {
+        // SAFETY: allocation only; null is checked.
+        let frame = unsafe { ffi::av_frame_alloc() };
+        if frame.is_null() {
+            return Err(Error::Source(Fault::new("decoder", "out of memory")));
+        }
+        Ok(Self(frame))
+    }
+
+    /// The frame's fields.
+    pub(super) fn get(&self) -> &ffi::AVFrame {
+        // SAFETY: never null after `new`.
+        unsafe { &*self.0 }
+    }
+
+    /// Whether the decoder itself says that the pixels are not those that were filmed.
+    pub(super) fn is_damaged(&self) -> bool {
+        self.get().decode_error_flags != 0 || self.get().flags & ffi::AV_FRAME_FLAG_CORRUPT != 0
+    }
+
+    /// Where plane `plane` may be read: its first row's address, and its buffer's first and past-last ones.
+    fn range(&self, plane: usize) -> Option<(usize, usize, usize)> {
+        // SAFETY: the frame is valid; the call only looks which of its buffers holds the plane.
+        let buffer = unsafe { ffi::av_frame_get_plane_buffer(self.0, i32::try_from(plane).ok()?).as_ref() }?;
+        let start = buffer.data as usize;
+        Some((*self.get().data.get(plane)? as usize, start, start.checked_add(buffer.size)?))
+    }
+
+    /// The bytes of a plane from its first row's first byte to its last row's `row_bytes`-th, if rows go
+    /// downwards and all of it lies inside the frame's buffer.
+    pub(super) fn plane(&self, plane: usize, row_bytes: usize) -> Option<&[u8]> {
+        let frame = self.get();
+        let stride = usize::try_from(*frame.linesize.get(plane)?).ok()?;
+        let height = usize::try_from(frame.height).ok()?;
+        let length = stride.checked_mul(height.checked_sub(1)?)?.checked_add(row_bytes)?;
+        let (first, start, end) = self.range(plane)?;
+        if first < start || first.checked_add(length)? > end || row_bytes > stride && height > 1 {
+            return None;
+        }
+        // SAFETY: the range was just checked to lie inside one buffer, which lives as long as `self`.
+        Some(unsafe { std::slice::from_raw_parts(first as *const u8, length) })
+    }
+
+    /// The first `row_bytes` bytes of row `y` of a plane, whichever way its rows go.
+    pub(super) fn row(&self, plane: usize, y: usize, row_bytes: usize) -> Option<&[u8]> {
+        let (first, start, end) = self.range(plane)?;
+        let stride = *self.get().linesize.get(plane)? as isize;
+        let row = first.checked_add_signed(stride.checked_mul(isize::try_from(y).ok()?)?)?;
+        if row < start || row.checked_add(row_bytes)? > end {
+            return None;
+        }
+        // SAFETY: the range was just checked to lie inside one buffer, which lives as long as `self`.
+        Some(unsafe { std::slice::from_raw_parts(row as *const u8, row_bytes) })
+    }
+}
+
+impl Drop for Picture {
+    fn drop(&mut self) {
+        // SAFETY: allocated by av_frame_alloc and freed once.
+        unsafe { ffi::av_frame_free(&mut self.0) };
+    }
+}

@@ -1,0 +1,229 @@
+//! Reading packets of the one video stream out of a container.
+//!
+//! Owns: [`Demuxer`], [`Packet`]. Must not: decode, or decide what a lost packet means.
+
+use std::ffi::{CStr, CString};
+use std::ptr;
+
+use ffmpeg_next::ffi;
+
+use super::message;
+use crate::error::{Error, Fault, Result};
+
+/// Demuxers that would open further files or addresses named inside the file.
+const PLAYLISTS: [&str; 5] = ["hls", "concat", "dash", "image2", "imf"];
+
+/// An open container with one video stream selected; all others are discarded unread.
+pub(super) struct Demuxer {
+    context: *mut ffi::AVFormatContext,
+    stream: usize,
+}
+
+// SAFETY: the context is owned by this value alone and libavformat binds it to no thread.
+unsafe impl Send for Demuxer {}
+
+/// What became of a request for a packet.
+pub(super) enum Read {
+    /// The packet holds data of the stream.
+    Packet,
+    /// The end of the file.
+    End,
+    /// The container cannot be read further.
+    Failed(String),
+}
+
+impl Demuxer {
+    /// Opens `url` (with its protocol, e.g. `file:`); `protocols` are those that may be used.
+    pub(super) fn open(url: &str, name: &str, protocols: Option<&str>) -> Result<Self> {
+        let failed = |code: i32| {
+            Error::Source(
+                Fault::new(name, format!("not a recording that can be read ({})", message(code)))
+                    .advice("Check that the file is complete and that `ffmpeg -i` reads it"),
+            )
+        };
+        let address =
+            CString::new(url).map_err(|_| Error::Source(Fault::new(name, "the name holds a zero byte")))?;
+        let mut options: *mut ffi::AVDictionary = ptr::null_mut();
+        if let Some(list) = protocols.and_then(|p| CString::new(p).ok()) {
+            // SAFETY: all strings are valid and zero-terminated; av_dict_set copies them.
+            unsafe { ffi::av_dict_set(&mut options, c"protocol_whitelist".as_ptr(), list.as_ptr(), 0) };
+        }
+        let mut context: *mut ffi::AVFormatContext = ptr::null_mut();
+        // SAFETY: `context` is null, so it is allocated; on failure it is freed and set to null by the call.
+        let code =
+            unsafe { ffi::avformat_open_input(&mut context, address.as_ptr(), ptr::null(), &mut options) };
+        // SAFETY: frees what the call left of the dictionary.
+        unsafe { ffi::av_dict_free(&mut options) };
+        if code < 0 {
+            return Err(failed(code));
+        }
+        let mut demuxer = Self { context, stream: 0 };
+        let container = demuxer.container();
+        if PLAYLISTS.iter().any(|p| container.split(',').any(|c| c == *p)) {
+            return Err(Error::Source(
+                Fault::new(name, format!("a list of other files ({container}), not a recording"))
+                    .advice("Give the recording itself"),
+            ));
+        }
+        // SAFETY: the context is open; null asks for no per-stream options.
+        let code = unsafe { ffi::avformat_find_stream_info(demuxer.context, ptr::null_mut()) };
+        if code < 0 {
+            return Err(failed(code));
+        }
+        // SAFETY: the context is open; a null decoder pointer is allowed.
+        let best = unsafe {
+            ffi::av_find_best_stream(
+                demuxer.context,
+                ffi::AVMediaType::AVMEDIA_TYPE_VIDEO,
+                -1,
+                -1,
+                ptr::null_mut(),
+                0,
+            )
+        };
+        demuxer.stream = usize::try_from(best).map_err(|_| {
+            Error::Source(
+                Fault::new(name, "it holds no video stream").advice("Give a film, not a sound or text file"),
+            )
+        })?;
+        // SAFETY: `nb_streams` streams are valid while the context is open.
+        unsafe {
+            for i in 0..(*demuxer.context).nb_streams as usize {
+                if i != demuxer.stream {
+                    (**(*demuxer.context).streams.add(i)).discard = ffi::AVDiscard::AVDISCARD_ALL;
+                }
+            }
+        }
+        Ok(demuxer)
+    }
+
+    /// The selected stream.
+    pub(super) fn stream(&self) -> &ffi::AVStream {
+        // SAFETY: `stream` is an index that av_find_best_stream gave; streams live as long as the context.
+        unsafe { &**(*self.context).streams.add(self.stream) }
+    }
+
+    /// The stream's parameters.
+    pub(super) fn parameters(&self) -> &ffi::AVCodecParameters {
+        // SAFETY: every stream has parameters as long as the context lives.
+        unsafe { &*self.stream().codecpar }
+    }
+
+    /// Short names of the container, comma-separated.
+    pub(super) fn container(&self) -> String {
+        // SAFETY: an open context has an input format, whose name is a static string.
+        unsafe { CStr::from_ptr((*(*self.context).iformat).name) }.to_string_lossy().into_owned()
+    }
+
+    /// The rate that the container claims, frames per second.
+    pub(super) fn rate(&self) -> Option<ffi::AVRational> {
+        let stream = self.stream();
+        [stream.avg_frame_rate, stream.r_frame_rate].into_iter().find(|r| r.num > 0 && r.den > 0)
+    }
+
+    /// Length of the whole recording by the container, in ticks of the stream's time base.
+    pub(super) fn duration(&self) -> Option<i64> {
+        let stream = self.stream();
+        (stream.duration > 0).then_some(stream.duration).or_else(|| {
+            // SAFETY: the context is open.
+            let whole = unsafe { (*self.context).duration };
+            let base = ffi::AVRational { num: 1, den: ffi::AV_TIME_BASE };
+            // SAFETY: a pure function of its arguments.
+            (whole > 0).then(|| unsafe { ffi::av_rescale_q(whole, base, stream.time_base) })
+        })
+    }
+
+    /// Byte offset that the reader has reached.
+    pub(super) fn position(&self) -> Option<u64> {
+        // SAFETY: the context is open; `pb` may be null for formats without a file.
+        let pb = unsafe { (*self.context).pb };
+        if pb.is_null() {
+            return None;
+        }
+        // SAFETY: a seek by 0 from the current place is how avio_tell is defined.
+        u64::try_from(unsafe { ffi::avio_seek(pb, 0, 1) }).ok()
+    }
+
+    /// Reads the next packet of the stream.
+    pub(super) fn read(&mut self, packet: &mut Packet) -> Read {
+        loop {
+            packet.clear();
+            // SAFETY: context and packet are valid and owned.
+            let code = unsafe { ffi::av_read_frame(self.context, packet.0) };
+            if code == ffi::AVERROR_EOF {
+                return Read::End;
+            }
+            if code < 0 {
+                return Read::Failed(message(code));
+            }
+            if usize::try_from(packet.get().stream_index) == Ok(self.stream) {
+                return Read::Packet;
+            }
+        }
+    }
+
+    /// Goes to the last key frame at or before `ticks`.
+    pub(super) fn seek(&mut self, ticks: i64) -> bool {
+        // SAFETY: the context is open and the stream's index valid.
+        unsafe { ffi::av_seek_frame(self.context, self.stream as i32, ticks, ffi::AVSEEK_FLAG_BACKWARD) >= 0 }
+    }
+}
+
+impl Drop for Demuxer {
+    fn drop(&mut self) {
+        // SAFETY: the context was opened by avformat_open_input and is closed once.
+        unsafe { ffi::avformat_close_input(&mut self.context) };
+    }
+}
+
+/// One packet of coded data.
+pub(super) struct Packet(*mut ffi::AVPacket);
+
+// SAFETY: the packet is owned by this value alone; its buffer's count is atomic.
+unsafe impl Send for Packet {}
+
+impl Packet {
+    /// An empty packet.
+    pub(super) fn new(name: &str) -> Result<Self> {
+        // SAFETY: allocation only; null is checked.
+        let packet = unsafe { ffi::av_packet_alloc() };
+        if packet.is_null() {
+            return Err(Error::Source(Fault::new(name, "out of memory")));
+        }
+        Ok(Self(packet))
+    }
+
+    /// The packet's fields.
+    pub(super) fn get(&self) -> &ffi::AVPacket {
+        // SAFETY: never null after `new`.
+        unsafe { &*self.0 }
+    }
+
+    /// Replaces the packet's display time.
+    pub(super) fn set_pts(&mut self, pts: i64) {
+        // SAFETY: never null after `new`.
+        unsafe { (*self.0).pts = pts };
+    }
+
+    /// Whether one of the flags `AV_PKT_FLAG_*` is set.
+    pub(super) fn has(&self, flag: i32) -> bool {
+        self.get().flags & flag != 0
+    }
+
+    /// For the decoder.
+    pub(super) fn as_ptr(&self) -> *const ffi::AVPacket {
+        self.0
+    }
+
+    fn clear(&mut self) {
+        // SAFETY: never null after `new`.
+        unsafe { ffi::av_packet_unref(self.0) };
+    }
+}
+
+impl Drop for Packet {
+    fn drop(&mut self) {
+        // SAFETY: allocated by av_packet_alloc and freed once.
+        unsafe { ffi::av_packet_free(&mut self.0) };
+    }
+}

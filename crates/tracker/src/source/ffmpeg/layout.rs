@@ -1,0 +1,363 @@
+//! From a decoder's picture to one plane of brightness: lent where it can be, converted once where not.
+//!
+//! Owns: [`Layout`], [`Orientation`]. Must not: change a value where the recording has a luma plane.
+
+use std::ffi::CStr;
+use std::ptr;
+
+use ffmpeg_next::ffi;
+
+use super::decode::Picture;
+use crate::error::{Error, Fault, Result};
+use crate::frame::{Bytes, PixelFormat};
+
+/// Weights of red, green and blue in brightness (ITU-R BT.601), over 2^14; their sum is 2^14, so gray stays
+/// what it is. OpenCV's `cvtColor` has the same.
+const RED: u32 = 4899;
+const GREEN: u32 = 9617;
+const BLUE: u32 = 1868;
+
+/// How brightness is taken from pictures of one pixel format.
+pub(super) struct Layout {
+    /// How samples are handed out.
+    pub format: PixelFormat,
+    /// Significant bits of a sample.
+    pub depth_bits: u32,
+    /// The pixel format's name in FFmpeg.
+    pub name: String,
+    raw: i32,
+    kind: Kind,
+}
+
+enum Kind {
+    /// A plane that is what we want.
+    Lend,
+    /// Every n-th byte or byte pair of a plane.
+    Gather(Component),
+    /// Red, green and blue, weighted.
+    Weigh([Component; 3]),
+    /// All others, by libswscale.
+    Scale,
+}
+
+#[derive(Clone, Copy)]
+struct Component {
+    plane: usize,
+    step: usize,
+    offset: usize,
+    shift: u32,
+    depth: u32,
+    big_endian: bool,
+}
+
+impl Component {
+    fn read(self, row: &[u8], x: usize) -> u32 {
+        let at = x * self.step + self.offset;
+        let mask = (1u32 << self.depth) - 1;
+        let value = if self.shift + self.depth <= 8 {
+            u32::from(row[at])
+        } else {
+            let pair = [row[at], row[at + 1]];
+            u32::from(if self.big_endian { u16::from_be_bytes(pair) } else { u16::from_le_bytes(pair) })
+        };
+        (value >> self.shift) & mask
+    }
+
+    fn row_bytes(self, width: usize) -> usize {
+        (width - 1) * self.step + self.offset + if self.shift + self.depth <= 8 { 1 } else { 2 }
+    }
+}
+
+/// A value of the enumeration, if it is one.
+fn pixel_format(raw: i32) -> Option<ffi::AVPixelFormat> {
+    let end = ffi::AVPixelFormat::AV_PIX_FMT_NB as i32;
+    // SAFETY: the enumeration was made from the headers of the library we are linked to and has every value
+    // from 0 to its end.
+    (0..end).contains(&raw).then(|| unsafe { std::mem::transmute::<i32, ffi::AVPixelFormat>(raw) })
+}
+
+impl Layout {
+    /// The layout of pixel format `raw`; `name` is the recording's, for messages.
+    pub(super) fn new(raw: i32, name: &str) -> Result<Self> {
+        let unknown = || {
+            Error::Source(
+                Fault::new(name, format!("pixel format {raw} is not known"))
+                    .advice("Convert the recording with `ffmpeg -i IN -pix_fmt gray -c:v ffv1 OUT.mkv`"),
+            )
+        };
+        let format = pixel_format(raw).ok_or_else(unknown)?;
+        // SAFETY: a look-up in a static table.
+        let descriptor = unsafe { ffi::av_pix_fmt_desc_get(format).as_ref() }.ok_or_else(unknown)?;
+        // SAFETY: the name of a pixel format is a static string.
+        let label = unsafe { CStr::from_ptr(descriptor.name) }.to_string_lossy().into_owned();
+        let has = |flag: i32| descriptor.flags & flag as u64 != 0;
+        if has(ffi::AV_PIX_FMT_FLAG_HWACCEL) {
+            return Err(Error::Source(Fault::new(name, format!("pictures of {label} lie outside memory"))));
+        }
+        let component = |i: usize| {
+            let c = &descriptor.comp[i];
+            Component {
+                plane: c.plane.unsigned_abs() as usize,
+                step: c.step.unsigned_abs() as usize,
+                offset: c.offset.unsigned_abs() as usize,
+                shift: c.shift.unsigned_abs(),
+                depth: c.depth.unsigned_abs(),
+                big_endian: has(ffi::AV_PIX_FMT_FLAG_BE),
+            }
+        };
+        let first = component(0);
+        let special = has(ffi::AV_PIX_FMT_FLAG_PAL)
+            || has(ffi::AV_PIX_FMT_FLAG_BITSTREAM)
+            || has(ffi::AV_PIX_FMT_FLAG_FLOAT)
+            || has(ffi::AV_PIX_FMT_FLAG_BAYER)
+            || label.starts_with("xyz")
+            || !(8..=16).contains(&first.depth);
+        let deepest = descriptor.comp[..usize::from(descriptor.nb_components)]
+            .iter()
+            .map(|c| c.depth.unsigned_abs())
+            .max()
+            .unwrap_or(8);
+        let (kind, depth_bits) = if special {
+            (Kind::Scale, if has(ffi::AV_PIX_FMT_FLAG_BAYER) || deepest <= 8 { deepest.max(8) } else { 16 })
+        } else if has(ffi::AV_PIX_FMT_FLAG_RGB) && descriptor.nb_components >= 3 {
+            let all = [component(0), component(1), component(2)];
+            if all.iter().all(|c| c.depth == first.depth) {
+                (Kind::Weigh(all), first.depth)
+            } else {
+                (Kind::Scale, deepest.max(8))
+            }
+        } else if first.step == first.sample_bytes()
+            && first.offset == 0
+            && !(first.big_endian && first.step == 2)
+        {
+            // Samples kept in the upper bits (P010 and its like) are handed out as they lie, as 16-bit values.
+            (Kind::Lend, first.depth + first.shift)
+        } else {
+            (Kind::Gather(first), first.depth)
+        };
+        let format = if depth_bits > 8 { PixelFormat::Gray16 } else { PixelFormat::Gray8 };
+        Ok(Self { format, depth_bits, name: label, raw, kind })
+    }
+
+    /// Whether pictures have this layout.
+    pub(super) fn is_of(&self, picture: &Picture) -> bool {
+        picture.get().format == self.raw
+    }
+
+    /// Whether samples have to be copied out of the picture; then what they are copied from.
+    pub(super) fn converted_from(&self) -> Option<String> {
+        (!matches!(self.kind, Kind::Lend)).then(|| self.name.clone())
+    }
+
+    fn sample_bytes(&self) -> usize {
+        if self.format == PixelFormat::Gray8 { 1 } else { 2 }
+    }
+
+    /// The plane of a picture and the bytes from one row to the next; `None` if the picture's buffers do not
+    /// hold what its size promises.
+    pub(super) fn plane(
+        &self,
+        picture: Picture,
+        orientation: Orientation,
+    ) -> Option<(Box<dyn Bytes>, usize)> {
+        let width = usize::try_from(picture.get().width).ok().filter(|w| *w > 0)?;
+        let height = usize::try_from(picture.get().height).ok().filter(|h| *h > 0)?;
+        let bytes = self.sample_bytes();
+        if matches!(self.kind, Kind::Lend) && orientation == Orientation::default() {
+            let row_bytes = width * bytes;
+            if picture.plane(0, row_bytes).is_some() {
+                let stride = usize::try_from(picture.get().linesize[0]).ok()?;
+                return Some((Box::new(Lent { picture, row_bytes }), stride));
+            }
+        }
+        let mut samples = vec![0u8; width.checked_mul(height)?.checked_mul(bytes)?];
+        let mut put = |y: usize, x: usize, value: u32| {
+            let at = (y * width + x) * bytes;
+            samples[at] = value as u8;
+            if bytes == 2 {
+                samples[at + 1] = (value >> 8) as u8;
+            }
+        };
+        match self.kind {
+            Kind::Lend => {
+                for (y, to) in samples.chunks_exact_mut(width * bytes).enumerate() {
+                    to.copy_from_slice(picture.row(0, y, width * bytes)?);
+                }
+            }
+            Kind::Gather(c) => {
+                for y in 0..height {
+                    let row = picture.row(c.plane, y, c.row_bytes(width))?;
+                    (0..width).for_each(|x| put(y, x, c.read(row, x)));
+                }
+            }
+            Kind::Weigh([r, g, b]) => {
+                for y in 0..height {
+                    let red = picture.row(r.plane, y, r.row_bytes(width))?;
+                    let green = picture.row(g.plane, y, g.row_bytes(width))?;
+                    let blue = picture.row(b.plane, y, b.row_bytes(width))?;
+                    for x in 0..width {
+                        let sum = RED * r.read(red, x) + GREEN * g.read(green, x) + BLUE * b.read(blue, x);
+                        put(y, x, (sum + (1 << 13)) >> 14);
+                    }
+                }
+            }
+            Kind::Scale => self.scale(&picture, width, height, &mut samples)?,
+        }
+        let (turned, row_pixels) = orientation.apply(samples, width, height, bytes);
+        Some((Box::new(turned), row_pixels * bytes))
+    }
+
+    fn scale(&self, picture: &Picture, width: usize, height: usize, to: &mut [u8]) -> Option<()> {
+        let from = pixel_format(self.raw)?;
+        let into = match self.format {
+            PixelFormat::Gray8 => ffi::AVPixelFormat::AV_PIX_FMT_GRAY8,
+            _ => ffi::AVPixelFormat::AV_PIX_FMT_GRAY16LE,
+        };
+        let (w, h) = (width as i32, height as i32);
+        let flags = ffi::SWS_BILINEAR | ffi::SWS_ACCURATE_RND | ffi::SWS_BITEXACT | ffi::SWS_FULL_CHR_H_INP;
+        // SAFETY: plain values; null filters and parameters are allowed; null is checked.
+        let context = unsafe {
+            ffi::sws_getContext(w, h, from, w, h, into, flags, ptr::null_mut(), ptr::null_mut(), ptr::null())
+        };
+        if context.is_null() {
+            return None;
+        }
+        let frame = picture.get();
+        let planes = [to.as_mut_ptr(), ptr::null_mut(), ptr::null_mut(), ptr::null_mut()];
+        let strides = [(width * self.sample_bytes()) as i32, 0, 0, 0];
+        // SAFETY: the source planes are those of a decoded frame of this format and size, the destination has
+        // `height` rows of `strides[0]` bytes, and the context is freed once after its only use.
+        let rows = unsafe {
+            let rows = ffi::sws_scale(
+                context,
+                frame.data.as_ptr().cast::<*const u8>(),
+                frame.linesize.as_ptr(),
+                0,
+                h,
+                planes.as_ptr(),
+                strides.as_ptr(),
+            );
+            ffi::sws_freeContext(context);
+            rows
+        };
+        if rows != h {
+            return None;
+        }
+        // libswscale stretches shallower samples to 16 bits; what is handed out keeps the recording's depth.
+        if self.format == PixelFormat::Gray16 && self.depth_bits < 16 {
+            for pair in to.chunks_exact_mut(2) {
+                let value = u16::from_le_bytes([pair[0], pair[1]]) >> (16 - self.depth_bits);
+                pair.copy_from_slice(&value.to_le_bytes());
+            }
+        }
+        Some(())
+    }
+}
+
+impl Component {
+    fn sample_bytes(self) -> usize {
+        if self.shift + self.depth <= 8 { 1 } else { 2 }
+    }
+}
+
+/// A plane lent by a decoder's picture.
+struct Lent {
+    picture: Picture,
+    row_bytes: usize,
+}
+
+impl Bytes for Lent {
+    fn bytes(&self) -> &[u8] {
+        // Checked when it was made; a picture does not change.
+        self.picture.plane(0, self.row_bytes).unwrap_or(&[])
+    }
+}
+
+/// How the picture must be turned to be seen as it was filmed: first transposed, then mirrored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct Orientation {
+    /// Rows become columns.
+    pub transposed: bool,
+    /// Left and right are exchanged, after that.
+    pub mirrored_x: bool,
+    /// Top and bottom are exchanged, after that.
+    pub mirrored_y: bool,
+}
+
+impl Orientation {
+    /// From the first two columns of a display matrix, row by row: a point (x, y) is shown at
+    /// (a x + c y, b x + d y). `None` for turns that are not by a right angle.
+    pub(super) fn from_matrix(a: i32, b: i32, c: i32, d: i32) -> Option<Self> {
+        match (a, b, c, d) {
+            (a, 0, 0, d) if a != 0 && d != 0 => {
+                Some(Self { transposed: false, mirrored_x: a < 0, mirrored_y: d < 0 })
+            }
+            (0, b, c, 0) if b != 0 && c != 0 => {
+                Some(Self { transposed: true, mirrored_x: c < 0, mirrored_y: b < 0 })
+            }
+            _ => None,
+        }
+    }
+
+    /// Width and height after turning.
+    pub(super) fn size(self, width: u32, height: u32) -> (u32, u32) {
+        if self.transposed { (height, width) } else { (width, height) }
+    }
+
+    /// In words, clockwise; `None` if nothing is turned.
+    pub(super) fn words(self) -> Option<&'static str> {
+        match (self.transposed, self.mirrored_x, self.mirrored_y) {
+            (false, false, false) => None,
+            (false, true, true) => Some("180 degrees"),
+            (true, true, false) => Some("90 degrees clockwise"),
+            (true, false, true) => Some("90 degrees counter-clockwise"),
+            (false, true, false) => Some("mirrored left to right"),
+            (false, false, true) => Some("mirrored top to bottom"),
+            (true, false, false) => Some("mirrored at its diagonal"),
+            (true, true, true) => Some("mirrored at its other diagonal"),
+        }
+    }
+
+    /// The turned samples and their row length in pixels.
+    fn apply(self, samples: Vec<u8>, width: usize, height: usize, bytes: usize) -> (Vec<u8>, usize) {
+        if self == Self::default() {
+            return (samples, width);
+        }
+        let (w, h) = if self.transposed { (height, width) } else { (width, height) };
+        let mut turned = vec![0u8; samples.len()];
+        for y in 0..h {
+            let v = if self.mirrored_y { h - 1 - y } else { y };
+            for x in 0..w {
+                let u = if self.mirrored_x { w - 1 - x } else { x };
+                let from = if self.transposed { (u * width + v) * bytes } else { (v * width + u) * bytes };
+                let to = (y * w + x) * bytes;
+                turned[to..to + bytes].copy_from_slice(&samples[from..from + bytes]);
+            }
+        }
+        (turned, w)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn turns_move_every_pixel_to_its_place() {
+        // 1 2 3
+        // 4 5 6
+        let picture = vec![1, 2, 3, 4, 5, 6];
+        let turn = |transposed, mirrored_x, mirrored_y| {
+            Orientation { transposed, mirrored_x, mirrored_y }.apply(picture.clone(), 3, 2, 1)
+        };
+        assert_eq!(turn(false, true, true), (vec![6, 5, 4, 3, 2, 1], 3));
+        assert_eq!(turn(true, true, false), (vec![4, 1, 5, 2, 6, 3], 2), "clockwise");
+        assert_eq!(turn(true, false, true), (vec![3, 6, 2, 5, 1, 4], 2), "counter-clockwise");
+        assert_eq!(turn(true, false, false), (vec![1, 4, 2, 5, 3, 6], 2));
+    }
+
+    #[test]
+    fn gray_stays_what_it_is_when_weighted() {
+        assert_eq!(RED + GREEN + BLUE, 1 << 14);
+    }
+}

@@ -1,0 +1,488 @@
+//! Compressed film through FFmpeg's libraries; the luma plane is lent to detection without a copy.
+//!
+//! Owns: [`FfmpegSource`]. Must not: print, change a pixel where the recording has a luma plane, or guess what
+//! a frame that could not be decoded held: it comes without a plane, and so do frames predicted from it, up to
+//! the next key frame.
+
+mod decode;
+mod demux;
+mod layout;
+mod order;
+mod sample;
+
+use std::collections::VecDeque;
+use std::ffi::CStr;
+use std::sync::Arc;
+
+use ffmpeg_next::ffi;
+
+use decode::{Decoder, Picture, Received};
+use demux::{Demuxer, Packet, Read};
+use layout::{Layout, Orientation};
+use order::{Order, Sent};
+
+use super::{Input, OpenOptions, clock};
+use crate::error::{Error, Fault, Result};
+use crate::frame::{Bytes, Ending, Frame, FrameSource, RateOrigin, SourceInfo, TimeBase};
+
+/// FFmpeg's words for an error code.
+fn message(code: i32) -> String {
+    ffmpeg_next::Error::from(code).to_string()
+}
+
+/// FFmpeg's name of a codec.
+fn codec_name(id: ffi::AVCodecID) -> String {
+    // SAFETY: the call gives a static string for any value.
+    unsafe { CStr::from_ptr(ffi::avcodec_get_name(id)) }.to_string_lossy().into_owned()
+}
+
+/// A frame on its way out: its time, and its plane with the bytes of a row.
+struct Ready {
+    ticks: i64,
+    plane: Option<(Box<dyn Bytes>, usize)>,
+    byte: Option<u64>,
+}
+
+/// A recording read through FFmpeg.
+pub struct FfmpegSource {
+    info: SourceInfo,
+    url: String,
+    can_reopen: bool,
+    protocols: Option<&'static str>,
+    threads: usize,
+    demuxer: Demuxer,
+    decoder: Decoder,
+    layout: Layout,
+    orientation: Orientation,
+    /// Packets read ahead while looking whether the stream has display times.
+    ahead: VecDeque<Packet>,
+    packet: Packet,
+    stamps: Stamps,
+    order: Order,
+    intra_only: bool,
+    /// A frame is damaged and those that follow are predicted from it.
+    tainted: bool,
+    draining: bool,
+    finished: bool,
+    failures: usize,
+    /// Packets of the stream seen, with those that an edit list hides.
+    packets: u64,
+    last_byte: Option<u64>,
+    stop_reason: Option<String>,
+    /// Frames without a plane whose fate depends on whether a good one follows.
+    held: VecDeque<Ready>,
+    ready: VecDeque<Ready>,
+    /// Frames given as samples of a pipe, to be handed out in their turn.
+    replay: VecDeque<Frame>,
+    next_index: u64,
+    user_clock: bool,
+    ending: Ending,
+}
+
+/// Where display times come from.
+enum Stamps {
+    /// Each packet has one.
+    Packets {
+        /// The last one and its duration, for a packet without.
+        last: Option<(i64, i64)>,
+    },
+    /// None has: the decoding times, which rise, are given to frames in their order.
+    Decoding {
+        times: VecDeque<i64>,
+        /// Time of the next frame if there are no decoding times either, and ticks from frame to frame.
+        next: i64,
+        step: i64,
+    },
+}
+
+/// How far decoding order and display order can differ (H.264's and HEVC's limit of 16 frames).
+const REORDER: i64 = 16;
+
+impl FfmpegSource {
+    /// Opens what `input` stands for; `name` is the user's, for messages.
+    ///
+    /// # Errors
+    /// [`Error::Source`] if it holds no film that can be decoded.
+    pub(crate) fn open(name: &str, input: &Input, options: &OpenOptions) -> Result<Self> {
+        // SAFETY: sets one global number. The libraries would print; errors come back as codes.
+        unsafe { ffi::av_log_set_level(ffi::AV_LOG_QUIET) };
+        let (url, can_reopen, protocols) = match input {
+            Input::File(url) => (url, true, Some("file")),
+            Input::Pipe(url) => (url, false, Some("file,pipe")),
+            Input::Address(url) => (url, false, None),
+        };
+        let mut demuxer = Demuxer::open(url, name, protocols)?;
+        let decoder = Decoder::open(&demuxer, name, options.threads)?;
+        let parameters = demuxer.parameters();
+        let codec = codec_name(parameters.codec_id);
+        let layout = Layout::new(parameters.format, name)?;
+        // SAFETY: a look-up in a static table; null for codecs without a descriptor.
+        let properties =
+            unsafe { ffi::avcodec_descriptor_get(parameters.codec_id).as_ref() }.map_or(0, |d| d.props);
+        let intra_only = properties & ffi::AV_CODEC_PROP_INTRA_ONLY != 0;
+        let (width, height) = size(parameters, name)?;
+        let mut warnings = Vec::new();
+        let orientation = turn(&demuxer, &mut warnings);
+        let (width, height) = orientation.size(width, height);
+
+        let stream = demuxer.stream();
+        let stream_base = positive(stream.time_base).unwrap_or((1, 1_000_000));
+        let rate = demuxer.rate();
+        let stream_rate_hz = rate.map(|r| f64::from(r.num) / f64::from(r.den));
+        let (time_base, rate_hz, rate_origin) = match options.fps {
+            Some(fps) => (clock::time_base(fps)?, Some(fps), RateOrigin::User),
+            None => (
+                TimeBase { numerator: stream_base.0, denominator: stream_base.1 },
+                stream_rate_hz,
+                if stream_rate_hz.is_some() { RateOrigin::Container } else { RateOrigin::Unknown },
+            ),
+        };
+        let step = stream_rate_hz
+            .map_or(1.0, |r| stream_base.1 as f64 / (stream_base.0 as f64 * r))
+            .round()
+            .max(1.0) as i64;
+        let info = SourceInfo {
+            name: name.to_owned(),
+            container: demuxer.container(),
+            codec,
+            width,
+            height,
+            format: layout.format,
+            depth_bits: layout.depth_bits,
+            declared_frames: u64::try_from(stream.nb_frames).ok().filter(|n| *n > 0),
+            time_base,
+            rate_hz,
+            rate_origin,
+            converted_from: layout.converted_from(),
+            size_bytes: can_reopen.then(|| std::fs::metadata(name).ok().map(|m| m.len())).flatten(),
+            details: details(parameters, &layout),
+            warnings,
+        };
+
+        // A stream has display times if its first packets have.
+        let mut ahead = VecDeque::new();
+        let mut stop_reason = None;
+        let mut at_end = false;
+        for _ in 0..if intra_only { 1 } else { 6 } {
+            let mut packet = Packet::new(name)?;
+            match demuxer.read(&mut packet) {
+                Read::Packet => ahead.push_back(packet),
+                Read::End => at_end = true,
+                Read::Failed(reason) => {
+                    stop_reason = Some(reason);
+                    at_end = true;
+                }
+            }
+            if at_end {
+                break;
+            }
+        }
+        let lacks = |p: &Packet| {
+            p.get().pts == ffi::AV_NOPTS_VALUE && !(intra_only && p.get().dts != ffi::AV_NOPTS_VALUE)
+        };
+        let unstamped = ahead.iter().any(lacks);
+        Ok(Self {
+            info,
+            url: url.clone(),
+            can_reopen,
+            protocols,
+            threads: options.threads,
+            demuxer,
+            decoder,
+            layout,
+            orientation,
+            ahead,
+            packet: Packet::new(name)?,
+            stamps: if unstamped {
+                Stamps::Decoding { times: VecDeque::new(), next: 0, step }
+            } else {
+                Stamps::Packets { last: None }
+            },
+            order: Order::new(if unstamped && !intra_only { REORDER } else { 0 }),
+            intra_only,
+            tainted: false,
+            draining: false,
+            finished: false,
+            failures: 0,
+            packets: 0,
+            last_byte: None,
+            stop_reason,
+            held: VecDeque::new(),
+            ready: VecDeque::new(),
+            replay: VecDeque::new(),
+            next_index: 0,
+            user_clock: options.fps.is_some(),
+            ending: Ending::Complete,
+        })
+    }
+
+    /// Reads one packet and gives it to the decoder, or starts draining.
+    fn feed(&mut self) {
+        if let Some(packet) = self.ahead.pop_front() {
+            self.packet = packet;
+        } else if self.stop_reason.is_some() {
+            return self.drain();
+        } else {
+            match self.demuxer.read(&mut self.packet) {
+                Read::Packet => {}
+                Read::End => return self.drain(),
+                Read::Failed(reason) => {
+                    self.stop_reason = Some(reason);
+                    return self.drain();
+                }
+            }
+        }
+        let number = self.packets as i64;
+        self.packets += 1;
+        let fields = *self.packet.get();
+        let byte = u64::try_from(fields.pos).ok();
+        let key = match &mut self.stamps {
+            Stamps::Packets { last } => {
+                let stamp = [fields.pts, fields.dts].into_iter().find(|t| *t != ffi::AV_NOPTS_VALUE);
+                let key = stamp.unwrap_or_else(|| last.map_or(0, |(t, d)| t.saturating_add(d.max(1))));
+                *last = Some((key, fields.duration));
+                key
+            }
+            Stamps::Decoding { times, next, step } => {
+                let time = if fields.dts == ffi::AV_NOPTS_VALUE { *next } else { fields.dts.max(*next) };
+                times.push_back(time);
+                *next = time.saturating_add(*step);
+                number
+            }
+        };
+        self.packet.set_pts(key);
+        // What an edit list hides is decoded, because others are predicted from it, but gives no picture.
+        if !self.packet.has(ffi::AV_PKT_FLAG_DISCARD) {
+            self.order.sent(Sent { key, byte, key_frame: self.packet.has(ffi::AV_PKT_FLAG_KEY) });
+            self.last_byte = byte.map(|b| b + u64::try_from(fields.size).unwrap_or(0)).or(self.last_byte);
+        }
+        // A packet that the demuxer knows to be cut would give a picture with made-up pixels.
+        if !self.packet.has(ffi::AV_PKT_FLAG_CORRUPT) {
+            self.decoder.send(Some(&self.packet));
+        }
+    }
+
+    fn drain(&mut self) {
+        self.draining = true;
+        self.decoder.send(None);
+    }
+
+    /// Takes one picture out of the decoder, feeding it as needed. Adds to `ready`, or ends the recording.
+    fn advance(&mut self) -> Result<()> {
+        match self.decoder.receive()? {
+            Received::Picture(picture) => {
+                self.failures = 0;
+                self.take(picture);
+            }
+            Received::Hungry if self.draining => self.finish(),
+            Received::Hungry => self.feed(),
+            Received::End => self.finish(),
+            Received::Damaged => {
+                self.failures += 1;
+                // One failure for each packet under way is the most that can come; more is a decoder that is stuck.
+                if self.draining && self.failures > self.order.waiting() + 64 {
+                    self.finish();
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Puts a picture into the queue, and before it frames without a plane for those that will not come.
+    fn take(&mut self, picture: Picture) {
+        let key = picture.get().pts;
+        let arrival = self.order.arrived(key);
+        for lost in arrival.lost {
+            self.tainted |= !self.intra_only;
+            self.hold(lost);
+        }
+        let damaged = picture.is_damaged();
+        if damaged {
+            self.tainted |= !self.intra_only;
+        } else if arrival.own.is_some_and(|p| p.key_frame) {
+            self.tainted = false;
+        }
+        let byte = arrival.own.and_then(|p| p.byte);
+        let fits = self.layout.is_of(&picture) && {
+            let (w, h) = (picture.get().width.unsigned_abs(), picture.get().height.unsigned_abs());
+            self.orientation.size(w, h) == (self.info.width, self.info.height)
+        };
+        let plane = if damaged || self.tainted || !fits {
+            None
+        } else {
+            self.layout.plane(picture, self.orientation)
+        };
+        let ticks = self.next_ticks(key);
+        let ready = Ready { ticks, plane, byte };
+        if ready.plane.is_some() {
+            self.ready.append(&mut self.held);
+            self.ready.push_back(ready);
+        } else {
+            self.held.push_back(ready);
+        }
+    }
+
+    fn hold(&mut self, lost: Sent) {
+        let ticks = self.next_ticks(lost.key);
+        self.held.push_back(Ready { ticks, plane: None, byte: lost.byte });
+    }
+
+    fn next_ticks(&mut self, key: i64) -> i64 {
+        match &mut self.stamps {
+            Stamps::Packets { .. } => key,
+            Stamps::Decoding { times, next, .. } => times.pop_front().unwrap_or(*next),
+        }
+    }
+
+    /// The decoder gives no more: says how the recording ended.
+    fn finish(&mut self) {
+        self.finished = true;
+        for lost in self.order.rest() {
+            self.hold(lost);
+        }
+        let declared = self.info.declared_frames;
+        let short = declared.is_some_and(|n| self.packets < n);
+        let reason = match (&self.stop_reason, declared) {
+            (Some(reason), _) => format!("the file cannot be read further ({reason})"),
+            (None, Some(n)) if short => {
+                format!("the file ends after {} of {n} frames that its header declares", self.packets)
+            }
+            _ if !self.held.is_empty() => "the last frames cannot be decoded".to_owned(),
+            _ => return,
+        };
+        let frames = self.next_index + self.ready.len() as u64;
+        let byte = self.held.front().map_or(self.last_byte, |h| h.byte).or_else(|| self.demuxer.position());
+        self.held.clear();
+        self.ending = Ending::Early { frames, byte, reason };
+    }
+
+    fn make(&mut self, ready: Ready) -> Frame {
+        let index = self.next_index;
+        self.next_index += 1;
+        let (plane, stride) = match ready.plane {
+            Some((plane, stride)) => (Some(plane), stride),
+            None => (None, 0),
+        };
+        Frame {
+            index,
+            ticks: if self.user_clock { index as i64 } else { ready.ticks },
+            width: self.info.width,
+            height: self.info.height,
+            stride,
+            format: self.info.format,
+            depth_bits: self.info.depth_bits,
+            plane,
+        }
+    }
+
+    fn decode_next(&mut self) -> Result<Option<Frame>> {
+        loop {
+            if let Some(ready) = self.ready.pop_front() {
+                return Ok(Some(self.make(ready)));
+            }
+            if self.finished {
+                if self.next_index == 0 {
+                    let reason = match &self.ending {
+                        Ending::Early { reason, .. } => reason.clone(),
+                        Ending::Complete => "it holds no frames".to_owned(),
+                    };
+                    return Err(Error::Source(
+                        Fault::new(&self.info.name, format!("no frame can be decoded: {reason}"))
+                            .advice("Check that the file is complete and that `ffmpeg -i` reads it"),
+                    ));
+                }
+                return Ok(None);
+            }
+            self.advance()?;
+        }
+    }
+}
+
+impl FrameSource for FfmpegSource {
+    fn info(&self) -> &SourceInfo {
+        &self.info
+    }
+
+    fn next_frame(&mut self) -> Result<Option<Frame>> {
+        match self.replay.pop_front() {
+            Some(frame) => Ok(Some(frame)),
+            None => self.decode_next(),
+        }
+    }
+
+    fn ending(&self) -> Ending {
+        self.ending.clone()
+    }
+
+    fn sample(&mut self, count: usize) -> Result<Vec<Frame>> {
+        if self.can_reopen { self.sample_file(count) } else { self.sample_pipe(count) }
+    }
+}
+
+/// A plane that two frames share.
+struct Shared(Arc<dyn Bytes>);
+
+impl Bytes for Shared {
+    fn bytes(&self) -> &[u8] {
+        self.0.bytes()
+    }
+}
+
+/// A fraction with both parts above 0.
+fn positive(r: ffi::AVRational) -> Option<(u64, u64)> {
+    Some((u64::try_from(r.num).ok().filter(|n| *n > 0)?, u64::try_from(r.den).ok().filter(|n| *n > 0)?))
+}
+
+/// Pixel format, profile's range and the like, for the user.
+fn details(parameters: &ffi::AVCodecParameters, layout: &Layout) -> Vec<(String, String)> {
+    let range = match parameters.color_range {
+        ffi::AVColorRange::AVCOL_RANGE_MPEG => "limited",
+        ffi::AVColorRange::AVCOL_RANGE_JPEG => "full",
+        _ if layout.name.starts_with("yuvj") || layout.name.starts_with("gray") => "full",
+        _ if layout.converted_from().is_some() => "full",
+        _ => "not said",
+    };
+    vec![("pixel format".into(), layout.name.clone()), ("range".into(), range.into())]
+}
+
+fn size(parameters: &ffi::AVCodecParameters, name: &str) -> Result<(u32, u32)> {
+    match (u32::try_from(parameters.width), u32::try_from(parameters.height)) {
+        (Ok(w), Ok(h)) if w > 0 && h > 0 => Ok((w, h)),
+        _ => Err(Error::Source(
+            Fault::new(name, format!("a picture of {} x {} px", parameters.width, parameters.height))
+                .advice("Check that the file is complete and that `ffmpeg -i` reads it"),
+        )),
+    }
+}
+
+/// How the container says that pictures are to be turned.
+fn turn(demuxer: &Demuxer, warnings: &mut Vec<String>) -> Orientation {
+    let mut size = 0usize;
+    // SAFETY: the stream is valid, and the data it gives lives as long as the stream.
+    let data = unsafe {
+        ffi::av_stream_get_side_data(
+            demuxer.stream(),
+            ffi::AVPacketSideDataType::AV_PKT_DATA_DISPLAYMATRIX,
+            (&raw mut size).cast(),
+        )
+    };
+    if data.is_null() || size < 36 {
+        return Orientation::default();
+    }
+    // SAFETY: a display matrix is nine 32-bit numbers; the size was checked, and reads may be unaligned.
+    let at = |i: usize| unsafe { data.cast::<i32>().add(i).read_unaligned() };
+    let orientation = Orientation::from_matrix(at(0), at(1), at(3), at(4));
+    match orientation {
+        Some(o) => {
+            if let Some(words) = o.words() {
+                warnings.push(format!("turned as the file says: {words}"));
+            }
+            o
+        }
+        None => {
+            warnings
+                .push("the file asks for a turn that is not by a right angle; it is not turned".to_owned());
+            Orientation::default()
+        }
+    }
+}

@@ -1,0 +1,6 @@
+//! Reading recordings: files made by the `ffmpeg` program from known pictures, and real ones.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+mod film;
+
+mod ffmpeg;
