@@ -18,9 +18,12 @@
 
 pub mod contact;
 pub mod dop853;
+pub mod ensemble;
+pub mod lyapunov;
 pub mod motion;
 pub mod parameters;
 pub mod scalar;
+pub mod section;
 pub mod simulate;
 mod tableau;
 pub mod terms;

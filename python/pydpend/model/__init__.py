@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pydpend.model.laws import UNITS, Damping
+from pydpend.model.laws import UNITS, Damping, parameters
 from pydpend.model.pendulum import CONSTANTS, Model, uniform_bar
 from pydpend.model.reduce import (
     G_MM_S2,
@@ -26,6 +26,7 @@ __all__ = [
     "derived",
     "from_parts",
     "jacobian",
+    "parameters",
     "published",
     "reduced_constants",
     "uniform_bar",

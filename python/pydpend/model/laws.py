@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, fields
 
 from pydpend.errors import ModelError, fault
+from pydpend.model.pendulum import Model
 
 
 @dataclass(frozen=True)
@@ -35,11 +36,20 @@ class Damping:
     strip_drag: float = 0.0
     """Air drag of the lower link in its true relative wind, N m s2: the moment is ``strip_drag |w2| w2``
     for the link turning alone about a fixed elbow."""
+    offset1: float = 0.0
+    """Constant torque driving link 1, N m, positive counter-clockwise (negative brakes that way)."""
+    offset2: float = 0.0
+    """Constant torque in joint 2, N m: on link 2, reacting on link 1."""
+    added_inertia: float = 0.0
+    """Inertia about the elbow of the air that moves with the lower link, kg m2."""
+    tilt: float = 0.0
+    """Direction of gravity in the plane, rad, counter-clockwise from where the angles are zero."""
 
     def __post_init__(self) -> None:
         for f in fields(self):
             value = getattr(self, f.name)
-            if not math.isfinite(value) or value < 0:
+            signed = f.name in ("offset1", "offset2", "tilt")
+            if not math.isfinite(value) or (value < 0 and not signed):
                 raise ModelError(
                     fault(
                         "damping", f"{f.name} is {value}", "A damping coefficient is finite and not negative"
@@ -57,5 +67,28 @@ UNITS = {
     "tau_c1": "N m",
     "tau_c2": "N m",
     "strip_drag": "N m s2",
+    "offset1": "N m",
+    "offset2": "N m",
+    "added_inertia": "kg m2",
+    "tilt": "rad",
 }
 """Unit of each coefficient of `Damping`."""
+
+
+def parameters(model: Model, damping: Damping) -> dict[str, float]:
+    """The model and its damping under the names that the compiled half knows (`_tracker.simulate_motion`)."""
+    out = {
+        "psi": model.psi_kg_m2,
+        "lambda": model.lambda_kg_m2,
+        "zeta": model.zeta_kg_m2,
+        "a3": model.a3_kg_m2,
+        "sigma": model.sigma_j,
+        "kappa": model.kappa_j,
+        "m1": model.m1_kg,
+        "m2": model.m2_kg,
+        "l1": model.l1_m,
+        "g": model.g_m_s2,
+        "lower_inner": model.lower_inner_m,
+        "lower_outer": model.lower_outer_m,
+    }
+    return out | {f.name: float(getattr(damping, f.name)) for f in fields(damping)}
