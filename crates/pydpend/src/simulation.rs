@@ -100,6 +100,8 @@ pub fn simulate_motion<'py>(
     run_dict(py, &run)
 }
 
+type Many<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<bool>>);
+
 /// Many motions on all cores: `states` (K, 4), one model for all or one each. Returns states (K*T, 4), energies
 /// (K*T,) and which came to rest (K,).
 #[pyfunction]
@@ -112,7 +114,7 @@ pub fn simulate_ensemble<'py>(
     tolerance: f64,
     width_rad_s: Option<f64>,
     pinned: bool,
-) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<bool>>)> {
+) -> PyResult<Many<'py>> {
     let pendulums = models.iter().map(parameters).collect::<PyResult<Vec<_>>>()?;
     let rows = states.as_array();
     if rows.shape()[1] != 4 || (pendulums.len() != 1 && pendulums.len() != rows.shape()[0]) {
