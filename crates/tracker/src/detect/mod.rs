@@ -3,8 +3,23 @@
 //! Owns: [`Detection`], [`DetectSettings`], [`Levels`] (what was learned of the recording) and [`Detector`].
 //! Must not: know of nodes, bodies or other frames.
 
-use crate::error::Result;
-use crate::frame::Frame;
+mod background;
+mod candidates;
+mod centre;
+mod contours;
+mod detector;
+mod lens;
+mod levels;
+mod mask;
+mod pixels;
+mod runs;
+mod shape;
+#[cfg(test)]
+mod tests;
+
+pub use detector::Detector;
+pub use levels::{Background, Levels, Noise, Side};
+
 use crate::rig::{Lens, Region};
 
 /// Facts about a detection that make its centre less trustworthy, as bits.

@@ -1,0 +1,182 @@
+//! Which polarity and which height make markers out of a recording: tried, and judged by the blobs that come.
+//!
+//! Owns: the choice. Must not: find centres.
+
+use super::background::Background;
+use super::levels::{Side, quantile, sorted};
+use super::pixels::Pixels;
+use super::runs::{Blob, Labeller, Plan, Segment};
+use crate::frame::PixelFormat;
+
+/// Sample images and what is known of them.
+pub(crate) struct Field<'a> {
+    pub images: &'a [Vec<u16>],
+    pub width: usize,
+    pub height: usize,
+    pub background: &'a Background,
+    /// Noise variance of the background.
+    pub read: f64,
+}
+
+/// A blob that looks like a marker.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Candidate {
+    /// Pixels beyond the threshold.
+    pub area: f64,
+    /// Height of its upper quarter above the background, raw units.
+    pub contrast: f64,
+    /// How much it counts for its threshold.
+    pub weight: f64,
+}
+
+/// The best choice and the blobs it gives.
+pub(crate) struct Choice {
+    pub side: Side,
+    pub height: f64,
+    pub blobs: Vec<Candidate>,
+}
+
+/// Frames in which thresholds are tried.
+const FRAMES: usize = 6;
+/// Thresholds tried on each side.
+const STEPS: usize = 20;
+
+/// Heights above the background as an image of their own, as bytes of 16-bit samples.
+fn heights(field: &Field<'_>, image: &[u16], side: Side) -> Vec<u8> {
+    let mut bytes = Vec::with_capacity(image.len() * 2);
+    let flat = field.background.is_flat();
+    let level = field.background.median();
+    for (y, row) in image.chunks_exact(field.width).enumerate() {
+        for (x, &v) in row.iter().enumerate() {
+            let b = if flat { level } else { field.background.at(x as f64, y as f64) };
+            let h = side.sign() * (f64::from(v) - b);
+            bytes.extend_from_slice(&(h.round().clamp(0.0, 65535.0) as u16).to_le_bytes());
+        }
+    }
+    bytes
+}
+
+/// The side and height whose blobs look most like markers; `fixed` is a threshold in raw units.
+pub(crate) fn best(field: &Field<'_>, sides: &[Side], fixed: Option<f64>) -> Option<Choice> {
+    let step = field.images.len().div_ceil(FRAMES).max(1);
+    let sigma = field.read.sqrt();
+    let fields: Vec<(Side, Vec<Vec<u8>>, f64)> = sides
+        .iter()
+        .map(|&side| {
+            let maps: Vec<Vec<u8>> =
+                field.images.iter().step_by(step).map(|i| heights(field, i, side)).collect();
+            let top = top_height(&maps);
+            (side, maps, top)
+        })
+        .collect();
+    let highest = fields.iter().map(|f| f.2).fold(0.0, f64::max);
+    let mut found: Option<(f64, Choice)> = None;
+    for (side, maps, top) in &fields {
+        let fixed = fixed.map(|t| side.sign() * (t - field.background.median()));
+        if fixed.is_some_and(|h| h <= 0.0) {
+            continue;
+        }
+        let low = (4.0 * sigma).max(2.0);
+        if fixed.is_none() && *top <= low {
+            continue;
+        }
+        let tried: Vec<f64> = match fixed {
+            Some(h) => vec![h],
+            None => {
+                (0..STEPS).map(|i| low * (0.97 * top / low).powf(i as f64 / (STEPS - 1) as f64)).collect()
+            }
+        };
+        let mut trials: Vec<(f64, f64, Vec<Candidate>)> = tried
+            .iter()
+            .map(|&h| {
+                let blobs = markers(field, maps, h, sigma);
+                let score = blobs.iter().map(|b| b.weight * (b.contrast / highest).sqrt()).sum();
+                (h, score, blobs)
+            })
+            .collect();
+        let best = (0..trials.len()).max_by(|&a, &b| trials[a].1.total_cmp(&trials[b].1))?;
+        let score = trials[best].1;
+        if score <= 0.0 || found.as_ref().is_some_and(|f| f.0 >= score) {
+            continue;
+        }
+        // The stretch of thresholds that are nearly as good; inside it, half of the height of a weak marker.
+        let good = |i: &usize| trials[*i].1 >= 0.85 * score;
+        let first = (0..=best).rev().take_while(good).last().unwrap_or(best);
+        let last = (best..trials.len()).take_while(good).last().unwrap_or(best);
+        let weak = quantile(&sorted(trials[best].2.iter().map(|b| b.contrast)), 0.1);
+        let height = (0.5 * weak).max((4.0 * sigma).min(0.7 * weak)).clamp(trials[first].0, trials[last].0);
+        let blobs =
+            if fixed.is_some() { trials.swap_remove(best).2 } else { markers(field, maps, height, sigma) };
+        if !blobs.is_empty() {
+            found = Some((score, Choice { side: *side, height, blobs }));
+        }
+    }
+    found.map(|f| f.1)
+}
+
+/// The height that a few pixels of each frame exceed: above single hot pixels.
+fn top_height(maps: &[Vec<u8>]) -> f64 {
+    let mut counts = vec![0usize; 65536];
+    for b in maps.iter().flat_map(|m| m.chunks_exact(2)) {
+        counts[usize::from(u16::from_le_bytes([b[0], b[1]]))] += 1;
+    }
+    let mut seen = 0;
+    for (h, n) in counts.iter().enumerate().rev() {
+        seen += n;
+        if seen >= 12 * maps.len() {
+            return h as f64;
+        }
+    }
+    0.0
+}
+
+/// Blobs at a height that are compact, not small, and steep at their edge.
+fn markers(field: &Field<'_>, maps: &[Vec<u8>], height: f64, sigma: f64) -> Vec<Candidate> {
+    let threshold = height.ceil().clamp(1.0, 65535.0) as u16;
+    let segment = Segment { start: 0, end: field.width as u32, threshold, edge: (true, true) };
+    let plan = Plan {
+        segments: vec![segment; field.height],
+        first: (0..=field.height as u32).collect(),
+        edge_rows: (0, field.height - 1),
+    };
+    let most = field.width * field.height / 20;
+    let mut labeller = Labeller::default();
+    let mut blobs: Vec<Blob> = Vec::new();
+    let mut all = Vec::new();
+    for map in maps {
+        let pixels = Pixels::of_samples(map, field.width, field.height, PixelFormat::Gray16);
+        labeller.find(&pixels, &plan, Side::Bright, &mut blobs);
+        for blob in &blobs {
+            let area = blob.area as usize;
+            if !(5..=most).contains(&area) || blob.elongation() > 6.0 || blob.fill() < 0.7 {
+                continue;
+            }
+            if let Some(c) = judge(&pixels, blob, threshold, sigma) {
+                all.push(c);
+            }
+        }
+    }
+    all
+}
+
+fn judge(pixels: &Pixels<'_>, blob: &Blob, threshold: u16, sigma: f64) -> Option<Candidate> {
+    let mut values: Vec<u16> = Vec::new();
+    let mut row = vec![0; (blob.x1 - blob.x0 + 1) as usize];
+    for y in blob.y0..=blob.y1 {
+        pixels.read(y as usize, blob.x0 as usize, &mut row);
+        values.extend(row.iter().filter(|&&v| v >= threshold));
+    }
+    if values.is_empty() {
+        return None;
+    }
+    values.sort_unstable();
+    let upper = f64::from(values[(values.len() - 1) * 3 / 4]);
+    if upper - f64::from(threshold) < 1.5 * sigma {
+        return None;
+    }
+    // Of a steep blob most pixels are above the middle between the threshold and its top.
+    let middle = (upper + f64::from(threshold)) / 2.0;
+    let above = values.iter().filter(|&&v| f64::from(v) >= middle).count() as f64 / values.len() as f64;
+    let border = if blob.border { 0.3 } else { 1.0 };
+    Some(Candidate { area: blob.area as f64, contrast: upper, weight: above * border })
+}

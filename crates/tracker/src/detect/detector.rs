@@ -1,0 +1,199 @@
+//! One frame in, detections out; the stages in order.
+//!
+//! Owns: [`Detector`] and its scratch. Must not: learn from the frames it sees: each frame's result depends on
+//! that frame alone, so frames can be spread over threads in any way.
+
+use std::sync::Arc;
+
+use super::centre::{Centre, Window};
+use super::contours::contour_centres;
+use super::lens::Undistort;
+use super::levels::{Levels, Side};
+use super::mask::Spans;
+use super::pixels::Pixels;
+use super::runs::{Blob, Labeller, Plan, Segment};
+use super::{Centroid, DetectSettings, Detection, shape};
+use crate::error::{Error, Fault, Place, Result};
+use crate::frame::Frame;
+
+/// Finds the markers of one frame at a time. One for each thread.
+#[derive(Debug)]
+pub struct Detector {
+    levels: Arc<Levels>,
+    centroid: Centroid,
+    spans: Spans,
+    plan: Plan,
+    lens: Option<Undistort>,
+    labeller: Labeller,
+    blobs: Vec<Blob>,
+    window: Window,
+    mask: Vec<u8>,
+    row: Vec<u16>,
+}
+
+/// Width of the stretches of a row that share one threshold where the background is not flat, px.
+const STRETCH_PX: u32 = 64;
+
+impl Detector {
+    /// A detector for recordings with these levels.
+    ///
+    /// # Errors
+    /// [`Error::Detect`] for a region without pixels or a lens that is none.
+    pub fn new(levels: Arc<Levels>, settings: &DetectSettings) -> Result<Self> {
+        let [width, height] = levels.image_px.map(|n| n as usize);
+        let spans = Spans::new(settings.region.as_ref(), width, height)?;
+        let plan = plan(&levels, &spans, height);
+        let lens = settings.lens.as_ref().map(Undistort::new).transpose()?;
+        Ok(Self {
+            levels,
+            centroid: settings.centroid,
+            spans,
+            plan,
+            lens,
+            labeller: Labeller::default(),
+            blobs: Vec::new(),
+            window: Window::default(),
+            mask: Vec::new(),
+            row: Vec::new(),
+        })
+    }
+
+    /// What it was made with.
+    pub fn levels(&self) -> &Levels {
+        &self.levels
+    }
+
+    /// The detections of a frame, ordered by y, then x; `out` is cleared first. A frame that was not decoded
+    /// has none.
+    ///
+    /// # Errors
+    /// [`Error::Detect`] if the frame has another size than those learned from, or too few bytes.
+    pub fn detect(&mut self, frame: &Frame, out: &mut Vec<Detection>) -> Result<()> {
+        out.clear();
+        let Some(pixels) = Pixels::of(frame)? else { return Ok(()) };
+        if [frame.width, frame.height] != self.levels.image_px {
+            let [w, h] = self.levels.image_px;
+            return Err(Error::Detect(
+                Fault::new(
+                    "frame",
+                    format!("{} x {} px, the recording began with {w} x {h} px", frame.width, frame.height),
+                )
+                .at(Place::Frame(frame.index))
+                .advice("A recording must keep one size"),
+            ));
+        }
+        match self.centroid {
+            Centroid::Weighted => self.weighted(&pixels, out),
+            Centroid::Contour => self.contour(&pixels, out)?,
+        }
+        if let Some(lens) = &mut self.lens {
+            lens.apply(out)?;
+        }
+        out.sort_unstable_by(|a, b| a.y_px.total_cmp(&b.y_px).then(a.x_px.total_cmp(&b.x_px)));
+        Ok(())
+    }
+
+    fn weighted(&mut self, pixels: &Pixels<'_>, out: &mut Vec<Detection>) {
+        // Step 1: blobs beyond the threshold.
+        self.labeller.find(pixels, &self.plan, self.levels.side, &mut self.blobs);
+        let [least, most] = self.levels.area_px;
+        for blob in &self.blobs {
+            // Step 2: area limits.
+            let area = blob.area as f64;
+            if area < least || area > most {
+                continue;
+            }
+            // Step 3: centre. Step 4: what its shape says.
+            let centre = self.window.weighted(pixels, &self.spans, blob, &self.levels);
+            out.push(detection(blob, &centre, &self.levels));
+        }
+    }
+
+    /// The paper's way: a mask of the whole image, its outer contours, their moments.
+    fn contour(&mut self, pixels: &Pixels<'_>, out: &mut Vec<Detection>) -> Result<()> {
+        self.mask.clear();
+        self.mask.resize(pixels.width * pixels.height, 0);
+        for y in 0..pixels.height {
+            for s in self.plan.first[y]..self.plan.first[y + 1] {
+                let s = self.plan.segments[s as usize];
+                self.row.resize((s.end - s.start) as usize, 0);
+                pixels.read(y, s.start as usize, &mut self.row);
+                let at = y * pixels.width + s.start as usize;
+                for (m, &v) in self.mask[at..].iter_mut().zip(&self.row) {
+                    *m = u8::from(match self.levels.side {
+                        Side::Bright => v >= s.threshold,
+                        Side::Dark => v <= s.threshold,
+                    });
+                }
+            }
+        }
+        self.labeller.find(pixels, &self.plan, self.levels.side, &mut self.blobs);
+        let [least, most] = self.levels.area_px;
+        for contour in contour_centres(&self.mask, pixels.width, pixels.height)? {
+            // The blob it goes round says the rest.
+            let inside = |b: &&Blob| {
+                let (x, y) = (contour.x_px, contour.y_px);
+                x >= f64::from(b.x0) && x <= f64::from(b.x1) && y >= f64::from(b.y0) && y <= f64::from(b.y1)
+            };
+            let Some(blob) = self.blobs.iter().filter(inside).max_by_key(|b| b.area) else { continue };
+            let area = blob.area as f64;
+            if area < least || area > most {
+                continue;
+            }
+            let centre = self.window.weighted(pixels, &self.spans, blob, &self.levels);
+            let whole = detection(blob, &centre, &self.levels);
+            // Rounding the outline to pixels dominates: 1/12 px^2 for each of its pixels, shared among them.
+            let outline = (4.0 * std::f64::consts::PI * area).sqrt().max(1.0);
+            out.push(Detection {
+                x_px: contour.x_px,
+                y_px: contour.y_px,
+                area_px: contour.area_px as f32,
+                sigma_px: f64::from(whole.sigma_px).hypot((1.0 / 12.0 / outline).sqrt()) as f32,
+                ..whole
+            });
+        }
+        Ok(())
+    }
+}
+
+fn detection(blob: &Blob, centre: &Centre, levels: &Levels) -> Detection {
+    Detection {
+        x_px: centre.x_px,
+        y_px: centre.y_px,
+        sigma_px: centre.sigma_px as f32,
+        area_px: blob.area as f32,
+        peak: centre.peak as f32,
+        elongation: blob.elongation() as f32,
+        flags: shape::judge(blob, centre, levels),
+    }
+}
+
+/// Spans with thresholds: one segment a span where the threshold is the same all over it.
+fn plan(levels: &Levels, spans: &Spans, height: usize) -> Plan {
+    let mut plan = Plan { segments: Vec::new(), first: vec![0], edge_rows: (usize::MAX, 0) };
+    for y in 0..height {
+        for &(start, end) in spans.row(y) {
+            plan.edge_rows = (plan.edge_rows.0.min(y), y);
+            let mut from = start;
+            while from < end {
+                let to = (from + STRETCH_PX).min(end);
+                let t = levels.threshold(f64::from(from + to - 1) / 2.0, y as f64);
+                let threshold = match levels.side {
+                    Side::Bright => t.ceil().clamp(1.0, 65535.0),
+                    Side::Dark => t.floor().clamp(0.0, 65534.0),
+                } as u16;
+                let edge = (from == start, to == end);
+                match plan.segments.last_mut() {
+                    Some(last) if !edge.0 && last.threshold == threshold && plan.first.len() == y + 1 => {
+                        last.end = to;
+                        last.edge.1 = edge.1;
+                    }
+                    _ => plan.segments.push(Segment { start: from, end: to, threshold, edge }),
+                }
+                from = to;
+            }
+        }
+        plan.first.push(plan.segments.len() as u32);
+    }
+    plan
+}

@@ -1,0 +1,235 @@
+//! What is learned of a recording before detection: polarity, background, threshold, noise, limits.
+//!
+//! Owns: [`Levels`], [`Side`], [`Noise`], [`Background`]. Must not: look at the frames that are detected later.
+
+use serde::{Deserialize, Serialize};
+
+use super::background;
+use super::candidates::{self, Candidate};
+use super::pixels::Pixels;
+use super::{DetectSettings, Polarity, Threshold};
+use crate::error::{Error, Fault, Place, Result};
+use crate::frame::Frame;
+
+pub use super::background::Background;
+
+/// Whether markers are brighter or darker than their surroundings, once that is known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Side {
+    /// Brighter.
+    Bright,
+    /// Darker.
+    Dark,
+}
+
+impl Side {
+    /// 1 for bright, -1 for dark: turns raw values into heights above the background.
+    pub fn sign(self) -> f64 {
+        match self {
+            Side::Bright => 1.0,
+            Side::Dark => -1.0,
+        }
+    }
+}
+
+/// Variance of a sample as a function of its value: `read + shot * max(value - dark, 0)`, raw units squared.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Noise {
+    /// Variance at and below the `dark` level: read noise and rounding.
+    pub read: f64,
+    /// Growth of the variance with the value (shot noise), raw units.
+    pub shot: f64,
+    /// Level at which only read noise is left: that of the background.
+    pub dark: f64,
+}
+
+impl Noise {
+    /// Variance of a sample whose true value is `value`.
+    pub fn variance(&self, value: f64) -> f64 {
+        self.read + self.shot * (value - self.dark).max(0.0)
+    }
+}
+
+/// What was learned of a recording. Written into the table's metadata.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Levels {
+    /// Polarity.
+    pub side: Side,
+    /// Width and height of the frames, px.
+    pub image_px: [u32; 2],
+    /// Significant bits of a sample.
+    pub depth_bits: u32,
+    /// Background, raw units.
+    pub background: Background,
+    /// Height above (or below) the background at which a marker begins, raw units; with a threshold given in
+    /// raw units, its distance from the background's median.
+    pub height: f64,
+    /// The threshold the user gave, raw units; replaces background and height.
+    pub fixed_threshold: Option<f64>,
+    /// Typical height of a marker, raw units.
+    pub contrast: f64,
+    /// Noise.
+    pub noise: Noise,
+    /// Value at which samples saturate on the markers' side, raw units; `None` if none do.
+    pub saturation: Option<f64>,
+    /// Least and greatest area of a blob that may be a marker, px.
+    pub area_px: [f64; 2],
+    /// Area of a typical marker, px; `None` where areas have no common value.
+    pub marker_area_px: Option<f64>,
+    /// Frames it was learned from.
+    pub frames: usize,
+    /// Blobs it was learned from.
+    pub blobs: usize,
+}
+
+/// Frames that are looked at; more would change nothing.
+const MOST_FRAMES: usize = 12;
+
+impl Levels {
+    /// Learns from frames spread over a recording. What the settings give is taken from them.
+    ///
+    /// # Errors
+    /// [`Error::Detect`] if no frame was decoded, frames differ in size, a threshold is out of range, or
+    /// nothing like a marker is found.
+    pub fn learn(samples: &[Frame], settings: &DetectSettings) -> Result<Self> {
+        // Step 1: unpack.
+        let mut images: Vec<Vec<u16>> = Vec::new();
+        let mut first: Option<&Frame> = None;
+        let step = samples.len().div_ceil(MOST_FRAMES).max(1);
+        for frame in samples.iter().step_by(step) {
+            let Some(pixels) = Pixels::of(frame)? else { continue };
+            let known = *first.get_or_insert(frame);
+            if (frame.width, frame.height) != (known.width, known.height) {
+                return Err(Error::Detect(
+                    Fault::new(
+                        "sample",
+                        format!(
+                            "{} x {} px, others are {} x {} px",
+                            frame.width, frame.height, known.width, known.height
+                        ),
+                    )
+                    .at(Place::Frame(frame.index))
+                    .advice("A recording must keep one size"),
+                ));
+            }
+            let mut image = vec![0; pixels.width * pixels.height];
+            for (y, row) in image.chunks_exact_mut(pixels.width).enumerate() {
+                pixels.read(y, 0, row);
+            }
+            images.push(image);
+        }
+        let Some(known) = first else {
+            return Err(Error::Detect(
+                Fault::new("recording", "none of its sample frames could be decoded")
+                    .advice("Look at it with `tracker info`"),
+            ));
+        };
+        let (width, height) = (known.width as usize, known.height as usize);
+        let top = f64::from((1u32 << known.depth_bits.clamp(1, 16)) - 1);
+        if let Threshold::Raw(t) = settings.threshold
+            && !(t > 0.0 && t <= top)
+        {
+            return Err(Error::Detect(
+                Fault::new("threshold", format!("{t} is outside the recording's range, 1 to {top}"))
+                    .advice("It is in raw units of the recording"),
+            ));
+        }
+
+        // Step 2: background and noise.
+        let background = background::learn(&images, width, height);
+        let read = background::noise_variance(&images, width);
+
+        // Step 3: polarity and height, by which blobs come and stay.
+        let sides: &[Side] = match settings.polarity {
+            Polarity::Auto => &[Side::Bright, Side::Dark],
+            Polarity::Bright => &[Side::Bright],
+            Polarity::Dark => &[Side::Dark],
+        };
+        let field = candidates::Field { images: &images, width, height, background: &background, read };
+        let fixed = match settings.threshold {
+            Threshold::Auto => None,
+            Threshold::Raw(t) => Some(t),
+        };
+        let Some(best) = candidates::best(&field, sides, fixed) else {
+            return Err(Error::Detect(
+                Fault::new("recording", "nothing like a marker stands out from the background")
+                    .advice("Give a threshold and a polarity, or check that markers are lit"),
+            ));
+        };
+
+        // Step 4: saturation, limits, typical marker.
+        let saturation = saturation(&images, best.side, top);
+        let areas = sorted(best.blobs.iter().map(|b| b.area));
+        let low = (0.15 * quantile(&areas, 0.05)).max(4.0);
+        let high = 6.0 * quantile(&areas, 0.95);
+        let area_px = [settings.min_area_px.unwrap_or(low), settings.max_area_px.unwrap_or(high)];
+        if !(area_px[0] >= 0.0 && area_px[0] <= area_px[1]) {
+            return Err(Error::Detect(
+                Fault::new("area limits", format!("least {} px, greatest {} px", area_px[0], area_px[1]))
+                    .advice("Give a least area below the greatest"),
+            ));
+        }
+        let contrasts = sorted(best.blobs.iter().map(|b| b.contrast));
+        let level = background.median();
+        Ok(Self {
+            side: best.side,
+            image_px: [known.width, known.height],
+            depth_bits: known.depth_bits,
+            background,
+            height: best.height,
+            fixed_threshold: fixed,
+            contrast: quantile(&contrasts, 0.5),
+            noise: Noise { read, shot: 0.0, dark: level },
+            saturation,
+            area_px,
+            marker_area_px: typical(&best.blobs),
+            frames: images.len(),
+            blobs: best.blobs.len(),
+        })
+    }
+
+    /// The threshold at a place, raw units: a pixel of a bright marker is at least this, of a dark one at most.
+    pub fn threshold(&self, x_px: f64, y_px: f64) -> f64 {
+        self.fixed_threshold
+            .unwrap_or_else(|| self.background.at(x_px, y_px) + self.side.sign() * self.height)
+    }
+}
+
+/// The value that samples pile up at on the markers' side.
+fn saturation(images: &[Vec<u16>], side: Side, top: f64) -> Option<f64> {
+    let extreme = match side {
+        Side::Bright => images.iter().flatten().max().copied()?,
+        Side::Dark => images.iter().flatten().min().copied()?,
+    };
+    let at = images.iter().flatten().filter(|&&v| v == extreme).count();
+    let piled = at >= 20 * images.len();
+    let end = match side {
+        Side::Bright => f64::from(extreme) >= 0.9 * top,
+        Side::Dark => f64::from(extreme) <= 0.02 * top,
+    };
+    (piled && end).then_some(f64::from(extreme))
+}
+
+/// The area most blobs have, if most have it within a third.
+fn typical(blobs: &[Candidate]) -> Option<f64> {
+    let areas = sorted(blobs.iter().map(|b| b.area));
+    let middle = quantile(&areas, 0.5);
+    let near = areas.iter().filter(|&&a| (a / middle - 1.0).abs() < 0.33).count();
+    (near * 4 >= areas.len() * 3).then_some(middle)
+}
+
+/// Values in order.
+pub(crate) fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {
+    let mut all: Vec<f64> = values.collect();
+    all.sort_unstable_by(f64::total_cmp);
+    all
+}
+
+/// The value below which a part of the sorted values lies; 0 of none.
+pub(crate) fn quantile(sorted: &[f64], part: f64) -> f64 {
+    if sorted.is_empty() {
+        return 0.0;
+    }
+    sorted[((sorted.len() - 1) as f64 * part).round() as usize]
+}

@@ -1,0 +1,159 @@
+//! Reading a frame's samples whatever their format.
+//!
+//! Owns: [`Pixels`]. Must not: judge a sample.
+
+use crate::error::{Error, Fault, Place, Result};
+use crate::frame::{Frame, PixelFormat};
+
+/// A frame's plane, checked once so that every row inside it can be read.
+#[derive(Clone, Copy)]
+pub(crate) struct Pixels<'a> {
+    /// The bytes of the plane.
+    pub bytes: &'a [u8],
+    /// Width, px.
+    pub width: usize,
+    /// Height, px.
+    pub height: usize,
+    /// How samples are stored.
+    pub format: PixelFormat,
+    /// Bits from the start of one row to the start of the next.
+    row_bits: usize,
+}
+
+impl<'a> Pixels<'a> {
+    /// The pixels of a frame, `None` if it was not decoded.
+    ///
+    /// # Errors
+    /// [`Error::Detect`] where the plane holds fewer bytes than its size says.
+    pub fn of(frame: &'a Frame) -> Result<Option<Self>> {
+        let Some(plane) = &frame.plane else { return Ok(None) };
+        let bytes = plane.bytes();
+        let (width, height) = (frame.width as usize, frame.height as usize);
+        let bits = frame.format.bits_per_pixel() as usize;
+        let row_bits = if frame.stride == 0 { width * bits } else { frame.stride * 8 };
+        let needed = (row_bits * height.saturating_sub(1) + width * bits).div_ceil(8);
+        if width == 0 || height == 0 || row_bits < width * bits || bytes.len() < needed {
+            return Err(Error::Detect(
+                Fault::new(
+                    "frame",
+                    format!(
+                        "{width} x {height} px of {bits} bits need {needed} bytes, the plane has {}",
+                        bytes.len()
+                    ),
+                )
+                .at(Place::Frame(frame.index))
+                .advice("The recording or its header is damaged"),
+            ));
+        }
+        Ok(Some(Self { bytes, width, height, format: frame.format, row_bits }))
+    }
+
+    /// Samples that lie row after row without gaps; `bytes` must hold them all.
+    pub fn of_samples(bytes: &'a [u8], width: usize, height: usize, format: PixelFormat) -> Self {
+        let row_bits = width * format.bits_per_pixel() as usize;
+        debug_assert!(bytes.len() * 8 >= row_bits * height);
+        Self { bytes, width, height, format, row_bits }
+    }
+
+    /// First byte and bits of it to leave out where pixel `x` of row `y` starts.
+    #[inline]
+    pub fn start(&self, y: usize, x: usize) -> (usize, usize) {
+        let bit = y * self.row_bits + x * self.format.bits_per_pixel() as usize;
+        (bit / 8, bit % 8)
+    }
+
+    /// Samples from `x` of row `y` into `out`, as many as `out` holds.
+    ///
+    /// Both ends must lie inside the row.
+    #[inline]
+    pub fn read(&self, y: usize, x: usize, out: &mut [u16]) {
+        debug_assert!(y < self.height && x + out.len() <= self.width);
+        let (byte, skip) = self.start(y, x);
+        match self.format {
+            PixelFormat::Gray8 => {
+                for (o, &b) in out.iter_mut().zip(&self.bytes[byte..]) {
+                    *o = u16::from(b);
+                }
+            }
+            PixelFormat::Gray16 => {
+                for (o, b) in out.iter_mut().zip(self.bytes[byte..].chunks_exact(2)) {
+                    *o = u16::from_le_bytes([b[0], b[1]]);
+                }
+            }
+            PixelFormat::Packed10 => self.unpack::<10>(byte, skip, out),
+            PixelFormat::Packed12 => self.unpack::<12>(byte, skip, out),
+        }
+    }
+
+    /// Most significant bits first; a sample of 10 or 12 bits spans at most three bytes.
+    fn unpack<const BITS: usize>(&self, byte: usize, skip: usize, out: &mut [u16]) {
+        let mut bit = byte * 8 + skip;
+        for o in out {
+            let at = bit / 8;
+            let b = |i: usize| u32::from(self.bytes.get(at + i).copied().unwrap_or(0));
+            let word = b(0) << 16 | b(1) << 8 | b(2);
+            *o = (word >> (24 - BITS - bit % 8)) as u16 & ((1 << BITS) - 1);
+            bit += BITS;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn packed(values: &[u16], bits: usize) -> Vec<u8> {
+        let mut bytes = vec![0u8; (values.len() * bits).div_ceil(8)];
+        for (i, &v) in values.iter().enumerate() {
+            for b in 0..bits {
+                if v >> (bits - 1 - b) & 1 == 1 {
+                    let at = i * bits + b;
+                    bytes[at / 8] |= 0x80 >> (at % 8);
+                }
+            }
+        }
+        bytes
+    }
+
+    #[test]
+    fn packed_rows_that_end_inside_a_byte_are_read_back() {
+        for (bits, format) in [(10, PixelFormat::Packed10), (12, PixelFormat::Packed12)] {
+            let (w, h) = (7usize, 5usize);
+            let values: Vec<u16> = (0..w * h).map(|i| (i * 397 % (1 << bits)) as u16).collect();
+            let frame = Frame {
+                index: 0,
+                ticks: 0,
+                width: w as u32,
+                height: h as u32,
+                stride: 0,
+                format,
+                depth_bits: bits as u32,
+                plane: Some(Box::new(packed(&values, bits))),
+            };
+            let pixels = Pixels::of(&frame).unwrap().unwrap();
+            for y in 0..h {
+                for x in 0..w {
+                    let mut out = vec![0; w - x];
+                    pixels.read(y, x, &mut out);
+                    assert_eq!(out, values[y * w + x..(y + 1) * w]);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_short_plane_is_an_error_that_names_the_frame() {
+        let frame = Frame {
+            index: 3,
+            ticks: 0,
+            width: 4,
+            height: 4,
+            stride: 4,
+            format: PixelFormat::Gray8,
+            depth_bits: 8,
+            plane: Some(Box::new(vec![0u8; 15])),
+        };
+        let text = Pixels::of(&frame).err().unwrap().to_string();
+        assert!(text.contains("frame 3") && text.contains("16 bytes") && text.contains("15"), "{text}");
+    }
+}

@@ -1,0 +1,232 @@
+//! Connected components in one pass: runs of pixels beyond the threshold, joined to the row above.
+//!
+//! Owns: [`Blob`], [`Labeller`]. Must not: know where the threshold comes from, or find a centre.
+//!
+//! Pixels are neighbours along sides and corners (8-connected).
+
+use super::levels::Side;
+use super::pixels::Pixels;
+
+/// What one pass adds up about a connected set of pixels beyond the threshold.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Blob {
+    /// Pixels.
+    pub area: u64,
+    /// First and last column.
+    pub x0: u32,
+    pub x1: u32,
+    /// First and last row.
+    pub y0: u32,
+    pub y1: u32,
+    /// Sums of x, y, x^2, x y, y^2 over its pixels, from the image's corner.
+    pub sums: [u64; 5],
+    /// Touches the border of the image or the region.
+    pub border: bool,
+}
+
+impl Blob {
+    fn absorb(&mut self, other: &Blob) {
+        self.area += other.area;
+        self.x0 = self.x0.min(other.x0);
+        self.x1 = self.x1.max(other.x1);
+        self.y0 = self.y0.min(other.y0);
+        self.y1 = self.y1.max(other.y1);
+        for (a, b) in self.sums.iter_mut().zip(other.sums) {
+            *a += b;
+        }
+        self.border |= other.border;
+    }
+
+    fn of_run(y: u32, x0: u32, end: u32, border: bool) -> Self {
+        let n = u64::from(end - x0);
+        let (a, b) = (u64::from(x0), u64::from(end) - 1);
+        let sx = (a + b) * n / 2;
+        // Sum of squares up to b less that up to a - 1.
+        let squares = |m: u64| m * (m + 1) * (2 * m + 1) / 6;
+        let sxx = squares(b) - if a == 0 { 0 } else { squares(a - 1) };
+        let yy = u64::from(y);
+        Self { area: n, x0, x1: end - 1, y0: y, y1: y, sums: [sx, n * yy, sxx, sx * yy, n * yy * yy], border }
+    }
+
+    /// Mean x and y of its pixels.
+    pub fn mean(&self) -> [f64; 2] {
+        let n = self.area as f64;
+        [self.sums[0] as f64 / n, self.sums[1] as f64 / n]
+    }
+
+    /// Variances of its pixels along the longer and the shorter principal axis, px^2, and the direction of the
+    /// longer one; each pixel counts as a square, not a point.
+    pub fn axes(&self) -> ([f64; 2], [f64; 2]) {
+        let n = self.area as f64;
+        let [mx, my] = self.mean();
+        let s = self.sums.map(|v| v as f64 / n);
+        let (xx, xy, yy) = (s[2] - mx * mx + 1.0 / 12.0, s[3] - mx * my, s[4] - my * my + 1.0 / 12.0);
+        let (half, diff) = ((xx + yy) / 2.0, (xx - yy) / 2.0);
+        let root = diff.hypot(xy);
+        let angle = 0.5 * xy.atan2(diff);
+        ([half + root, (half - root).max(1.0 / 12.0)], [angle.cos(), angle.sin()])
+    }
+
+    /// Longer over shorter principal axis.
+    pub fn elongation(&self) -> f64 {
+        let ([a, b], _) = self.axes();
+        (a / b).sqrt()
+    }
+
+    /// Its area over that of the ellipse with its second moments: 1 for a full disc or ellipse, 0.95 for a
+    /// rectangle, far below 1 for something branched or hollow.
+    pub fn fill(&self) -> f64 {
+        let ([a, b], _) = self.axes();
+        self.area as f64 / (4.0 * std::f64::consts::PI * (a * b).sqrt())
+    }
+}
+
+/// Columns `start..end` of a row with the threshold to apply there, raw units.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Segment {
+    pub start: u32,
+    pub end: u32,
+    /// A bright marker's pixel is at least this, a dark marker's at most this.
+    pub threshold: u16,
+    /// The region or the image ends at `start` / at `end`.
+    pub edge: (bool, bool),
+}
+
+/// What to look at and with which threshold, row by row.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct Plan {
+    pub segments: Vec<Segment>,
+    /// Index of the first segment of each row, and one more at the end.
+    pub first: Vec<u32>,
+    /// Whether the region begins at a row or ends after it.
+    pub edge_rows: (usize, usize),
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Run {
+    x0: u32,
+    end: u32,
+    label: u32,
+}
+
+/// Finds blobs; owns its scratch, so a frame allocates nothing once it has grown.
+#[derive(Debug, Default)]
+pub(crate) struct Labeller {
+    above: Vec<Run>,
+    here: Vec<Run>,
+    parents: Vec<u32>,
+    blobs: Vec<Blob>,
+    row: Vec<u16>,
+}
+
+/// Pixels tested at once before any is looked at on its own.
+const CHUNK: usize = 64;
+
+impl Labeller {
+    /// Appends the blobs of a frame to `out` (cleared first), in order of their first pixel.
+    pub fn find(&mut self, pixels: &Pixels<'_>, plan: &Plan, side: Side, out: &mut Vec<Blob>) {
+        out.clear();
+        self.parents.clear();
+        self.blobs.clear();
+        self.above.clear();
+        for y in 0..pixels.height {
+            self.here.clear();
+            for s in plan.first[y]..plan.first[y + 1] {
+                self.scan(pixels, y, plan.segments[s as usize], plan.edge_rows, side);
+            }
+            self.join();
+            std::mem::swap(&mut self.above, &mut self.here);
+        }
+        for i in 0..self.blobs.len() {
+            if self.parents[i] as usize == i {
+                out.push(self.blobs[i]);
+            }
+        }
+    }
+
+    fn scan(&mut self, pixels: &Pixels<'_>, y: usize, s: Segment, edge_rows: (usize, usize), side: Side) {
+        let mut row = std::mem::take(&mut self.row);
+        row.resize((s.end - s.start) as usize, 0);
+        pixels.read(y, s.start as usize, &mut row);
+        let edge_row = y == edge_rows.0 || y == edge_rows.1;
+        let mut open: Option<u32> = None;
+        let mut x = s.start;
+        for chunk in row.chunks(CHUNK) {
+            let extreme = match side {
+                Side::Bright => chunk.iter().fold(0, |m: u16, &v| m.max(v)) >= s.threshold,
+                Side::Dark => chunk.iter().fold(u16::MAX, |m: u16, &v| m.min(v)) <= s.threshold,
+            };
+            if extreme {
+                for &v in chunk {
+                    let beyond = match side {
+                        Side::Bright => v >= s.threshold,
+                        Side::Dark => v <= s.threshold,
+                    };
+                    match (beyond, open) {
+                        (true, None) => open = Some(x),
+                        (false, Some(x0)) => {
+                            self.run(y as u32, x0, x, edge_row || (s.edge.0 && x0 == s.start));
+                            open = None;
+                        }
+                        _ => {}
+                    }
+                    x += 1;
+                }
+            } else {
+                if let Some(x0) = open.take() {
+                    self.run(y as u32, x0, x, edge_row || (s.edge.0 && x0 == s.start));
+                }
+                x += chunk.len() as u32;
+            }
+        }
+        if let Some(x0) = open {
+            self.run(y as u32, x0, x, edge_row || (s.edge.0 && x0 == s.start) || s.edge.1);
+        }
+        self.row = row;
+    }
+
+    fn run(&mut self, y: u32, x0: u32, end: u32, border: bool) {
+        let blob = Blob::of_run(y, x0, end, border);
+        if let Some(last) = self.here.last_mut()
+            && last.end == x0
+        {
+            // The same run went on across two segments.
+            last.end = end;
+            let label = last.label as usize;
+            self.blobs[label].absorb(&blob);
+            return;
+        }
+        let label = self.blobs.len() as u32;
+        self.blobs.push(blob);
+        self.parents.push(label);
+        self.here.push(Run { x0, end, label });
+    }
+
+    fn root(parents: &mut [u32], mut i: u32) -> u32 {
+        while parents[i as usize] != i {
+            parents[i as usize] = parents[parents[i as usize] as usize];
+            i = parents[i as usize];
+        }
+        i
+    }
+
+    /// Joins the runs of this row to those of the row above that they touch.
+    fn join(&mut self) {
+        let mut first = 0;
+        for run in &mut self.here {
+            while first < self.above.len() && self.above[first].end < run.x0 {
+                first += 1;
+            }
+            for up in self.above[first..].iter().take_while(|up| up.x0 <= run.end) {
+                let a = Self::root(&mut self.parents, up.label);
+                let b = Self::root(&mut self.parents, run.label);
+                if a != b {
+                    let (keep, gone) = (a.min(b), a.max(b));
+                    self.parents[gone as usize] = keep;
+                    let lost = self.blobs[gone as usize];
+                    self.blobs[keep as usize].absorb(&lost);
+                }
+            }
+        }
+    }
+}
