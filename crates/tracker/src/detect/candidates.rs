@@ -3,7 +3,7 @@
 //! Owns: the choice. Must not: find centres.
 
 use super::background::Background;
-use super::levels::{Side, quantile, sorted};
+use super::levels::Side;
 use super::pixels::Pixels;
 use super::runs::{Blob, Labeller, Plan, Segment};
 use crate::frame::PixelFormat;
@@ -18,6 +18,13 @@ pub(crate) struct Field<'a> {
     pub read: f64,
 }
 
+impl Field<'_> {
+    /// Every how manieth image is tried.
+    fn step(&self) -> usize {
+        self.images.len().div_ceil(FRAMES).max(1)
+    }
+}
+
 /// A blob that looks like a marker.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Candidate {
@@ -25,6 +32,9 @@ pub(crate) struct Candidate {
     pub area: f64,
     /// Height of its upper quarter above the background, raw units.
     pub contrast: f64,
+    /// The blob, and the sample image it is in.
+    pub blob: Blob,
+    pub image: usize,
     /// How much it counts for its threshold.
     pub weight: f64,
 }
@@ -58,13 +68,12 @@ fn heights(field: &Field<'_>, image: &[u16], side: Side) -> Vec<u8> {
 
 /// The side and height whose blobs look most like markers; `fixed` is a threshold in raw units.
 pub(crate) fn best(field: &Field<'_>, sides: &[Side], fixed: Option<f64>) -> Option<Choice> {
-    let step = field.images.len().div_ceil(FRAMES).max(1);
     let sigma = field.read.sqrt();
     let fields: Vec<(Side, Vec<Vec<u8>>, f64)> = sides
         .iter()
         .map(|&side| {
             let maps: Vec<Vec<u8>> =
-                field.images.iter().step_by(step).map(|i| heights(field, i, side)).collect();
+                field.images.iter().step_by(field.step()).map(|i| heights(field, i, side)).collect();
             let top = top_height(&maps);
             (side, maps, top)
         })
@@ -90,7 +99,7 @@ pub(crate) fn best(field: &Field<'_>, sides: &[Side], fixed: Option<f64>) -> Opt
             .iter()
             .map(|&h| {
                 let blobs = markers(field, maps, h, sigma);
-                let score = blobs.iter().map(|b| b.weight * (b.contrast / highest).sqrt()).sum();
+                let score = blobs.iter().map(|b| b.weight * b.contrast / highest).sum();
                 (h, score, blobs)
             })
             .collect();
@@ -100,10 +109,10 @@ pub(crate) fn best(field: &Field<'_>, sides: &[Side], fixed: Option<f64>) -> Opt
             continue;
         }
         // The stretch of thresholds that are nearly as good; inside it, half of the height of a weak marker.
-        let good = |i: &usize| trials[*i].1 >= 0.85 * score;
+        let good = |i: &usize| trials[*i].1 >= 0.97 * score;
         let first = (0..=best).rev().take_while(good).last().unwrap_or(best);
         let last = (best..trials.len()).take_while(good).last().unwrap_or(best);
-        let weak = quantile(&sorted(trials[best].2.iter().map(|b| b.contrast)), 0.1);
+        let weak = weighted_quantile(&trials[best].2, |b| b.contrast, 0.1);
         let height = (0.5 * weak).max((4.0 * sigma).min(0.7 * weak)).clamp(trials[first].0, trials[last].0);
         let blobs =
             if fixed.is_some() { trials.swap_remove(best).2 } else { markers(field, maps, height, sigma) };
@@ -112,6 +121,22 @@ pub(crate) fn best(field: &Field<'_>, sides: &[Side], fixed: Option<f64>) -> Opt
         }
     }
     found.map(|f| f.1)
+}
+
+/// The value below which a part of the blobs lies, each counted by its contrast and weight: a few faint blobs
+/// that are no markers pull nothing, a link half as bright as the other does.
+pub(crate) fn weighted_quantile(blobs: &[Candidate], value: impl Fn(&Candidate) -> f64, part: f64) -> f64 {
+    let mut all: Vec<(f64, f64)> = blobs.iter().map(|b| (value(b), b.contrast * b.weight)).collect();
+    all.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+    let total: f64 = all.iter().map(|b| b.1).sum();
+    let mut below = 0.0;
+    for &(v, weight) in &all {
+        below += weight;
+        if below >= part * total {
+            return v;
+        }
+    }
+    all.last().map_or(0.0, |b| b.0)
 }
 
 /// The height that a few pixels of each frame exceed: above single hot pixels.
@@ -139,11 +164,12 @@ fn markers(field: &Field<'_>, maps: &[Vec<u8>], height: f64, sigma: f64) -> Vec<
         first: (0..=field.height as u32).collect(),
         edge_rows: (0, field.height - 1),
     };
-    let most = field.width * field.height / 20;
+    let most = field.width * field.height / 5;
     let mut labeller = Labeller::default();
     let mut blobs: Vec<Blob> = Vec::new();
     let mut all = Vec::new();
-    for map in maps {
+    for (k, map) in maps.iter().enumerate() {
+        let image = k * field.step();
         let pixels = Pixels::of_samples(map, field.width, field.height, PixelFormat::Gray16);
         labeller.find(&pixels, &plan, Side::Bright, &mut blobs);
         for blob in &blobs {
@@ -151,7 +177,7 @@ fn markers(field: &Field<'_>, maps: &[Vec<u8>], height: f64, sigma: f64) -> Vec<
             if !(5..=most).contains(&area) || blob.elongation() > 6.0 || blob.fill() < 0.7 {
                 continue;
             }
-            if let Some(c) = judge(&pixels, blob, threshold, sigma) {
+            if let Some(c) = judge(&pixels, blob, threshold, sigma, image) {
                 all.push(c);
             }
         }
@@ -159,7 +185,7 @@ fn markers(field: &Field<'_>, maps: &[Vec<u8>], height: f64, sigma: f64) -> Vec<
     all
 }
 
-fn judge(pixels: &Pixels<'_>, blob: &Blob, threshold: u16, sigma: f64) -> Option<Candidate> {
+fn judge(pixels: &Pixels<'_>, blob: &Blob, threshold: u16, sigma: f64, image: usize) -> Option<Candidate> {
     let mut values: Vec<u16> = Vec::new();
     let mut row = vec![0; (blob.x1 - blob.x0 + 1) as usize];
     for y in blob.y0..=blob.y1 {
@@ -178,5 +204,6 @@ fn judge(pixels: &Pixels<'_>, blob: &Blob, threshold: u16, sigma: f64) -> Option
     let middle = (upper + f64::from(threshold)) / 2.0;
     let above = values.iter().filter(|&&v| f64::from(v) >= middle).count() as f64 / values.len() as f64;
     let border = if blob.border { 0.3 } else { 1.0 };
-    Some(Candidate { area: blob.area as f64, contrast: upper, weight: above * border })
+    let area = blob.area as f64;
+    Some(Candidate { area, contrast: upper, blob: *blob, image, weight: above * border * area.sqrt() })
 }

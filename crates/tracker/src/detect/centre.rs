@@ -2,6 +2,8 @@
 //!
 //! Owns: [`Centre`], [`Window`]. Must not: decide what is a marker.
 
+use super::edge::EdgeTable;
+use super::fit::{DiscFit, Fitted, Patch};
 use super::levels::{Levels, Side};
 use super::mask::Spans;
 use super::pixels::Pixels;
@@ -17,6 +19,8 @@ pub(crate) struct Centre {
     pub peak: f64,
     /// Pixels at the end of the recording's range.
     pub saturated: u32,
+    /// The disc, if one was fitted.
+    pub fitted: Option<Fitted>,
 }
 
 /// Heights around a blob, in the detector's scratch.
@@ -35,11 +39,11 @@ pub(crate) struct Window {
 const MARGIN: usize = 4;
 
 impl Window {
-    fn load(&mut self, pixels: &Pixels<'_>, blob: &Blob) {
-        self.x0 = (blob.x0 as usize).saturating_sub(MARGIN);
-        self.y0 = (blob.y0 as usize).saturating_sub(MARGIN);
-        self.width = (blob.x1 as usize + MARGIN + 1).min(pixels.width) - self.x0;
-        self.height = (blob.y1 as usize + MARGIN + 1).min(pixels.height) - self.y0;
+    fn load(&mut self, pixels: &Pixels<'_>, blob: &Blob, margin: usize) {
+        self.x0 = (blob.x0 as usize).saturating_sub(margin);
+        self.y0 = (blob.y0 as usize).saturating_sub(margin);
+        self.width = (blob.x1 as usize + margin + 1).min(pixels.width) - self.x0;
+        self.height = (blob.y1 as usize + margin + 1).min(pixels.height) - self.y0;
         self.row.resize(self.width, 0);
         self.heights.clear();
         for y in self.y0..self.y0 + self.height {
@@ -48,10 +52,87 @@ impl Window {
         }
     }
 
+    /// Middle of the values at eight places around (cx, cy) at a distance; `None` where all lie outside.
+    fn around(&self, cx: f64, cy: f64, distance: f64) -> Option<f64> {
+        let mut values = [0.0f32; 8];
+        let mut n = 0;
+        for (dx, dy) in [
+            (1.0, 0.0),
+            (0.7, 0.7),
+            (0.0, 1.0),
+            (-0.7, 0.7),
+            (-1.0, 0.0),
+            (-0.7, -0.7),
+            (0.0, -1.0),
+            (0.7, -0.7),
+        ] {
+            let i = (cx + distance * dx).round() - self.x0 as f64;
+            let j = (cy + distance * dy).round() - self.y0 as f64;
+            if i >= 0.0 && j >= 0.0 && (i as usize) < self.width && (j as usize) < self.height {
+                values[n] = self.heights[j as usize * self.width + i as usize];
+                n += 1;
+            }
+        }
+        values[..n].sort_unstable_by(f32::total_cmp);
+        (n > 0).then(|| f64::from(values[(n - 1) / 2] + values[n / 2]) / 2.0)
+    }
+
+    /// A disc fitted to a blob's edge; `None` where none fits.
+    pub fn fit(&mut self, pixels: &Pixels<'_>, blob: &Blob, fit: &DiscFit<'_>) -> Option<Fitted> {
+        let margin = (fit.table.reach_px + 2.0).ceil() as usize;
+        self.load(pixels, blob, margin);
+        let [cx, cy] = blob.mean();
+        let radius = (blob.area as f64 / std::f64::consts::PI).sqrt();
+        let base = self.around(cx, cy, radius + fit.table.reach_px + 0.7)?;
+        let top = self.around(cx, cy, (radius - fit.table.reach_px - 0.7).max(0.0))?;
+        let patch =
+            Patch { values: &self.heights, width: self.width, x0: self.x0 as f64, y0: self.y0 as f64 };
+        fit.fit(&patch, [cx, cy, radius, base, top - base])
+    }
+
+    /// Variances of the pixels just outside and just inside of a fitted disc's edge, appended to `flat`.
+    pub fn flat_variances(
+        &mut self,
+        pixels: &Pixels<'_>,
+        blob: &Blob,
+        fitted: &Fitted,
+        table: &EdgeTable,
+        saturation: Option<f64>,
+        side: Side,
+        flat: &mut [Vec<f64>; 2],
+    ) {
+        self.load(pixels, blob, (table.reach_px + 3.0).ceil() as usize);
+        let mut sums = [[0.0; 3]; 2];
+        for (j, row) in self.heights.chunks_exact(self.width).enumerate() {
+            for (i, &v) in row.iter().enumerate() {
+                let dx = (self.x0 + i) as f64 - fitted.x_px;
+                let dy = (self.y0 + j) as f64 - fitted.y_px;
+                let inside = fitted.radius_px - dx.hypot(dy);
+                let v = f64::from(v);
+                let lost = saturation.is_some_and(|l| match side {
+                    Side::Bright => v >= l,
+                    Side::Dark => v <= l,
+                });
+                if inside.abs() > table.reach_px && inside.abs() < table.reach_px + 2.0 && !lost {
+                    let s = &mut sums[usize::from(inside > 0.0)];
+                    let h = v - fitted.base - if inside > 0.0 { fitted.height } else { 0.0 };
+                    s[0] += 1.0;
+                    s[1] += h;
+                    s[2] += h * h;
+                }
+            }
+        }
+        for (s, f) in sums.iter().zip(flat) {
+            if s[0] >= 12.0 {
+                f.push((s[2] - s[1] * s[1] / s[0]) / (s[0] - 1.0));
+            }
+        }
+    }
+
     /// The centre by intensity against the local background, over a disc that reaches two pixels beyond the
     /// blob; in three rounds, each about the centre of the one before.
     pub fn weighted(&mut self, pixels: &Pixels<'_>, spans: &Spans, blob: &Blob, levels: &Levels) -> Centre {
-        self.load(pixels, blob);
+        self.load(pixels, blob, MARGIN);
         let sign = levels.side.sign();
         let [mut cx, mut cy] = blob.mean();
         let reach = blob.axes().0.map(|v| 2.0 * v.sqrt());

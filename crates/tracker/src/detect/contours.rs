@@ -4,6 +4,7 @@
 
 use opencv::core::{CV_8UC1, Mat, Point, Vector};
 use opencv::imgproc::{self, CHAIN_APPROX_NONE, RETR_EXTERNAL};
+use opencv::prelude::*;
 
 use crate::error::{Error, Fault, Result};
 

@@ -7,6 +7,8 @@ use std::sync::Arc;
 
 use super::centre::{Centre, Window};
 use super::contours::contour_centres;
+use super::edge::EdgeTable;
+use super::fit::DiscFit;
 use super::lens::Undistort;
 use super::levels::{Levels, Side};
 use super::mask::Spans;
@@ -27,6 +29,7 @@ pub struct Detector {
     labeller: Labeller,
     blobs: Vec<Blob>,
     window: Window,
+    table: Option<EdgeTable>,
     mask: Vec<u8>,
     row: Vec<u16>,
 }
@@ -44,6 +47,7 @@ impl Detector {
         let spans = Spans::new(settings.region.as_ref(), width, height)?;
         let plan = plan(&levels, &spans, height);
         let lens = settings.lens.as_ref().map(Undistort::new).transpose()?;
+        let table = levels.marker.map(|m| EdgeTable::new(m.radius_px, m.blur_px));
         Ok(Self {
             levels,
             centroid: settings.centroid,
@@ -53,6 +57,7 @@ impl Detector {
             labeller: Labeller::default(),
             blobs: Vec::new(),
             window: Window::default(),
+            table,
             mask: Vec::new(),
             row: Vec::new(),
         })
@@ -97,16 +102,38 @@ impl Detector {
         // Step 1: blobs beyond the threshold.
         self.labeller.find(pixels, &self.plan, self.levels.side, &mut self.blobs);
         let [least, most] = self.levels.area_px;
-        for blob in &self.blobs {
+        for i in 0..self.blobs.len() {
+            let blob = &self.blobs[i].clone();
             // Step 2: area limits.
             let area = blob.area as f64;
             if area < least || area > most {
                 continue;
             }
             // Step 3: centre. Step 4: what its shape says.
-            let centre = self.window.weighted(pixels, &self.spans, blob, &self.levels);
+            let centre = self.centre(pixels, blob);
             out.push(detection(blob, &centre, &self.levels));
         }
+    }
+
+    fn centre(&mut self, pixels: &Pixels<'_>, blob: &Blob) -> Centre {
+        if let Some(table) = &self.table {
+            let l = &self.levels;
+            let fit = DiscFit { table, noise: l.noise, side: l.side, saturation: l.saturation };
+            if let Some(f) = self.window.fit(pixels, blob, &fit)
+                && f.rms < 0.15 * f.height.abs() + 2.0 * l.noise.variance(f.base).sqrt()
+            {
+                return Centre {
+                    x_px: f.x_px,
+                    y_px: f.y_px,
+                    // Where the disc fits worse than noise alone, its centre is less sure by as much.
+                    sigma_px: f.sigma_px * f.chi2.max(1.0).sqrt(),
+                    peak: f.height.abs(),
+                    saturated: f.saturated,
+                    fitted: Some(f),
+                };
+            }
+        }
+        self.window.weighted(pixels, &self.spans, blob, &self.levels)
     }
 
     /// The paper's way: a mask of the whole image, its outer contours, their moments.

@@ -6,12 +6,14 @@ use serde::{Deserialize, Serialize};
 
 use super::background;
 use super::candidates::{self, Candidate};
+use super::marker::{self, Sample};
 use super::pixels::Pixels;
 use super::{DetectSettings, Polarity, Threshold};
 use crate::error::{Error, Fault, Place, Result};
-use crate::frame::Frame;
+use crate::frame::{Frame, PixelFormat};
 
 pub use super::background::Background;
+pub use super::marker::Marker;
 
 /// Whether markers are brighter or darker than their surroundings, once that is known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -77,6 +79,8 @@ pub struct Levels {
     pub area_px: [f64; 2],
     /// Area of a typical marker, px; `None` where areas have no common value.
     pub marker_area_px: Option<f64>,
+    /// What a marker looks like; `None` where markers are no discs.
+    pub marker: Option<Marker>,
     /// Frames it was learned from.
     pub frames: usize,
     /// Blobs it was learned from.
@@ -160,9 +164,9 @@ impl Levels {
 
         // Step 4: saturation, limits, typical marker.
         let saturation = saturation(&images, best.side, top);
-        let areas = sorted(best.blobs.iter().map(|b| b.area));
-        let low = (0.15 * quantile(&areas, 0.05)).max(4.0);
-        let high = 6.0 * quantile(&areas, 0.95);
+        let area = |part: f64| candidates::weighted_quantile(&best.blobs, |b| b.area, part);
+        let low = (0.15 * area(0.05)).max(0.01 * area(0.5)).max(4.0);
+        let high = 6.0 * area(0.95);
         let area_px = [settings.min_area_px.unwrap_or(low), settings.max_area_px.unwrap_or(high)];
         if !(area_px[0] >= 0.0 && area_px[0] <= area_px[1]) {
             return Err(Error::Detect(
@@ -170,8 +174,22 @@ impl Levels {
                     .advice("Give a least area below the greatest"),
             ));
         }
-        let contrasts = sorted(best.blobs.iter().map(|b| b.contrast));
-        let level = background.median();
+        let noise = Noise { read, shot: 0.0, dark: background.median() };
+        let bytes: Vec<Vec<u8>> =
+            images.iter().map(|i| i.iter().flat_map(|v| v.to_le_bytes()).collect()).collect();
+        let samples: Vec<Sample<'_>> = best
+            .blobs
+            .iter()
+            .filter(|b| b.area >= area_px[0] && b.area <= area_px[1])
+            .map(|b| Sample {
+                pixels: Pixels::of_samples(&bytes[b.image], width, height, PixelFormat::Gray16),
+                blob: b.blob,
+            })
+            .collect();
+        let (marker, noise) = match marker::learn(&samples, best.side, noise, saturation) {
+            Some((marker, noise)) => (Some(marker), noise),
+            None => (None, noise),
+        };
         Ok(Self {
             side: best.side,
             image_px: [known.width, known.height],
@@ -179,11 +197,12 @@ impl Levels {
             background,
             height: best.height,
             fixed_threshold: fixed,
-            contrast: quantile(&contrasts, 0.5),
-            noise: Noise { read, shot: 0.0, dark: level },
+            contrast: candidates::weighted_quantile(&best.blobs, |b| b.contrast, 0.5),
+            noise,
             saturation,
             area_px,
             marker_area_px: typical(&best.blobs),
+            marker,
             frames: images.len(),
             blobs: best.blobs.len(),
         })

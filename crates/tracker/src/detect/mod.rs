@@ -8,8 +8,11 @@ mod candidates;
 mod centre;
 mod contours;
 mod detector;
+mod edge;
+mod fit;
 mod lens;
 mod levels;
+mod marker;
 mod mask;
 mod pixels;
 mod runs;
@@ -18,7 +21,7 @@ mod shape;
 mod tests;
 
 pub use detector::Detector;
-pub use levels::{Background, Levels, Noise, Side};
+pub use levels::{Background, Levels, Marker, Noise, Side};
 
 use crate::rig::{Lens, Region};
 

@@ -1,0 +1,125 @@
+//! How much of a pixel a disc with a blurred edge covers, as a table.
+//!
+//! Owns: [`EdgeTable`]. Must not: fit anything.
+
+/// Steps of distance per pixel.
+const PER_PX: usize = 32;
+/// Directions of the edge from along an axis to along a diagonal.
+const DIRECTIONS: usize = 16;
+/// Chords per pixel in the integral.
+const CHORDS: usize = 32;
+
+/// Coverage of a pixel and its slope, by the distance of the pixel's centre inside the disc's edge and by the
+/// edge's direction. Made for one radius and one blur; the curvature of other radii changes it by less than
+/// 1/24 px times the difference of the curvatures.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct EdgeTable {
+    /// Coverage and its derivative by distance in 1/px, direction by direction.
+    rows: Vec<[f32; 2]>,
+    columns: usize,
+    /// Distance from the edge beyond which coverage is 0 or 1, px.
+    pub reach_px: f64,
+}
+
+/// Area of the unit square about (x, y) inside a disc of radius r about the origin.
+fn disc_in_pixel(x: f64, y: f64, r: f64) -> f64 {
+    let mut sum = 0.0;
+    for k in 0..CHORDS {
+        let yy = y - 0.5 + (k as f64 + 0.5) / CHORDS as f64;
+        let half = (r * r - yy * yy).max(0.0).sqrt();
+        sum += ((x + 0.5).min(half) - (x - 0.5).max(-half)).max(0.0);
+    }
+    sum / CHORDS as f64
+}
+
+impl EdgeTable {
+    /// The table for discs of a radius whose edge is blurred by a Gaussian of standard deviation `blur_px`.
+    pub fn new(radius_px: f64, blur_px: f64) -> Self {
+        let reach = 0.75 + 3.0 * blur_px;
+        let half = (reach * PER_PX as f64).ceil() as usize;
+        let columns = 2 * half + 1;
+        let spread = (3.5 * blur_px * PER_PX as f64).ceil() as usize;
+        let kernel: Vec<f64> = (0..=2 * spread)
+            .map(|i| {
+                let t = (i as f64 - spread as f64) / PER_PX as f64 / blur_px.max(1e-9);
+                (-0.5 * t * t).exp()
+            })
+            .collect();
+        let total: f64 = kernel.iter().sum();
+        let mut rows = Vec::with_capacity(columns * DIRECTIONS);
+        let mut sharp = vec![0.0; columns + 2 * spread + 2];
+        let mut soft = vec![0.0; columns + 2];
+        for k in 0..DIRECTIONS {
+            let s = (k as f64 + 0.5) / DIRECTIONS as f64 * std::f64::consts::FRAC_1_SQRT_2;
+            let c = (1.0 - s * s).sqrt();
+            for (i, v) in sharp.iter_mut().enumerate() {
+                let d = (i as f64 - (half + spread + 1) as f64) / PER_PX as f64;
+                let rho = radius_px - d;
+                // Past the centre the far edge would come in; a small disc ends there.
+                *v = if rho <= 0.0 { 1.0 } else { disc_in_pixel(rho * c, rho * s, radius_px) };
+            }
+            for (i, v) in soft.iter_mut().enumerate() {
+                *v = if spread == 0 {
+                    sharp[i]
+                } else {
+                    kernel.iter().zip(&sharp[i..]).map(|(a, b)| a * b).sum::<f64>() / total
+                };
+            }
+            for i in 0..columns {
+                // The slope over two steps: coverage has kinks, and a pixel is found within half a step.
+                let slope = (soft[i + 2] - soft[i]) * PER_PX as f64 / 2.0;
+                rows.push([soft[i + 1] as f32, slope as f32]);
+            }
+        }
+        Self { rows, columns, reach_px: half as f64 / PER_PX as f64 }
+    }
+
+    /// Coverage and slope at a distance inside the edge, where the edge's normal has the smaller component
+    /// `minor` (at most 0.71).
+    #[inline]
+    pub fn at(&self, inside_px: f32, minor: f32) -> (f32, f32) {
+        let t = (inside_px + self.reach_px as f32) * PER_PX as f32;
+        if t <= 0.0 {
+            return (0.0, 0.0);
+        }
+        let i = (t + 0.5) as usize;
+        if i >= self.columns {
+            return (1.0, 0.0);
+        }
+        let k = ((minor * (DIRECTIONS as f32 * std::f32::consts::SQRT_2)) as usize).min(DIRECTIONS - 1);
+        let [p, slope] = self.rows[k * self.columns + i];
+        (p + slope * (t - i as f32) / PER_PX as f32, slope)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_table_gives_the_exact_area_of_a_sharp_disc() {
+        let (r, c) = (6.0, [0.3, -0.2]);
+        let table = EdgeTable::new(r, 0.0);
+        let mut worst: f64 = 0.0;
+        for y in -8..=8 {
+            for x in -8..=8 {
+                let (dx, dy) = (f64::from(x) - c[0], f64::from(y) - c[1]);
+                let rho = dx.hypot(dy);
+                let minor = (dx.abs().min(dy.abs()) / rho) as f32;
+                let p = f64::from(table.at((r - rho) as f32, minor).0);
+                worst = worst.max((p - disc_in_pixel(dx, dy, r)).abs());
+            }
+        }
+        // Half a step of direction (0.022) turns the edge by up to 0.03 rad inside a pixel.
+        assert!(worst < 0.01, "{worst}");
+    }
+
+    #[test]
+    fn blur_keeps_the_middle_and_widens_the_edge() {
+        let (sharp, soft) = (EdgeTable::new(50.0, 0.0), EdgeTable::new(50.0, 0.8));
+        assert!((f64::from(soft.at(0.0, 0.3).0) - 0.5).abs() < 0.01);
+        // One standard deviation of blur and pixel together: sqrt(0.64 + 1/12) = 0.85 px holds 84 %.
+        assert!((f64::from(soft.at(0.85, 0.3).0) - 0.841).abs() < 0.01);
+        assert_eq!(sharp.at(0.85, 0.3).0, 1.0);
+    }
+}

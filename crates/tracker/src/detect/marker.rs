@@ -1,0 +1,133 @@
+//! What a marker of this recording looks like: radius, blur of its edge, and the noise on it.
+//!
+//! Owns: [`Marker`]. Must not: choose a threshold.
+
+use serde::{Deserialize, Serialize};
+
+use super::centre::Window;
+use super::edge::EdgeTable;
+use super::fit::{DiscFit, Fitted};
+use super::levels::{Noise, Side, quantile, sorted};
+use super::pixels::Pixels;
+use super::runs::Blob;
+
+/// A typical marker.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Marker {
+    /// Radius of the disc, px.
+    pub radius_px: f64,
+    /// Half the range that holds most radii, as a part of the radius.
+    pub radius_spread: f64,
+    /// Standard deviation of the blur of its edge, px; the pixel's own extent is not in it.
+    pub blur_px: f64,
+    /// Median of the mean square of weighted residuals: 1 where markers are discs and the noise is as learned.
+    pub chi2: f64,
+    /// Its ninth decile.
+    pub chi2_high: f64,
+}
+
+/// A blob in one of the sample frames.
+pub(crate) struct Sample<'a> {
+    pub pixels: Pixels<'a>,
+    pub blob: Blob,
+}
+
+/// Blurs that are tried, px.
+const BLURS_PX: [f64; 8] = [0.0, 0.15, 0.3, 0.45, 0.6, 0.8, 1.1, 1.5];
+/// Blobs that are fitted; more would change nothing.
+const MOST: usize = 60;
+
+/// Learns the marker and the noise from blobs; `None` where they are no discs.
+pub(crate) fn learn(
+    samples: &[Sample<'_>],
+    side: Side,
+    noise: Noise,
+    saturation: Option<f64>,
+) -> Option<(Marker, Noise)> {
+    let step = samples.len().div_ceil(MOST).max(1);
+    let samples: Vec<&Sample<'_>> = samples.iter().step_by(step).filter(|s| !s.blob.border).collect();
+    let areas = sorted(samples.iter().map(|s| s.blob.area as f64));
+    let radius = (quantile(&areas, 0.5) / std::f64::consts::PI).sqrt();
+    if samples.is_empty() || radius < 1.2 {
+        return None;
+    }
+    let mut window = Window::default();
+    let fits = |table: &EdgeTable, noise: Noise, window: &mut Window| -> Vec<(usize, Fitted)> {
+        let fit = DiscFit { table, noise, side, saturation };
+        (0..samples.len())
+            .filter_map(|i| window.fit(&samples[i].pixels, &samples[i].blob, &fit).map(|f| (i, f)))
+            .collect()
+    };
+    // Step 1: the blur whose discs fit best, first on the list, then between its neighbours.
+    let mut misfit = |blur: f64, radius: f64| -> f64 {
+        let table = EdgeTable::new(radius, blur);
+        let found = fits(&table, noise, &mut window);
+        if found.len() * 3 < samples.len() * 2 {
+            return f64::INFINITY;
+        }
+        let squares = sorted(found.iter().map(|(_, f)| f.chi2));
+        quantile(&squares, 0.5)
+    };
+    let tried: Vec<f64> = BLURS_PX.iter().map(|&b| misfit(b, radius)).collect();
+    let best = (0..tried.len()).min_by(|&a, &b| tried[a].total_cmp(&tried[b]))?;
+    if !tried[best].is_finite() {
+        return None;
+    }
+    let (mut low, mut high) =
+        (BLURS_PX[best.saturating_sub(1)], BLURS_PX[(best + 1).min(BLURS_PX.len() - 1)]);
+    while high - low > 0.02 {
+        let (a, b) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
+        if misfit(a, radius) <= misfit(b, radius) {
+            high = b;
+        } else {
+            low = a;
+        }
+    }
+    let blur =
+        if best == 0 && tried[0] <= misfit((low + high) / 2.0, radius) { 0.0 } else { (low + high) / 2.0 };
+
+    // Step 2: with that blur, the noise inside and outside of the discs.
+    let table = EdgeTable::new(radius, blur);
+    let found = fits(&table, noise, &mut window);
+    let mut flat = [Vec::new(), Vec::new()];
+    for (i, f) in &found {
+        window.flat_variances(&samples[*i].pixels, &samples[*i].blob, f, &table, saturation, side, &mut flat);
+    }
+    let mut noise = noise;
+    let [outside, inside] = flat.map(|v| sorted(v.into_iter()));
+    if outside.len() >= 5 {
+        noise.read = quantile(&outside, 0.5).max(1.0 / 12.0);
+    }
+    let heights = sorted(found.iter().map(|(_, f)| f.height.abs()));
+    let bases = sorted(found.iter().map(|(_, f)| f.base));
+    if inside.len() >= 5 {
+        let rise = quantile(&heights, 0.5);
+        // For dark markers the ground is the brighter side.
+        let (dark, bright) = match side {
+            Side::Bright => (noise.read, quantile(&inside, 0.5)),
+            Side::Dark => (quantile(&inside, 0.5), noise.read),
+        };
+        noise.read = dark.max(1.0 / 12.0);
+        noise.shot = ((bright - dark) / rise.max(1.0)).max(0.0);
+        noise.dark = match side {
+            Side::Bright => quantile(&bases, 0.5),
+            Side::Dark => quantile(&bases, 0.5) - rise,
+        };
+    }
+
+    // Step 3: once more with that noise, for what is typical.
+    let found = fits(&table, noise, &mut window);
+    let radii = sorted(found.iter().map(|(_, f)| f.radius_px));
+    let squares = sorted(found.iter().map(|(_, f)| f.chi2));
+    let radius = quantile(&radii, 0.5);
+    Some((
+        Marker {
+            radius_px: radius,
+            radius_spread: (quantile(&radii, 0.9) - quantile(&radii, 0.1)) / 2.0 / radius,
+            blur_px: blur,
+            chi2: quantile(&squares, 0.5),
+            chi2_high: quantile(&squares, 0.9),
+        },
+        noise,
+    ))
+}
