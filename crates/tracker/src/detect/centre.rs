@@ -2,7 +2,6 @@
 //!
 //! Owns: [`Centre`], [`Window`]. Must not: decide what is a marker.
 
-use super::edge::EdgeTable;
 use super::fit::{DiscFit, Fitted, Patch};
 use super::levels::{Levels, Side};
 use super::mask::Spans;
@@ -96,11 +95,10 @@ impl Window {
         pixels: &Pixels<'_>,
         blob: &Blob,
         fitted: &Fitted,
-        table: &EdgeTable,
-        saturation: Option<f64>,
-        side: Side,
+        fit: &DiscFit<'_>,
         flat: &mut [Vec<f64>; 2],
     ) {
+        let table = fit.table;
         self.load(pixels, blob, (table.reach_px + 3.0).ceil() as usize);
         let mut sums = [[0.0; 3]; 2];
         for (j, row) in self.heights.chunks_exact(self.width).enumerate() {
@@ -109,10 +107,7 @@ impl Window {
                 let dy = (self.y0 + j) as f64 - fitted.y_px;
                 let inside = fitted.radius_px - dx.hypot(dy);
                 let v = f64::from(v);
-                let lost = saturation.is_some_and(|l| match side {
-                    Side::Bright => v >= l,
-                    Side::Dark => v <= l,
-                });
+                let lost = fit.saturated(v);
                 if inside.abs() > table.reach_px && inside.abs() < table.reach_px + 2.0 && !lost {
                     let s = &mut sums[usize::from(inside > 0.0)];
                     let h = v - fitted.base - if inside > 0.0 { fitted.height } else { 0.0 };

@@ -7,6 +7,8 @@
 //! are used: they hold all that is known of the centre, and what is inside the marker or farther off (a link's
 //! edge, a neighbour) does not matter.
 
+use nalgebra::{SMatrix, SVector};
+
 use super::edge::EdgeTable;
 use super::levels::{Noise, Side};
 
@@ -63,6 +65,14 @@ struct Normal {
 }
 
 impl DiscFit<'_> {
+    /// Whether a value is at the end of the recording's range on the markers' side.
+    pub fn saturated(&self, value: f64) -> bool {
+        self.saturation.is_some_and(|limit| match self.side {
+            Side::Bright => value >= limit,
+            Side::Dark => value <= limit,
+        })
+    }
+
     /// Fits a disc from a start `[x, y, radius, base, height]`; `None` where it does not come to rest near it.
     pub fn fit(&self, patch: &Patch<'_>, start: [f64; 5]) -> Option<Fitted> {
         let mut p = start;
@@ -72,7 +82,7 @@ impl DiscFit<'_> {
             if n.pixels < 12 {
                 return None;
             }
-            let (step, covariance) = solve(&n.a, &n.b)?;
+            let (step, covariance): ([f64; 5], [f64; 5]) = solve(&n.a, &n.b)?;
             round += 1;
             let limit = 0.25 * start[2].max(2.0);
             let scale = (limit / step[0].abs().max(step[1].abs()).max(step[2].abs())).min(1.0);
@@ -134,16 +144,12 @@ impl DiscFit<'_> {
                 let mut model = base + height * cover;
                 let value = f64::from(patch.values[j * patch.width + i]);
                 if let Some(limit) = self.saturation {
-                    let beyond = |v: f64| match self.side {
-                        Side::Bright => v >= limit,
-                        Side::Dark => v <= limit,
-                    };
-                    if beyond(value) {
+                    if self.saturated(value) {
                         n.saturated += 1;
-                        if beyond(model) {
+                        if self.saturated(model) {
                             continue;
                         }
-                    } else if beyond(model) {
+                    } else if self.saturated(model) {
                         model = limit;
                     }
                 }
@@ -170,47 +176,9 @@ impl DiscFit<'_> {
 /// Solves `a x = b` for a symmetric positive matrix given by its lower triangle; also the diagonal of its
 /// inverse. `None` where it is not positive.
 fn solve(a: &[[f64; 5]; 5], b: &[f64; 5]) -> Option<([f64; 5], [f64; 5])> {
-    let mut l = [[0.0; 5]; 5];
-    for i in 0..5 {
-        for j in 0..=i {
-            let mut sum = a[i][j];
-            for k in 0..j {
-                sum -= l[i][k] * l[j][k];
-            }
-            if i == j {
-                // A saturated marker tells little of its height: it must not blow up the rest.
-                if !(sum > 1e-9 * a[i][i]) {
-                    return None;
-                }
-                l[i][i] = sum.sqrt();
-            } else {
-                l[i][j] = sum / l[j][j];
-            }
-        }
-    }
-    let through = |b: &[f64; 5]| {
-        let mut y = [0.0; 5];
-        for i in 0..5 {
-            let mut sum = b[i];
-            for k in 0..i {
-                sum -= l[i][k] * y[k];
-            }
-            y[i] = sum / l[i][i];
-        }
-        for i in (0..5).rev() {
-            let mut sum = y[i];
-            for k in i + 1..5 {
-                sum -= l[k][i] * y[k];
-            }
-            y[i] = sum / l[i][i];
-        }
-        y
-    };
-    let mut diagonal = [0.0; 5];
-    for (i, d) in diagonal.iter_mut().enumerate() {
-        let mut unit = [0.0; 5];
-        unit[i] = 1.0;
-        *d = through(&unit)[i];
-    }
-    Some((through(b), diagonal))
+    let full = SMatrix::<f64, 5, 5>::from_fn(|i, j| a[i.max(j)][i.min(j)]);
+    let factor = full.cholesky()?;
+    let step = factor.solve(&SVector::<f64, 5>::from_row_slice(b));
+    let inverse = factor.inverse();
+    Some((step.into(), inverse.diagonal().into()))
 }

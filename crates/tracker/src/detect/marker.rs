@@ -90,8 +90,9 @@ pub(crate) fn learn(
     let table = EdgeTable::new(radius, blur);
     let found = fits(&table, noise, &mut window);
     let mut flat = [Vec::new(), Vec::new()];
+    let fit = DiscFit { table: &table, noise, side, saturation };
     for (i, f) in &found {
-        window.flat_variances(&samples[*i].pixels, &samples[*i].blob, f, &table, saturation, side, &mut flat);
+        window.flat_variances(&samples[*i].pixels, &samples[*i].blob, f, &fit, &mut flat);
     }
     let mut noise = noise;
     let [outside, inside] = flat.map(|v| sorted(v.into_iter()));
