@@ -1,6 +1,22 @@
 //! From detections to named nodes: nearest neighbours, signatures, rigid bodies.
 //!
-//! Owns: [`Status`], [`Observation`], `Tracker`, `track_recording`. Must not: know of pixels, pendulums or metres.
+//! Owns: [`Status`], [`Observation`], [`Tracker`], [`track_recording`]. Must not: know of pixels, pendulums or metres.
+
+pub mod constellation;
+pub mod joints;
+pub mod learn;
+pub mod mechanism;
+pub mod nearest;
+pub mod predict;
+pub mod recording;
+pub mod rigid;
+pub mod tracker;
+
+#[cfg(test)]
+mod swing;
+
+pub use recording::{TrackSummary, track_recording};
+pub use tracker::Tracker;
 
 /// What is known of a node in a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

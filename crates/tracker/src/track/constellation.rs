@@ -1,0 +1,328 @@
+//! Looking for a body among detections: poses under which its nodes are seen.
+//!
+//! Owns: [`Anchor`], [`Search`], [`Sighting`]. Must not: decide between sightings (`tracker` does).
+//!
+//! A pose follows from two joints, from a joint and one node, or from two nodes. Every pose that follows from
+//! the detections is tested on all nodes of the body and refitted on those that agree.
+
+use nalgebra::{Isometry2, Vector2};
+
+use super::mechanism::Link;
+use super::nearest::Sky;
+use super::predict::{Forecast, hung_at};
+use super::rigid::{Pair, PoseFit, fit_pose, place, pose_at};
+
+/// A point of the body whose place in the image is known from elsewhere: the pivot, a neighbour's joint.
+#[derive(Debug, Clone, Copy)]
+pub struct Anchor {
+    /// In the body's coordinates, px.
+    pub local: Vector2<f64>,
+    /// In the image, px.
+    pub place: Vector2<f64>,
+    /// Standard uncertainty of each coordinate, px.
+    pub sigma_px: f64,
+}
+
+/// A pose under which nodes are seen.
+#[derive(Debug, Clone)]
+pub struct Sighting {
+    /// The pose, fitted on anchors and whole detections.
+    pub fit: PoseFit,
+    /// For each node of the body its detection.
+    pub picks: Vec<Option<usize>>,
+    /// Nodes seen whole.
+    pub support: usize,
+    /// Sum of squared residuals of the nodes over their variances.
+    pub chi2: f64,
+}
+
+/// What a search found.
+#[derive(Debug, Default)]
+pub struct Found {
+    /// Sightings with different detections, the best first.
+    pub sightings: Vec<Sighting>,
+    /// Poses that the detections allowed and that were tested.
+    pub trials: usize,
+}
+
+/// A search for one body in one frame.
+pub struct Search<'a> {
+    /// The body.
+    pub link: &'a Link,
+    /// Points known from elsewhere.
+    pub anchors: &'a [Anchor],
+    /// The detections.
+    pub sky: &'a Sky<'a>,
+    /// Detections that no other body has.
+    pub free: &'a [bool],
+    /// Where the body must be; `None` is anywhere.
+    pub window: Option<Forecast>,
+    /// Deviations, in standard uncertainties, up to which a detection agrees.
+    pub reach_sigma: f64,
+    /// Added to every detection's uncertainty in square, px.
+    pub floor_px: f64,
+}
+
+fn turned(a: f64) -> f64 {
+    let t = a.rem_euclid(std::f64::consts::TAU);
+    if t > std::f64::consts::PI { t - std::f64::consts::TAU } else { t }
+}
+
+impl Search<'_> {
+    /// Standard uncertainty of detection `d` as node `j`, px.
+    fn sigma(&self, j: usize, d: usize) -> f64 {
+        let own = f64::from(self.sky.get(d).sigma_px).max(1e-3);
+        (own * own + self.link.slack_px[j].powi(2) + self.floor_px.powi(2)).sqrt()
+    }
+
+    fn usual_sigma(&self, j: usize) -> f64 {
+        let mut own = 0.0_f64;
+        for d in 0..self.sky.len() {
+            own = own.max(f64::from(self.sky.get(d).sigma_px));
+        }
+        (own * own + self.link.slack_px[j].powi(2) + self.floor_px.powi(2)).sqrt()
+    }
+
+    /// Whether a pose is one that the window allows.
+    fn allowed(&self, pose: &Isometry2<f64>) -> bool {
+        let Some(w) = &self.window else { return true };
+        if turned(pose.rotation.angle() - w.pose.rotation.angle()).abs() > w.angle_rad {
+            return false;
+        }
+        // With an anchor the place follows from it.
+        !self.anchors.is_empty()
+            || (pose.translation.vector - w.pose.translation.vector).norm()
+                <= w.origin_px + self.reach_sigma * self.floor_px
+    }
+
+    /// The sighting that grows from a pose known to `slack_rad`, if any node is seen.
+    pub fn grow(&self, pose: Isometry2<f64>, about: Vector2<f64>, slack_rad: f64) -> Option<Sighting> {
+        let n = self.link.nodes.len();
+        let mut pose = pose;
+        let mut slack = slack_rad;
+        let mut picks: Vec<Option<usize>> = vec![None; n];
+        let mut about = about;
+        let mut result = None;
+        for round in 0..6 {
+            let mut new: Vec<Option<usize>> = vec![None; n];
+            let mut distance = vec![f64::INFINITY; n];
+            for j in 0..n {
+                let there = place(&pose, self.link.template[j]);
+                let lever = (self.link.template[j] - about).norm();
+                let wide = self.reach_sigma * (self.usual_sigma(j) + slack * lever);
+                if let Some((d, r)) = self.sky.nearest(there, wide)
+                    && self.free[d]
+                    && r <= self.reach_sigma * (self.sigma(j, d) + slack * lever)
+                {
+                    // A detection is one node at most: the nearer one.
+                    if let Some(other) = (0..j).find(|&k| new[k] == Some(d)) {
+                        if distance[other] <= r {
+                            continue;
+                        }
+                        new[other] = None;
+                    }
+                    new[j] = Some(d);
+                    distance[j] = r;
+                }
+            }
+            let pairs = self.pairs(&new);
+            let fit = self.fit(&pairs, &pose)?;
+            slack = 0.0;
+            about = fit.centre;
+            pose = fit.pose;
+            let same = new == picks;
+            picks = new;
+            result = Some(fit);
+            if same && round > 0 {
+                break;
+            }
+        }
+        let fit = result?;
+        // Last test, at the fitted pose and with its own uncertainty no excuse.
+        let mut chi2 = 0.0;
+        let mut support = 0;
+        for j in 0..n {
+            if let Some(d) = picks[j] {
+                let r = (place(&fit.pose, self.link.template[j]) - self.sky.place(d)).norm();
+                let s = self.sigma(j, d);
+                if r > self.reach_sigma * s {
+                    picks[j] = None;
+                } else if self.sky.whole(d) {
+                    support += 1;
+                    chi2 += (r / s).powi(2);
+                }
+            }
+        }
+        // The anchors must agree too.
+        for a in self.anchors {
+            if (place(&fit.pose, a.local) - a.place).norm() > self.reach_sigma * a.sigma_px {
+                return None;
+            }
+        }
+        (support > 0 && self.allowed(&fit.pose)).then_some(Sighting { fit, picks, support, chi2 })
+    }
+
+    fn pairs(&self, picks: &[Option<usize>]) -> Vec<Pair> {
+        let mut pairs: Vec<Pair> = self
+            .anchors
+            .iter()
+            .map(|a| Pair { local: a.local, place: a.place, sigma_px: a.sigma_px })
+            .collect();
+        for (j, pick) in picks.iter().enumerate() {
+            if let Some(d) = *pick
+                && self.sky.whole(d)
+            {
+                let sigma_px = self.sigma(j, d);
+                pairs.push(Pair { local: self.link.template[j], place: self.sky.place(d), sigma_px });
+            }
+        }
+        pairs
+    }
+
+    /// A pose from the pairs; from a single one the angle is kept.
+    fn fit(&self, pairs: &[Pair], pose: &Isometry2<f64>) -> Option<PoseFit> {
+        fit_pose(pairs).or_else(|| {
+            let p = pairs.first()?;
+            let turn = self.window.map_or(std::f64::consts::PI, |w| w.angle_rad);
+            Some(PoseFit {
+                pose: hung_at(pose, p.local, p.place),
+                centre: p.local,
+                sigma_angle_rad: turn,
+                sigma_centre_px: p.sigma_px,
+                chi2: 0.0,
+            })
+        })
+    }
+
+    /// All sightings, the best (most nodes, then least chi-square) first.
+    pub fn run(&self) -> Found {
+        let mut found = Found::default();
+        let link = self.link;
+        let n = link.nodes.len();
+        let mut near = Vec::new();
+        if let Some((a, b)) = self.far_anchors() {
+            // Two anchors fix the pose.
+            let pairs = [a, b].map(|a| Pair { local: a.local, place: a.place, sigma_px: a.sigma_px });
+            if let Some(fit) = fit_pose(&pairs) {
+                self.test(fit.pose, fit.centre, fit.sigma_angle_rad, &mut found);
+            }
+        } else if let Some(a) = self.anchors.first() {
+            for j in 0..n {
+                let arm = link.template[j] - a.local;
+                let radius = arm.norm();
+                let reach = self.reach_sigma * self.usual_sigma(j).hypot(a.sigma_px);
+                if radius <= reach {
+                    // A node at the joint gives no angle.
+                    if let Some(w) = &self.window
+                        && n == 1
+                    {
+                        self.test(hung_at(&w.pose, a.local, a.place), a.local, 0.0, &mut found);
+                    } else if n == 1 {
+                        self.test(pose_at(0.0, a.local, a.place), a.local, 0.0, &mut found);
+                    }
+                    continue;
+                }
+                match &self.window {
+                    Some(w) if w.angle_rad < 1.5 => {
+                        let there = place(&hung_at(&w.pose, a.local, a.place), link.template[j]);
+                        self.sky.within(there, radius * w.angle_rad + reach, &mut near);
+                    }
+                    _ => self.sky.within(a.place, radius + reach, &mut near),
+                }
+                for &d in &near {
+                    let ray = self.sky.place(d) - a.place;
+                    if !self.free[d] || !self.sky.whole(d) || (ray.norm() - radius).abs() > reach {
+                        continue;
+                    }
+                    let angle = ray.y.atan2(ray.x) - arm.y.atan2(arm.x);
+                    let slack = self.sigma(j, d).hypot(a.sigma_px) / radius;
+                    self.test(pose_at(angle, a.local, a.place), a.local, slack, &mut found);
+                }
+            }
+        } else if n == 1 {
+            if let Some(w) = &self.window {
+                self.sky.within(w.pose.translation.vector, w.origin_px, &mut near);
+                for &d in &near {
+                    if self.free[d] {
+                        let pose = hung_at(&w.pose, link.template[0], self.sky.place(d));
+                        self.test(pose, link.template[0], 0.0, &mut found);
+                    }
+                }
+            }
+        } else {
+            self.from_pairs(&mut found);
+        }
+        found.sightings.sort_by(|a, b| b.support.cmp(&a.support).then(a.chi2.total_cmp(&b.chi2)));
+        found
+    }
+
+    fn far_anchors(&self) -> Option<(Anchor, Anchor)> {
+        let a = *self.anchors.first()?;
+        let b = self.anchors[1..]
+            .iter()
+            .copied()
+            .max_by(|x, y| (x.local - a.local).norm().total_cmp(&(y.local - a.local).norm()))?;
+        ((b.local - a.local).norm() > 20.0 * a.sigma_px.hypot(b.sigma_px)).then_some((a, b))
+    }
+
+    /// Poses from two nodes: every pair of detections at the distance of a pair of nodes.
+    fn from_pairs(&self, found: &mut Found) {
+        /// Pairs of nodes tried, the longest first: they turn least with noise.
+        const PAIRS: usize = 60;
+        let link = self.link;
+        let n = link.nodes.len();
+        let mut spans: Vec<(f64, usize, usize)> = Vec::new();
+        for i in 0..n {
+            for j in i + 1..n {
+                spans.push(((link.template[i] - link.template[j]).norm(), i, j));
+            }
+        }
+        spans.sort_by(|a, b| b.0.total_cmp(&a.0));
+        spans.truncate(PAIRS);
+        let stars: Vec<usize> = (0..self.sky.len()).filter(|&d| self.free[d] && self.sky.whole(d)).collect();
+        let mut gaps: Vec<(f64, usize, usize)> = Vec::new();
+        for (k, &d) in stars.iter().enumerate() {
+            for &e in &stars[k + 1..] {
+                gaps.push(((self.sky.place(d) - self.sky.place(e)).norm(), d, e));
+            }
+        }
+        gaps.sort_by(|a, b| a.0.total_cmp(&b.0));
+        for &(span, i, j) in &spans {
+            let sigma = self.usual_sigma(i).hypot(self.usual_sigma(j));
+            let reach = self.reach_sigma * sigma;
+            if span <= 4.0 * reach {
+                continue;
+            }
+            let first = gaps.partition_point(|g| g.0 < span - reach);
+            for &(gap, d, e) in gaps[first..].iter().take_while(|g| g.0 <= span + reach) {
+                debug_assert!(gap >= span - reach);
+                for (d, e) in [(d, e), (e, d)] {
+                    let pairs = [(i, d), (j, e)].map(|(j, d)| Pair {
+                        local: link.template[j],
+                        place: self.sky.place(d),
+                        sigma_px: self.sigma(j, d),
+                    });
+                    if let Some(fit) = fit_pose(&pairs) {
+                        self.test(fit.pose, fit.centre, fit.sigma_angle_rad, found);
+                    }
+                }
+            }
+        }
+    }
+
+    fn test(&self, pose: Isometry2<f64>, about: Vector2<f64>, slack_rad: f64, found: &mut Found) {
+        if let Some(w) = &self.window {
+            // The seed's own uncertainty widens the window here; the fitted pose is held to it.
+            let off = turned(pose.rotation.angle() - w.pose.rotation.angle()).abs();
+            if off > w.angle_rad + self.reach_sigma * slack_rad {
+                return;
+            }
+        }
+        found.trials += 1;
+        if let Some(s) = self.grow(pose, about, slack_rad)
+            && !found.sightings.iter().any(|o| o.picks == s.picks)
+        {
+            found.sightings.push(s);
+        }
+    }
+}

@@ -1,0 +1,275 @@
+//! A whole recording: what it says of rig and motion first, then every frame, each way of time.
+//!
+//! Owns: [`track_recording`], [`TrackSummary`]. Must not: keep more of the recording than what is undecided.
+
+use std::collections::VecDeque;
+
+use super::Observation;
+use super::learn::Lessons;
+use super::mechanism::Mechanism;
+use super::nearest::Sky;
+use super::predict::Motion;
+use super::tracker::{BodySeen, Engine, Habits, Returns, observations};
+use crate::detect::Detection;
+use crate::error::Result;
+use crate::rig::Rig;
+use crate::store::{DetectionStore, FrameStamp};
+
+/// What came of a recording.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct TrackSummary {
+    /// Frames written.
+    pub frames: u64,
+    /// For each node, in the rig's order, frames in which it was seen.
+    pub seen: Vec<u64>,
+    /// For each node, frames in which its name stayed open.
+    pub ambiguous: Vec<u64>,
+    /// For each node, whether it was seen in the last frame.
+    pub seen_last: Vec<bool>,
+}
+
+/// Receives one frame's stamp and its nodes, in the rig's order.
+pub type Sink<'a> = dyn FnMut(&FrameStamp, &[Observation]) -> Result<()> + 'a;
+
+/// Frames after which an open body is written as it stands.
+const PATIENCE: usize = 20_000;
+/// Frames in a row in which a body must be seen before its gap is filled from behind.
+const SETTLED: usize = 3;
+
+struct Pending {
+    stamp: FrameStamp,
+    seen: Vec<BodySeen>,
+}
+
+/// Names the markers of a whole recording and hands every frame to `sink` in the order of recording.
+///
+/// # Errors
+/// Those of the sink, and [`crate::error::Error::Rig`] for a rig that is not valid.
+pub fn track_recording(store: &DetectionStore, rig: &Rig, sink: &mut Sink<'_>) -> Result<TrackSummary> {
+    rig.check("rig")?;
+    let mechanism = Mechanism::new(rig, 0.3);
+    let habits = Habits::unknown(&mechanism, 0.05);
+    let n = mechanism.nodes;
+    let mut out = Output {
+        returns: Returns::new(n),
+        summary: TrackSummary {
+            seen: vec![0; n],
+            ambiguous: vec![0; n],
+            seen_last: vec![false; n],
+            ..Default::default()
+        },
+        scratch: Vec::new(),
+    };
+    if store.is_empty() {
+        return Ok(out.summary);
+    }
+    let start = start_frame(store, rig);
+    let (mechanism, habits) = learn(store, rig, start, mechanism, habits);
+    let engine = started(rig, start, mechanism, habits);
+    // Backwards from the reference frame, kept; then forwards from it, written as it is decided.
+    let mut before = Pass::new(store, engine.clone());
+    for i in (0..start).rev() {
+        before.step(i);
+    }
+    before.finish();
+    while let Some(p) = before.pending.pop_back() {
+        out.write(store, &before.engine.mechanism, p, sink)?;
+    }
+    let mut after = Pass::new(store, engine);
+    for i in start..store.len() {
+        after.step(i);
+        while after.decided() > 0 {
+            if let Some(p) = after.pending.pop_front() {
+                out.write(store, &after.engine.mechanism, p, sink)?;
+            }
+            after.first += 1;
+        }
+    }
+    after.finish();
+    while let Some(p) = after.pending.pop_front() {
+        out.write(store, &after.engine.mechanism, p, sink)?;
+    }
+    Ok(out.summary)
+}
+
+/// Frames that the rig is refined on.
+const LESSON: usize = 4000;
+
+/// Follows the markers from the reference frame on, only to learn.
+fn learn(
+    store: &DetectionStore,
+    rig: &Rig,
+    start: usize,
+    mut mechanism: Mechanism,
+    mut habits: Habits,
+) -> (Mechanism, Habits) {
+    let mut scratch = Vec::new();
+    let mut engine = started(rig, start, mechanism.clone(), habits.clone());
+    let mut lessons = Lessons::new(&mechanism);
+    // The last frames before the reference count too where few come after it.
+    let first = start.min(store.len().saturating_sub(LESSON));
+    for i in (first..start).rev().chain(start..store.len().min(first + LESSON)) {
+        if i == start {
+            engine = started(rig, start, mechanism.clone(), habits.clone());
+        }
+        store.read(i, &mut scratch);
+        let sky = Sky::new(&scratch);
+        let seen = engine.step(i as f64, &sky, None);
+        lessons.add(&engine.mechanism, &seen, &sky);
+    }
+    lessons.apply(&mut mechanism, &mut habits);
+    (mechanism, habits)
+}
+
+/// A tracker that stands in the reference frame.
+fn started(rig: &Rig, start: usize, mechanism: Mechanism, habits: Habits) -> Engine {
+    let mut engine = Engine::new(mechanism, habits);
+    if rig.reference_frame.is_some() {
+        for b in 0..engine.mechanism.links.len() {
+            engine.motions[b] = Motion::at(start as f64, &engine.mechanism.home_pose(b));
+        }
+    }
+    engine
+}
+
+/// Index in the store of the reference frame; 0 where there is none in it.
+fn start_frame(store: &DetectionStore, rig: &Rig) -> usize {
+    let Some(reference) = rig.reference_frame else { return 0 };
+    let first = store.stamp(0).index;
+    reference.checked_sub(first).map_or(0, |i| if (i as usize) < store.len() { i as usize } else { 0 })
+}
+
+struct Output {
+    returns: Returns,
+    summary: TrackSummary,
+    scratch: Vec<Detection>,
+}
+
+impl Output {
+    fn write(
+        &mut self,
+        store: &DetectionStore,
+        mechanism: &Mechanism,
+        p: Pending,
+        sink: &mut Sink<'_>,
+    ) -> Result<()> {
+        let i = (p.stamp.index - store.stamp(0).index) as usize;
+        store.read(i, &mut self.scratch);
+        let mut row = observations(mechanism, &p.seen, &self.scratch);
+        self.returns.mark(&mut row);
+        let s = &mut self.summary;
+        s.frames += 1;
+        for (k, o) in row.iter().enumerate() {
+            let seen = o.x_px.is_finite();
+            s.seen[k] += u64::from(seen);
+            s.ambiguous[k] += u64::from(o.status == super::Status::Ambiguous);
+            s.seen_last[k] = seen;
+        }
+        sink(&p.stamp, &row)
+    }
+}
+
+/// One direction of time: steps, and fills gaps from behind once a body is settled again.
+struct Pass<'a> {
+    store: &'a DetectionStore,
+    engine: Engine,
+    pending: VecDeque<Pending>,
+    /// Steps already taken out of `pending`.
+    first: usize,
+    /// For each body the step at which its gap began.
+    gap: Vec<Option<usize>>,
+    /// For each body the steps in a row in which it was seen.
+    run: Vec<usize>,
+    scratch: Vec<Detection>,
+}
+
+impl<'a> Pass<'a> {
+    fn new(store: &'a DetectionStore, engine: Engine) -> Self {
+        let n = engine.mechanism.links.len();
+        Self {
+            store,
+            engine,
+            pending: VecDeque::new(),
+            first: 0,
+            gap: vec![None; n],
+            run: vec![0; n],
+            scratch: Vec::new(),
+        }
+    }
+
+    fn step(&mut self, i: usize) {
+        self.store.read(i, &mut self.scratch);
+        let sky = Sky::new(&self.scratch);
+        let seen = self.engine.step(i as f64, &sky, None);
+        let now = self.first + self.pending.len();
+        for (b, s) in seen.iter().enumerate() {
+            if s.fit.is_some() {
+                self.run[b] += 1;
+            } else {
+                self.run[b] = 0;
+                self.gap[b].get_or_insert(now);
+            }
+        }
+        self.pending.push_back(Pending { stamp: self.store.stamp(i), seen });
+        for b in 0..self.gap.len() {
+            if self.gap[b].is_some() && self.run[b] == SETTLED {
+                self.fill(b);
+            }
+        }
+    }
+
+    /// Steps that no open gap holds back.
+    fn decided(&self) -> usize {
+        let end = self.first + self.pending.len();
+        let open = self.gap.iter().flatten().copied().min().unwrap_or(end);
+        open.saturating_sub(self.first).max(self.pending.len().saturating_sub(PATIENCE))
+    }
+
+    /// Follows body `b` from now back through its gap.
+    fn fill(&mut self, b: usize) {
+        let Some(start) = self.gap[b].take() else { return };
+        let from = start.max(self.first) - self.first;
+        let end = self.pending.len() - SETTLED;
+        let mut engine = self.engine.clone();
+        engine.motions[b] = Motion::default();
+        let time = |p: &Pending, store: &DetectionStore| (p.stamp.index - store.stamp(0).index) as f64;
+        for p in self.pending.range(end..).rev() {
+            if let Some(f) = &p.seen[b].fit {
+                engine.motions[b].add(time(p, self.store), f);
+            }
+        }
+        for k in (from..end).rev() {
+            let p = &mut self.pending[k];
+            let i = time(p, self.store);
+            self.store.read(i as usize, &mut self.scratch);
+            if self.scratch.is_empty() || p.seen[b].fit.is_some() {
+                if let Some(f) = &p.seen[b].fit {
+                    engine.motions[b].add(i, f);
+                }
+                continue;
+            }
+            let sky = Sky::new(&self.scratch);
+            let mut known = p.seen.clone();
+            for (o, s) in known.iter_mut().enumerate() {
+                // Other open bodies are not the question now.
+                if o != b && s.fit.is_none() {
+                    s.picks = vec![None; s.picks.len()];
+                }
+            }
+            let seen = engine.step_one(b, i, &sky, &known);
+            if seen.fit.is_some() {
+                p.seen[b] = seen;
+            }
+        }
+    }
+
+    /// Fills what gaps can be filled at the end of the recording.
+    fn finish(&mut self) {
+        for b in 0..self.gap.len() {
+            if self.gap[b].is_some() && self.run[b] > 0 && self.pending.len() > SETTLED {
+                self.fill(b);
+            }
+        }
+        self.gap.fill(None);
+    }
+}

@@ -1,0 +1,476 @@
+//! One frame's detections to named nodes, given the frames before it.
+//!
+//! Owns: [`Engine`] (either direction of time), [`Tracker`] (forwards, live). Must not: look ahead.
+//!
+//! Every body is first looked for where its motion carries it, then anywhere. What is found is accepted when it
+//! is very unlikely to be chance and no other pose explains as much; else the body stays open. Never guessed.
+
+use nalgebra::Vector2;
+
+use super::constellation::{Anchor, Found, Search, Sighting};
+use super::mechanism::{Holder, Mechanism};
+use super::nearest::Sky;
+use super::predict::{Forecast, Motion, Unrest, hung_at};
+use super::rigid::{PoseFit, place};
+use super::{Observation, Status};
+use crate::detect::{Detection, Flags};
+use crate::error::{Error, Fault, Result};
+use crate::rig::Rig;
+use crate::store::FrameStamp;
+
+/// What a frame says about one body.
+#[derive(Debug, Clone, Default)]
+pub struct BodySeen {
+    /// The accepted pose.
+    pub fit: Option<PoseFit>,
+    /// For each node of the body its detection.
+    pub picks: Vec<Option<usize>>,
+    /// For each node of the body whether something seen may be it.
+    pub open: Vec<bool>,
+}
+
+/// Deviations up to which a detection agrees with its node. With nine nodes and 1e5 frames a true one is lost to
+/// chance in one of 1e4 (Rayleigh: exp(-k^2 / 2) = 2.5e-6 at 5.1).
+const REACH_SIGMA: f64 = 5.1;
+/// Greatest expected number of chance sightings for a body found where its motion carries it.
+const CHANCE_EXPECTED: f64 = 2e-3;
+/// The same for a body found elsewhere.
+const CHANCE_ANYWHERE: f64 = 1e-5;
+/// How exactly the only node seen of a body must be expected, px.
+const LONE_GATE_PX: f64 = 1.5;
+/// Poses that put every node closer together than this are the same, px.
+const SAME_POSE_PX: f64 = 1.5;
+
+/// What was learned of a recording's motion and clutter.
+#[derive(Debug, Clone)]
+pub struct Habits {
+    /// For each body the least unrest to reckon with.
+    pub floor: Vec<Unrest>,
+    /// For each body how far it may go in a frame.
+    pub first: Vec<Unrest>,
+    /// Detections per frame that are no node.
+    pub clutter: f64,
+    /// Added to every detection's uncertainty in square, px.
+    pub floor_px: f64,
+}
+
+impl Habits {
+    /// What holds of any recording.
+    pub fn unknown(mechanism: &Mechanism, floor_px: f64) -> Self {
+        let each = |k: f64| -> Vec<Unrest> {
+            mechanism
+                .links
+                .iter()
+                .map(|l| {
+                    let reach = l.reach_px(Vector2::zeros()).max(30.0);
+                    Unrest { angle_rad: k / reach, origin_px: k }
+                })
+                .collect()
+        };
+        let mut first = each(25.0);
+        for (f, l) in first.iter_mut().zip(&mechanism.links) {
+            if l.nodes.len() > 1 {
+                f.angle_rad = 4.0;
+                f.origin_px = 150.0;
+            }
+        }
+        Self { floor: each(1.0), first, clutter: 0.5, floor_px }
+    }
+}
+
+/// Follows bodies through frames in either direction of time.
+#[derive(Debug, Clone)]
+pub struct Engine {
+    /// Templates and hinges.
+    pub mechanism: Mechanism,
+    /// What to reckon with.
+    pub habits: Habits,
+    /// The last poses of each body.
+    pub motions: Vec<Motion>,
+    /// For each body the least turn that maps it on itself as far as two nodes, rad.
+    likeness: Vec<f64>,
+}
+
+impl Engine {
+    /// A tracker that knows no pose yet.
+    pub fn new(mechanism: Mechanism, habits: Habits) -> Self {
+        let motions = vec![Motion::default(); mechanism.links.len()];
+        let likeness = (0..mechanism.links.len()).map(|b| likeness(&mechanism, &habits, b)).collect();
+        Self { mechanism, habits, motions, likeness }
+    }
+
+    /// Points of a body known from the ground and from bodies whose pose is known.
+    pub fn anchors(&self, body: usize, fits: &[BodySeen]) -> Vec<Anchor> {
+        let mut out: Vec<Anchor> = Vec::new();
+        for h in self.mechanism.hinges.iter().filter(|h| h.body == body) {
+            match h.holder {
+                Holder::Ground(p) => out.push(Anchor { local: h.local, place: p, sigma_px: h.sigma_px }),
+                Holder::Body(o, there) => {
+                    if let Some(f) = &fits[o].fit {
+                        let sigma_px = h.sigma_px.hypot(f.sigma_at(there));
+                        out.push(Anchor { local: h.local, place: place(&f.pose, there), sigma_px });
+                    }
+                }
+            }
+        }
+        out.sort_by(|a, b| a.sigma_px.total_cmp(&b.sigma_px));
+        out
+    }
+
+    /// Where a body is expected at `time`.
+    pub fn forecast(&self, body: usize, time: f64, anchors: &[Anchor]) -> Option<Forecast> {
+        let mut f = self.motions[body].forecast(time, self.habits.floor[body], self.habits.first[body])?;
+        if let Some(a) = anchors.first() {
+            f.pose = hung_at(&f.pose, a.local, a.place);
+            f.origin_px = 0.0;
+        }
+        Some(f)
+    }
+
+    /// Names the detections of one frame. `time` in frames may go either way. Bodies that are already known in
+    /// this frame are given in `known` and stay as they are.
+    pub fn step(&mut self, time: f64, sky: &Sky<'_>, known: Option<&[BodySeen]>) -> Vec<BodySeen> {
+        let n = self.mechanism.links.len();
+        let mut seen: Vec<BodySeen> = match known {
+            Some(k) => k.to_vec(),
+            None => vec![BodySeen::default(); n],
+        };
+        let mut free = vec![true; sky.len()];
+        for s in &seen {
+            for d in s.picks.iter().flatten() {
+                free[*d] = false;
+            }
+        }
+        let given: Vec<bool> = seen.iter().map(|s| s.fit.is_some()).collect();
+        // Twice: a body that was found can hold its neighbours.
+        for round in 0..2 {
+            for k in 0..n {
+                let b = self.mechanism.order[k];
+                if seen[b].fit.is_some() {
+                    continue;
+                }
+                let anchors = self.anchors(b, &seen);
+                if round == 1 && anchors.is_empty() {
+                    continue;
+                }
+                let got = self.find(b, time, sky, &free, &anchors);
+                for d in got.picks.iter().flatten() {
+                    free[*d] = false;
+                }
+                if got.fit.is_some() || seen[b].picks.is_empty() || round == 1 {
+                    seen[b] = got;
+                }
+            }
+        }
+        for b in 0..n {
+            if let Some(f) = &seen[b].fit
+                && !given[b]
+            {
+                self.motions[b].add(time, f);
+            }
+        }
+        seen
+    }
+
+    /// Looks for one body with all others as `known` says.
+    pub fn step_one(&mut self, b: usize, time: f64, sky: &Sky<'_>, known: &[BodySeen]) -> BodySeen {
+        let mut free = vec![true; sky.len()];
+        for (o, s) in known.iter().enumerate() {
+            if o != b && s.fit.is_some() {
+                for d in s.picks.iter().flatten() {
+                    free[*d] = false;
+                }
+            }
+        }
+        let anchors = self.anchors(b, known);
+        let got = self.find(b, time, sky, &free, &anchors);
+        if let Some(f) = &got.fit {
+            self.motions[b].add(time, f);
+        }
+        got
+    }
+
+    fn find(&self, b: usize, time: f64, sky: &Sky<'_>, free: &[bool], anchors: &[Anchor]) -> BodySeen {
+        let link = &self.mechanism.links[b];
+        let n = link.nodes.len();
+        let nothing = BodySeen { fit: None, picks: vec![None; n], open: vec![false; n] };
+        if sky.is_empty() {
+            return nothing;
+        }
+        let mut open = vec![false; n];
+        let forecast = self.forecast(b, time, anchors);
+        let mut search = Search {
+            link,
+            anchors,
+            sky,
+            free,
+            window: forecast,
+            reach_sigma: REACH_SIGMA,
+            floor_px: self.habits.floor_px,
+        };
+        if let Some(w) = forecast.filter(|w| w.angle_rad < std::f64::consts::PI) {
+            // The usual case: every node near its expected place, and no other turn can look like it.
+            let about = anchors.first().map_or(Vector2::zeros(), |a| a.local);
+            if 2.0 * w.angle_rad < self.likeness[b]
+                && let Some(s) = search.grow(w.pose, about, w.angle_rad)
+                && (s.support == n || s.support >= 3)
+                && s.support >= 2
+                && self.chance(b, &s, 1, sky, free, anchors, Some(&w)) < CHANCE_ANYWHERE
+            {
+                return accepted(s, n);
+            }
+            let found = search.run();
+            match self.judge(b, found, sky, free, anchors, Some(&w), CHANCE_EXPECTED, &mut open) {
+                Some(s) => return accepted(s, n),
+                None if open.iter().any(|&o| o) && n == 1 => return BodySeen { open, ..nothing },
+                None => {}
+            }
+            if n == 1 {
+                return nothing;
+            }
+        }
+        search.window = None;
+        let found = search.run();
+        match self.judge(b, found, sky, free, anchors, None, CHANCE_ANYWHERE, &mut open) {
+            Some(s) => accepted(s, n),
+            None => BodySeen { open, ..nothing },
+        }
+    }
+
+    /// The sighting that stands, if one does; else marks the nodes that something seen may be.
+    #[allow(clippy::too_many_arguments)]
+    fn judge(
+        &self,
+        b: usize,
+        found: Found,
+        sky: &Sky<'_>,
+        free: &[bool],
+        anchors: &[Anchor],
+        window: Option<&Forecast>,
+        limit: f64,
+        open: &mut [bool],
+    ) -> Option<Sighting> {
+        let link = &self.mechanism.links[b];
+        let mut sightings = found.sightings.into_iter();
+        let best = sightings.next()?;
+        let chance = self.chance(b, &best, found.trials, sky, free, anchors, window);
+        let least = if best.support > 2 { best.support - 1 } else { best.support };
+        let rivals: Vec<Sighting> = sightings
+            .take_while(|s| s.support >= least)
+            .filter(|s| {
+                link.template
+                    .iter()
+                    .any(|&t| (place(&s.fit.pose, t) - place(&best.fit.pose, t)).norm() > SAME_POSE_PX)
+            })
+            .collect();
+        if chance < limit && rivals.is_empty() {
+            return Some(best);
+        }
+        for s in rivals.iter().chain([&best]) {
+            for (o, p) in open.iter_mut().zip(&s.picks) {
+                *o |= p.is_some();
+            }
+        }
+        None
+    }
+
+    /// Expected number of sightings as good as this that chance alone would give.
+    #[allow(clippy::too_many_arguments)]
+    fn chance(
+        &self,
+        b: usize,
+        s: &Sighting,
+        trials: usize,
+        sky: &Sky<'_>,
+        free: &[bool],
+        anchors: &[Anchor],
+        window: Option<&Forecast>,
+    ) -> f64 {
+        let link = &self.mechanism.links[b];
+        let n = link.nodes.len();
+        let others = free.iter().filter(|&&f| f).count().saturating_sub(s.support) as f64;
+        let from = anchors.first().map_or(Vector2::zeros(), |a| a.local);
+        let reach = link.reach_px(from).max(30.0);
+        let density = others.max(self.habits.clutter) / (std::f64::consts::PI * reach * reach);
+        let sigma = s
+            .picks
+            .iter()
+            .enumerate()
+            .filter_map(|(j, d)| d.map(|d| f64::from(sky.get(d).sigma_px).hypot(link.slack_px[j])))
+            .fold(0.0, f64::max)
+            .hypot(self.habits.floor_px);
+        let radius = REACH_SIGMA * sigma;
+        let hit = (density * std::f64::consts::PI * radius * radius).min(1.0);
+        let base = if anchors.len() >= 2 {
+            0
+        } else if anchors.len() == 1 {
+            1
+        } else {
+            2
+        };
+        let turn = window.map_or(std::f64::consts::PI, |w| w.angle_rad.min(std::f64::consts::PI));
+        let gate = window.map_or(f64::INFINITY, |w| w.origin_px + w.angle_rad * reach + radius);
+        if s.support > base {
+            let k = s.support - base;
+            return trials as f64 * choose(n.saturating_sub(base).max(k), k) * hit.powi(k as i32);
+        }
+        match base {
+            // One node on its circle about the anchor; half hidden it would not show, so it must be expected
+            // within what it may be off.
+            1 if n > 1 && turn * reach > LONE_GATE_PX => f64::INFINITY,
+            1 => n as f64 * density * 4.0 * radius * reach * turn,
+            // One or two nodes of a body that hangs on nothing.
+            _ if s.support == 1 => {
+                if n == 1 {
+                    density * std::f64::consts::PI * gate * gate
+                } else {
+                    f64::INFINITY
+                }
+            }
+            _ => {
+                let pairs = (n * (n - 1) / 2) as f64;
+                pairs * (density * std::f64::consts::PI * gate * gate) * density * 4.0 * radius * gate
+            }
+        }
+    }
+}
+
+fn accepted(s: Sighting, n: usize) -> BodySeen {
+    BodySeen { fit: Some(s.fit), picks: s.picks, open: vec![false; n] }
+}
+
+fn choose(n: usize, k: usize) -> f64 {
+    (0..k).map(|i| (n - i) as f64 / (i + 1) as f64).product()
+}
+
+/// The least turn of a body, about its first joint if it has one, that lays two of its nodes (three where it
+/// hangs on nothing) on places of nodes again; infinite if there is none.
+fn likeness(mechanism: &Mechanism, habits: &Habits, body: usize) -> f64 {
+    let link = &mechanism.links[body];
+    let stars: Vec<Detection> = link
+        .template
+        .iter()
+        .map(|t| Detection { x_px: t.x, y_px: t.y, sigma_px: 0.05, flags: Flags(0), ..Default::default() })
+        .collect();
+    let anchors: Vec<Anchor> = mechanism
+        .hinges
+        .iter()
+        .filter(|h| h.body == body)
+        .take(1)
+        .map(|h| Anchor { local: h.local, place: h.local, sigma_px: h.sigma_px })
+        .collect();
+    let least = if anchors.is_empty() { 3 } else { 2 };
+    let sky = Sky::new(&stars);
+    let free = vec![true; stars.len()];
+    let search = Search {
+        link,
+        anchors: &anchors,
+        sky: &sky,
+        free: &free,
+        window: None,
+        reach_sigma: REACH_SIGMA,
+        floor_px: habits.floor_px,
+    };
+    search
+        .run()
+        .sightings
+        .iter()
+        .filter(|s| s.support >= least)
+        .filter(|s| s.picks.iter().enumerate().any(|(j, p)| p.is_some_and(|p| p != j)))
+        .map(|s| s.fit.pose.rotation.angle().abs())
+        .fold(f64::INFINITY, f64::min)
+}
+
+/// The observations of one frame, in the order of the rig's nodes.
+pub fn observations(mechanism: &Mechanism, seen: &[BodySeen], sky: &[Detection]) -> Vec<Observation> {
+    let mut out = vec![Observation::MISSING; mechanism.nodes];
+    for (link, s) in mechanism.links.iter().zip(seen) {
+        for (j, &node) in link.nodes.iter().enumerate() {
+            if let Some(Some(d)) = s.picks.get(j) {
+                let d = &sky[*d];
+                out[node] = Observation {
+                    x_px: d.x_px,
+                    y_px: d.y_px,
+                    sigma_px: d.sigma_px,
+                    area_px: d.area_px,
+                    status: Status::Seen,
+                };
+            } else if s.open.get(j) == Some(&true) {
+                out[node].status = Status::Ambiguous;
+            }
+        }
+    }
+    out
+}
+
+/// Marks the first frame in which a node is seen again.
+#[derive(Debug, Clone)]
+pub struct Returns {
+    /// For each node whether it was seen before, and whether in the last frame.
+    past: Vec<(bool, bool)>,
+}
+
+impl Returns {
+    /// No frame yet.
+    pub fn new(nodes: usize) -> Self {
+        Self { past: vec![(false, false); nodes] }
+    }
+
+    /// Marks one frame's nodes; frames must come in order.
+    pub fn mark(&mut self, row: &mut [Observation]) {
+        for (o, (ever, last)) in row.iter_mut().zip(&mut self.past) {
+            let now = o.status == Status::Seen;
+            if now && *ever && !*last {
+                o.status = Status::Reacquired;
+            }
+            *ever |= now;
+            *last = now;
+        }
+    }
+}
+
+/// Follows the nodes of a given rig through a live recording, frame by frame. Nothing is filled in later.
+#[derive(Debug, Clone)]
+pub struct Tracker {
+    engine: Engine,
+    returns: Returns,
+    last: Option<FrameStamp>,
+}
+
+impl Tracker {
+    /// A tracker for a checked rig.
+    ///
+    /// # Errors
+    /// [`Error::Rig`] where the rig is not valid.
+    pub fn new(rig: &Rig) -> Result<Self> {
+        rig.check("rig")?;
+        let mechanism = Mechanism::new(rig, 0.3);
+        let habits = Habits::unknown(&mechanism, 0.05);
+        let returns = Returns::new(mechanism.nodes);
+        Ok(Self { engine: Engine::new(mechanism, habits), returns, last: None })
+    }
+
+    /// The nodes in the next frame, in the rig's order.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] if the frame does not come after the one before it.
+    pub fn step(&mut self, stamp: &FrameStamp, detections: &[Detection]) -> Result<Vec<Observation>> {
+        if let Some(last) = self.last
+            && stamp.index <= last.index
+        {
+            return Err(Error::Argument(
+                Fault::new(
+                    "Tracker::step",
+                    format!("frame {} comes after frame {}", stamp.index, last.index),
+                )
+                .advice("Give frames in the order of recording"),
+            ));
+        }
+        self.last = Some(*stamp);
+        let sky = Sky::new(detections);
+        let seen = self.engine.step(stamp.index as f64, &sky, None);
+        let mut row = observations(&self.engine.mechanism, &seen, detections);
+        self.returns.mark(&mut row);
+        Ok(row)
+    }
+}
