@@ -141,12 +141,12 @@ impl Search<'_> {
         // Last test, at the fitted pose and with its own uncertainty no excuse.
         let mut chi2 = 0.0;
         let mut support = 0;
-        for j in 0..n {
-            if let Some(d) = picks[j] {
+        for (j, pick) in picks.iter_mut().enumerate() {
+            if let Some(d) = *pick {
                 let r = (place(&fit.pose, self.link.template[j]) - self.sky.place(d)).norm();
                 let s = self.sigma(j, d);
                 if r > self.reach_sigma * s {
-                    picks[j] = None;
+                    *pick = None;
                 } else if self.sky.whole(d) {
                     support += 1;
                     chi2 += (r / s).powi(2);
@@ -250,7 +250,7 @@ impl Search<'_> {
                 }
             }
         } else {
-            self.from_pairs(&mut found);
+            self.by_pairs(&mut found);
         }
         found.sightings.sort_by(|a, b| b.support.cmp(&a.support).then(a.chi2.total_cmp(&b.chi2)));
         found
@@ -266,7 +266,7 @@ impl Search<'_> {
     }
 
     /// Poses from two nodes: every pair of detections at the distance of a pair of nodes.
-    fn from_pairs(&self, found: &mut Found) {
+    fn by_pairs(&self, found: &mut Found) {
         /// Pairs of nodes tried, the longest first: they turn least with noise.
         const PAIRS: usize = 60;
         let link = self.link;

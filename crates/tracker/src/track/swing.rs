@@ -141,10 +141,11 @@ impl Swing {
             let mut seen = Vec::new();
             for (i, &p) in places.iter().enumerate() {
                 let low = i >= self.upper.len();
-                let mut whole = !(self.late.0.contains(&i) && k < self.late.1)
-                    && !inside(k, &self.black)
-                    && !(low && inside(k, &self.hidden))
-                    && rng.random::<f64>() >= self.lost;
+                let gone = (self.late.0.contains(&i) && k < self.late.1)
+                    || inside(k, &self.black)
+                    || (low && inside(k, &self.hidden))
+                    || rng.random::<f64>() < self.lost;
+                let mut whole = !gone;
                 let mut bias = Vector2::zeros();
                 let mut flags = Flags(0);
                 if low && self.behind && whole {
