@@ -11,6 +11,7 @@
 //! ticks with a time base until they are written.
 
 pub mod detect;
+pub mod discover;
 pub mod error;
 pub mod film;
 pub mod frame;

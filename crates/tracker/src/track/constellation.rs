@@ -61,6 +61,8 @@ pub struct Search<'a> {
     pub reach_sigma: f64,
     /// Added to every detection's uncertainty in square, px.
     pub floor_px: f64,
+    /// Pairs of nodes from which a free pose is sought, the longest first: they turn least with noise.
+    pub pairs: usize,
 }
 
 fn turned(a: f64) -> f64 {
@@ -267,8 +269,6 @@ impl Search<'_> {
 
     /// Poses from two nodes: every pair of detections at the distance of a pair of nodes.
     fn by_pairs(&self, found: &mut Found) {
-        /// Pairs of nodes tried, the longest first: they turn least with noise.
-        const PAIRS: usize = 60;
         let link = self.link;
         let n = link.nodes.len();
         let mut spans: Vec<(f64, usize, usize)> = Vec::new();
@@ -278,7 +278,7 @@ impl Search<'_> {
             }
         }
         spans.sort_by(|a, b| b.0.total_cmp(&a.0));
-        spans.truncate(PAIRS);
+        spans.truncate(self.pairs);
         let stars: Vec<usize> = (0..self.sky.len()).filter(|&d| self.free[d] && self.sky.whole(d)).collect();
         let mut gaps: Vec<(f64, usize, usize)> = Vec::new();
         for (k, &d) in stars.iter().enumerate() {

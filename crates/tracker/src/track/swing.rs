@@ -298,9 +298,8 @@ pub fn judge(film: &Filmed, rig: &Rig) -> Marks {
     m
 }
 
-#[test]
-fn scenes_with_the_rig_given() {
-    let scenes: Vec<(&str, Swing)> = vec![
+fn scenes() -> Vec<(&'static str, Swing)> {
+    vec![
         ("clean", Swing::default()),
         ("noisy", Swing { noise_px: 0.12, ..Swing::default() }),
         ("glints", Swing { glints: 6.0, lost: 0.01, ..Swing::default() }),
@@ -312,11 +311,21 @@ fn scenes_with_the_rig_given() {
         ("occluded", Swing { hidden: vec![(200, 300), (900, 300), (1500, 300)], ..Swing::default() }),
         ("fast", Swing { fps: 250.0, ..Swing::default() }),
         ("lossy", Swing { lost: 0.3, glints: 3.0, ..Swing::default() }),
-    ];
-    let seeds: u64 = std::env::var("SWING_SEEDS").ok().and_then(|s| s.parse().ok()).unwrap_or(2);
+    ]
+}
+
+/// Seeds of the test; `SWING_SEEDS=1000..1100` for tuning.
+fn seeds() -> std::ops::Range<u64> {
+    let range = std::env::var("SWING_SEEDS").unwrap_or_default();
+    let parse = |s: &str| s.parse::<u64>().ok();
+    range.split_once("..").and_then(|(a, b)| Some(parse(a)?..parse(b)?)).unwrap_or(0..2)
+}
+
+#[test]
+fn scenes_with_the_rig_given() {
     let mut bad = Vec::new();
-    for (name, scene) in &scenes {
-        for seed in 0..seeds {
+    for (name, scene) in &scenes() {
+        for seed in seeds() {
             let film = Swing { seed, ..scene.clone() }.film();
             let m = judge(&film, &film.rig);
             println!(
@@ -336,6 +345,47 @@ fn scenes_with_the_rig_given() {
             };
             if m.wrong > 0 || m.coverage() < least {
                 bad.push((name.to_string(), seed, m));
+            }
+        }
+    }
+    assert!(bad.is_empty(), "{bad:#?}");
+}
+
+/// For each node of `rig` the node of the film's rig it is, by where it is in the reference frame.
+fn identify(film: &Filmed, rig: &Rig) -> Option<Vec<usize>> {
+    let truth = &film.truth[rig.reference_frame? as usize];
+    rig.nodes
+        .iter()
+        .map(|n| truth.iter().position(|(p, _)| (Vector2::new(n.x_px, n.y_px) - p).norm() < 2.0))
+        .collect()
+}
+
+#[test]
+fn rigs_are_discovered() {
+    let mut bad = Vec::new();
+    for (name, scene) in &scenes() {
+        for seed in seeds() {
+            let film = Swing { seed, ..scene.clone() }.film();
+            let found = match crate::discover::discover(&film.store, [1280, 1024]) {
+                Ok(d) => d,
+                Err(e) => {
+                    bad.push(format!("{name} {seed}: {e}"));
+                    continue;
+                }
+            };
+            let who = identify(&film, &found.rig);
+            // Bodies from the pivot outwards, nodes along them: the film's own order.
+            let right = who.as_deref() == Some(&[0, 1, 2, 3, 4, 5, 6, 7, 8])
+                && found.rig.joints.len() == 2
+                && found.rig.bodies.len() == 2;
+            let m = if right { Some(judge(&film, &found.rig)) } else { None };
+            println!(
+                "{name:9} {seed:3} {who:?} {:?} {:?}",
+                found.warnings,
+                m.map(|m| (m.coverage(), m.wrong))
+            );
+            if !right || m.is_none_or(|m| m.wrong > 0) {
+                bad.push(format!("{name} {seed}: {who:?} {:?} {m:?}", found.rig.joints));
             }
         }
     }

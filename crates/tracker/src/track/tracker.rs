@@ -36,6 +36,12 @@ const REACH_SIGMA: f64 = 5.1;
 const CHANCE_EXPECTED: f64 = 2e-3;
 /// The same for a body found elsewhere.
 const CHANCE_ANYWHERE: f64 = 1e-5;
+/// Pairs of nodes from which a free body is sought.
+const PAIRS: usize = 60;
+/// Undecided sightings followed at once.
+const TENTATIVE: usize = 8;
+/// How far a sighting must move for its motion to prove anything, px.
+const PROOF_PX: f64 = 3.0;
 /// How exactly the only node seen of a body must be expected, px.
 const LONE_GATE_PX: f64 = 1.5;
 /// Poses that put every node closer together than this are the same, px.
@@ -78,6 +84,24 @@ impl Habits {
     }
 }
 
+/// A sighting that could be chance, followed until it no longer can be.
+#[derive(Debug, Clone)]
+struct Tentative {
+    motion: Motion,
+    /// Expected number of such by chance, so far.
+    chance: f64,
+    /// Where its nodes were when that was last lowered: what stands still proves nothing.
+    proved: Vec<Vector2<f64>>,
+    missed: u32,
+}
+
+/// What a search says of a body.
+struct Finding {
+    seen: BodySeen,
+    /// Sightings between which nothing decides, each with its expected number by chance.
+    undecided: Vec<(Sighting, f64)>,
+}
+
 /// Follows bodies through frames in either direction of time.
 #[derive(Debug, Clone)]
 pub struct Engine {
@@ -87,6 +111,8 @@ pub struct Engine {
     pub habits: Habits,
     /// The last poses of each body.
     pub motions: Vec<Motion>,
+    /// For each body sightings that may be it and wait for their motion to decide.
+    tentative: Vec<Vec<Tentative>>,
     /// For each body the least turn that maps it on itself as far as two nodes, rad.
     likeness: Vec<f64>,
 }
@@ -96,7 +122,8 @@ impl Engine {
     pub fn new(mechanism: Mechanism, habits: Habits) -> Self {
         let motions = vec![Motion::default(); mechanism.links.len()];
         let likeness = (0..mechanism.links.len()).map(|b| likeness(&mechanism, &habits, b)).collect();
-        Self { mechanism, habits, motions, likeness }
+        let tentative = vec![Vec::new(); mechanism.links.len()];
+        Self { mechanism, habits, motions, tentative, likeness }
     }
 
     /// Points of a body known from the ground and from bodies whose pose is known.
@@ -142,6 +169,8 @@ impl Engine {
             }
         }
         let given: Vec<bool> = seen.iter().map(|s| s.fit.is_some()).collect();
+        let mut undecided: Vec<Vec<(Sighting, f64)>> = (0..n).map(|_| Vec::new()).collect();
+        let mut settled = vec![false; n];
         // Twice: a body that was found can hold its neighbours.
         for round in 0..2 {
             for k in 0..n {
@@ -154,22 +183,135 @@ impl Engine {
                     continue;
                 }
                 let got = self.find(b, time, sky, &free, &anchors);
-                for d in got.picks.iter().flatten() {
+                if got.seen.fit.is_some() || seen[b].picks.is_empty() || round == 1 {
+                    seen[b] = got.seen;
+                    undecided[b] = got.undecided;
+                }
+                for d in seen[b].picks.iter().flatten() {
                     free[*d] = false;
                 }
-                if got.fit.is_some() || seen[b].picks.is_empty() || round == 1 {
-                    seen[b] = got;
+            }
+        }
+        for k in 0..n {
+            let b = self.mechanism.order[k];
+            if seen[b].fit.is_some() {
+                self.tentative[b].clear();
+                continue;
+            }
+            let anchors = self.anchors(b, &seen);
+            let waiting = std::mem::take(&mut undecided[b]);
+            if let Some(s) = self.follow(b, time, sky, &free, &anchors, waiting) {
+                for d in s.picks.iter().flatten() {
+                    free[*d] = false;
                 }
+                seen[b] = accepted(s, self.mechanism.links[b].nodes.len());
+                settled[b] = true;
             }
         }
         for b in 0..n {
             if let Some(f) = &seen[b].fit
                 && !given[b]
+                && !settled[b]
             {
                 self.motions[b].add(time, f);
             }
         }
         seen
+    }
+
+    /// Carries on the sightings of a body that nothing decided yet, and begins new ones; the one that stands, if
+    /// now one does.
+    fn follow(
+        &mut self,
+        b: usize,
+        time: f64,
+        sky: &Sky<'_>,
+        free: &[bool],
+        anchors: &[Anchor],
+        undecided: Vec<(Sighting, f64)>,
+    ) -> Option<Sighting> {
+        let link = &self.mechanism.links[b];
+        let mut now: Vec<Option<Sighting>> = Vec::new();
+        let mut kept: Vec<Tentative> = Vec::new();
+        for mut t in std::mem::take(&mut self.tentative[b]) {
+            let Some(mut w) = t.motion.forecast(time, self.habits.floor[b], self.habits.first[b]) else {
+                continue;
+            };
+            if let Some(a) = anchors.first() {
+                w.pose = hung_at(&w.pose, a.local, a.place);
+                w.origin_px = 0.0;
+            }
+            let search = self.search(b, sky, free, anchors, Some(w));
+            let found = search.run();
+            let mut open = vec![false; link.nodes.len()];
+            let trials = found.trials;
+            let single = self.judge(b, found, sky, free, anchors, Some(&w), f64::INFINITY, &mut open);
+            match single {
+                Ok(s) => {
+                    let chance = self.chance(b, &s, trials, sky, free, anchors, Some(&w)).min(1.0);
+                    let places = link.places(&s.fit.pose);
+                    let moved = places.iter().zip(&t.proved).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+                    // The first step only gives the rate: it proves nothing. Nor does what stands still.
+                    if moved > PROOF_PX && t.motion.depth() >= 2 {
+                        t.chance *= chance;
+                        t.proved = places;
+                    }
+                    t.motion.add(time, &s.fit);
+                    t.missed = 0;
+                    kept.push(t);
+                    now.push(Some(s));
+                }
+                Err(_) => {
+                    t.missed += 1;
+                    if t.missed <= 3 {
+                        kept.push(t);
+                        now.push(None);
+                    }
+                }
+            }
+        }
+        for (s, chance) in undecided {
+            let same = now.iter().flatten().any(|o| o.picks == s.picks);
+            if !same && kept.len() < TENTATIVE {
+                let mut motion = Motion::default();
+                motion.add(time, &s.fit);
+                let proved = link.places(&s.fit.pose);
+                kept.push(Tentative { motion, chance: chance.min(1e3), proved, missed: 0 });
+                now.push(Some(s));
+            }
+        }
+        // One that is beyond chance stands if all others are gone.
+        let alive = now.iter().flatten().count();
+        let result = (0..kept.len())
+            .find(|&k| kept[k].chance < CHANCE_ANYWHERE && now[k].is_some())
+            .filter(|_| alive == 1 && kept.len() == 1)
+            .and_then(|k| now[k].clone().map(|s| (k, s)));
+        if let Some((k, s)) = result {
+            self.motions[b] = kept.swap_remove(k).motion;
+            return Some(s);
+        }
+        self.tentative[b] = kept;
+        None
+    }
+
+    fn search<'a>(
+        &'a self,
+        b: usize,
+        sky: &'a Sky<'a>,
+        free: &'a [bool],
+        anchors: &'a [Anchor],
+        window: Option<Forecast>,
+    ) -> Search<'a> {
+        Search {
+            link: &self.mechanism.links[b],
+            anchors,
+            sky,
+            free,
+            window,
+            reach_sigma: REACH_SIGMA,
+            floor_px: self.habits.floor_px,
+            pairs: PAIRS,
+        }
     }
 
     /// Looks for one body with all others as `known` says.
@@ -183,33 +325,27 @@ impl Engine {
             }
         }
         let anchors = self.anchors(b, known);
-        let got = self.find(b, time, sky, &free, &anchors);
+        let got = self.find(b, time, sky, &free, &anchors).seen;
         if let Some(f) = &got.fit {
             self.motions[b].add(time, f);
         }
         got
     }
 
-    fn find(&self, b: usize, time: f64, sky: &Sky<'_>, free: &[bool], anchors: &[Anchor]) -> BodySeen {
-        let link = &self.mechanism.links[b];
-        let n = link.nodes.len();
-        let nothing = BodySeen { fit: None, picks: vec![None; n], open: vec![false; n] };
-        if sky.is_empty() {
-            return nothing;
-        }
+    fn find(&self, b: usize, time: f64, sky: &Sky<'_>, free: &[bool], anchors: &[Anchor]) -> Finding {
+        let n = self.mechanism.links[b].nodes.len();
+        let nothing = |open: Vec<bool>| BodySeen { fit: None, picks: vec![None; n], open };
         let mut open = vec![false; n];
+        if sky.is_empty() {
+            return Finding { seen: nothing(open), undecided: Vec::new() };
+        }
+        let stands = |s: Sighting| Finding { seen: accepted(s, n), undecided: Vec::new() };
         let forecast = self.forecast(b, time, anchors);
-        let mut search = Search {
-            link,
-            anchors,
-            sky,
-            free,
-            window: forecast,
-            reach_sigma: REACH_SIGMA,
-            floor_px: self.habits.floor_px,
-        };
-        if let Some(w) = forecast.filter(|w| w.angle_rad < std::f64::consts::PI) {
+        // A body of one node that hangs on nothing has no angle to be lost.
+        let single = n == 1 && anchors.is_empty();
+        if let Some(w) = forecast.filter(|w| single || w.angle_rad < std::f64::consts::PI) {
             // The usual case: every node near its expected place, and no other turn can look like it.
+            let search = self.search(b, sky, free, anchors, Some(w));
             let about = anchors.first().map_or(Vector2::zeros(), |a| a.local);
             if 2.0 * w.angle_rad < self.likeness[b]
                 && let Some(s) = search.grow(w.pose, about, w.angle_rad)
@@ -217,27 +353,26 @@ impl Engine {
                 && s.support >= 2
                 && self.chance(b, &s, 1, sky, free, anchors, Some(&w)) < CHANCE_ANYWHERE
             {
-                return accepted(s, n);
+                return stands(s);
             }
-            let found = search.run();
-            match self.judge(b, found, sky, free, anchors, Some(&w), CHANCE_EXPECTED, &mut open) {
-                Some(s) => return accepted(s, n),
-                None if open.iter().any(|&o| o) && n == 1 => return BodySeen { open, ..nothing },
-                None => {}
-            }
-            if n == 1 {
-                return nothing;
+            match self.judge(b, search.run(), sky, free, anchors, Some(&w), CHANCE_EXPECTED, &mut open) {
+                Ok(s) => return stands(s),
+                // What is open where it is expected is not looked for elsewhere.
+                Err(undecided) if single || (n == 1 && !undecided.is_empty()) => {
+                    return Finding { seen: nothing(open), undecided };
+                }
+                Err(_) => {}
             }
         }
-        search.window = None;
-        let found = search.run();
-        match self.judge(b, found, sky, free, anchors, None, CHANCE_ANYWHERE, &mut open) {
-            Some(s) => accepted(s, n),
-            None => BodySeen { open, ..nothing },
+        let search = self.search(b, sky, free, anchors, None);
+        match self.judge(b, search.run(), sky, free, anchors, None, CHANCE_ANYWHERE, &mut open) {
+            Ok(s) => stands(s),
+            Err(undecided) => Finding { seen: nothing(open), undecided },
         }
     }
 
-    /// The sighting that stands, if one does; else marks the nodes that something seen may be.
+    /// The sighting that stands, if one does; else those between which nothing decides, and marks on the nodes
+    /// that something seen may be.
     #[allow(clippy::too_many_arguments)]
     fn judge(
         &self,
@@ -249,10 +384,10 @@ impl Engine {
         window: Option<&Forecast>,
         limit: f64,
         open: &mut [bool],
-    ) -> Option<Sighting> {
+    ) -> std::result::Result<Sighting, Vec<(Sighting, f64)>> {
         let link = &self.mechanism.links[b];
         let mut sightings = found.sightings.into_iter();
-        let best = sightings.next()?;
+        let Some(best) = sightings.next() else { return Err(Vec::new()) };
         let chance = self.chance(b, &best, found.trials, sky, free, anchors, window);
         let least = if best.support > 2 { best.support - 1 } else { best.support };
         let rivals: Vec<Sighting> = sightings
@@ -264,14 +399,15 @@ impl Engine {
             })
             .collect();
         if chance < limit && rivals.is_empty() {
-            return Some(best);
+            return Ok(best);
         }
-        for s in rivals.iter().chain([&best]) {
+        let undecided: Vec<(Sighting, f64)> = rivals.into_iter().chain([best]).map(|s| (s, chance)).collect();
+        for (s, _) in &undecided {
             for (o, p) in open.iter_mut().zip(&s.picks) {
                 *o |= p.is_some();
             }
         }
-        None
+        Err(undecided)
     }
 
     /// Expected number of sightings as good as this that chance alone would give.
@@ -370,6 +506,7 @@ fn likeness(mechanism: &Mechanism, habits: &Habits, body: usize) -> f64 {
         window: None,
         reach_sigma: REACH_SIGMA,
         floor_px: habits.floor_px,
+        pairs: PAIRS,
     };
     search
         .run()

@@ -1,0 +1,180 @@
+//! Joints between bodies, their order from the pivot outwards, and names.
+//!
+//! Owns: [`Found`], [`arrange`]. Must not: look for bodies.
+
+use nalgebra::{Isometry2, Vector2};
+
+use crate::rig::{Body, Joint, Node, RIG_SCHEMA, Rig};
+use crate::track::joints::{Shared, Turning};
+use crate::track::mechanism::Link;
+use crate::track::rigid::place;
+
+/// A body and its pose in each frame of the sample.
+#[derive(Debug, Clone)]
+pub struct Found {
+    /// Nodes in its own coordinates.
+    pub link: Link,
+    /// Pose per frame of the sample.
+    pub poses: Vec<Option<Isometry2<f64>>>,
+}
+
+/// Two points agree on a joint within this, px, and this part of the body's reach.
+const JOINT_PX: f64 = 1.0;
+const JOINT_PART: f64 = 0.01;
+
+struct Held {
+    /// Body, or `None` for the ground.
+    on: Option<usize>,
+    /// In the body's own coordinates.
+    local: Vector2<f64>,
+    /// In the coordinates of `on`.
+    there: Vector2<f64>,
+}
+
+fn joint(a: &Found, b: Option<&Found>) -> Option<Turning> {
+    let mut sums = Shared::default();
+    for (f, pose) in a.poses.iter().enumerate() {
+        let Some(pose) = pose else { continue };
+        match b {
+            None => sums.add(pose, &Isometry2::identity()),
+            Some(b) => {
+                if let Some(other) = &b.poses[f] {
+                    sums.add(pose, other);
+                }
+            }
+        }
+    }
+    let t = sums.solve()?;
+    let reach = a.link.reach_px(t.first).max(b.map_or(0.0, |b| b.link.reach_px(t.second)));
+    (t.rms_px < JOINT_PX.max(JOINT_PART * reach)).then_some(t)
+}
+
+/// The rig of the bodies: joints found, bodies ordered and named, nodes ordered along them, placed as in frame
+/// `reference` of the sample.
+pub fn arrange(found: &[Found], reference: usize, reference_frame: Option<u64>, image_px: [u32; 2]) -> Rig {
+    let n = found.len();
+    // What each body hangs on: the ground first, then bodies already hung.
+    let mut held: Vec<Option<Held>> = (0..n).map(|_| None).collect();
+    let mut order: Vec<usize> = Vec::new();
+    let mut ground: Vec<(f64, usize, Turning)> =
+        (0..n).filter_map(|b| joint(&found[b], None).map(|t| (t.rms_px, b, t))).collect();
+    ground.sort_by(|a, b| a.0.total_cmp(&b.0));
+    for (_, b, t) in ground {
+        held[b] = Some(Held { on: None, local: t.first, there: t.second });
+        order.push(b);
+    }
+    if order.is_empty() && n > 0 {
+        // Nothing stays: the body with most nodes leads.
+        let lead = (0..n).max_by_key(|&b| (found[b].link.nodes.len(), std::cmp::Reverse(b))).unwrap_or(0);
+        order.push(lead);
+    }
+    loop {
+        let mut best: Option<(f64, usize, usize, Turning)> = None;
+        for b in (0..n).filter(|b| !order.contains(b)) {
+            for &o in &order {
+                if let Some(t) = joint(&found[b], Some(&found[o]))
+                    && best.as_ref().is_none_or(|x| t.rms_px < x.0)
+                {
+                    best = Some((t.rms_px, b, o, t));
+                }
+            }
+        }
+        match best {
+            Some((_, b, o, t)) => {
+                held[b] = Some(Held { on: Some(o), local: t.first, there: t.second });
+                order.push(b);
+            }
+            None => match (0..n).find(|b| !order.contains(b)) {
+                Some(b) => order.push(b),
+                None => break,
+            },
+        }
+    }
+    let hung = order.iter().filter(|&&b| held[b].is_some()).count();
+    let names: Vec<String> = order
+        .iter()
+        .enumerate()
+        .map(|(k, _)| match (n, hung, k) {
+            (2, 2, 0) => "upper".into(),
+            (2, 2, _) => "lower".into(),
+            (_, h, _) if h == n => format!("link{}", k + 1),
+            _ => format!("body{}", k + 1),
+        })
+        .collect();
+    let pose = |b: usize| {
+        found[b]
+            .poses
+            .get(reference)
+            .copied()
+            .flatten()
+            .unwrap_or_else(|| Isometry2::new(found[b].link.home, 0.0))
+    };
+    let mut rig = Rig {
+        schema: RIG_SCHEMA,
+        image_px,
+        reference_frame,
+        region: None,
+        lens: None,
+        bodies: names.iter().map(|name| Body { name: name.clone() }).collect(),
+        nodes: Vec::new(),
+        joints: Vec::new(),
+    };
+    for (k, &b) in order.iter().enumerate() {
+        let link = &found[b].link;
+        // Along the link: from its inner joint to what hangs on it, else to the middle of its nodes.
+        let inner = held[b].as_ref().map(|h| h.local);
+        let outer = (0..n).find_map(|o| held[o].as_ref().filter(|h| h.on == Some(b)).map(|h| h.there));
+        let middle = link.template.iter().sum::<Vector2<f64>>() / link.nodes.len().max(1) as f64;
+        let axis = match (inner, outer) {
+            (Some(i), Some(o)) if (o - i).norm() > 1.0 => o - i,
+            (Some(i), _) if (middle - i).norm() > 1.0 => middle - i,
+            _ => longest(link),
+        };
+        let mut along: Vec<(f64, Vector2<f64>)> =
+            link.template.iter().map(|&t| (axis.dot(&t), place(&pose(b), t))).collect();
+        along.sort_by(|a, b| a.0.total_cmp(&b.0));
+        for (_, p) in along {
+            rig.nodes.push(Node {
+                name: format!("n{}", rig.nodes.len()),
+                body: names[k].clone(),
+                x_px: p.x,
+                y_px: p.y,
+            });
+        }
+    }
+    let mut pivots = 0;
+    for (k, &b) in order.iter().enumerate() {
+        let Some(h) = &held[b] else { continue };
+        let p = place(&pose(b), h.local);
+        let (name, bodies, p) = match h.on {
+            None => {
+                pivots += 1;
+                let name = if pivots == 1 { "pivot".into() } else { format!("pivot{pivots}") };
+                (name, vec![names[k].clone()], h.there)
+            }
+            Some(o) => {
+                let on = order.iter().position(|&x| x == o).unwrap_or(0);
+                // Halfway between what both sides say.
+                let p = (p + place(&pose(o), h.there)) / 2.0;
+                let name = if hung == 2 { "elbow".into() } else { format!("joint{k}") };
+                (name, vec![names[on].clone(), names[k].clone()], p)
+            }
+        };
+        rig.joints.push(Joint { name, bodies, x_px: p.x, y_px: p.y });
+    }
+    rig
+}
+
+fn longest(link: &Link) -> Vector2<f64> {
+    let mut best = Vector2::new(0.0, 1.0);
+    let mut span = 0.0;
+    for (i, a) in link.template.iter().enumerate() {
+        for b in &link.template[i + 1..] {
+            if (b - a).norm() > span {
+                span = (b - a).norm();
+                best = b - a;
+            }
+        }
+    }
+    if best.y < 0.0 { -best } else { best }
+}

@@ -1,0 +1,274 @@
+//! Rigid bodies from the constancy of distances over the whole recording.
+//!
+//! Owns: [`find_bodies`], [`poses`]. Must not: link frames by nearness: a marker may go any way between two of
+//! them, only distances count.
+//!
+//! Between two frames every rigid motion that takes three or more detections to detections is a body, or
+//! several bodies that happen to stand alike. Over many frames only bodies stay together.
+
+use nalgebra::{Isometry2, Vector2};
+
+use super::sample::Sample;
+use crate::detect::Detection;
+use crate::track::constellation::{Search, Sighting};
+use crate::track::mechanism::Link;
+use crate::track::nearest::Sky;
+use crate::track::rigid::place;
+
+/// Frames from which bodies are sought.
+const BASES: usize = 16;
+/// Frames with which each is compared.
+const COMPARED: usize = 120;
+/// Deviations, in standard uncertainties, up to which a distance is the same.
+const REACH_SIGMA: f64 = 4.5;
+/// Unmodelled scatter of a centre, px (codec, lens, bending).
+pub const FLOOR_PX: f64 = 0.06;
+/// Pairs of detections from which motions are sought.
+const PAIRS: usize = 250;
+/// Detections of a frame beyond which it is no base: it is full of glints.
+const CROWD: usize = 120;
+
+fn at(d: &Detection) -> Vector2<f64> {
+    Vector2::new(d.x_px, d.y_px)
+}
+
+/// A body of points in its own coordinates.
+pub fn link_of(points: Vec<Vector2<f64>>, slack_px: f64) -> Link {
+    let home = points.iter().sum::<Vector2<f64>>() / points.len().max(1) as f64;
+    Link {
+        nodes: (0..points.len()).collect(),
+        slack_px: vec![slack_px; points.len()],
+        template: points.iter().map(|p| p - home).collect(),
+        home,
+    }
+}
+
+/// Sightings of a free body in a frame, best first.
+pub fn sightings(link: &Link, sky: &Sky<'_>, free: &[bool], pairs: usize) -> Vec<Sighting> {
+    let search = Search {
+        link,
+        anchors: &[],
+        sky,
+        free,
+        window: None,
+        reach_sigma: REACH_SIGMA,
+        floor_px: FLOOR_PX,
+        pairs,
+    };
+    search.run().sightings
+}
+
+/// Pose of each body in each frame of the sample, where at least three of its nodes are seen and no other pose
+/// explains as many; with the detections that are its nodes.
+pub fn poses(links: &[Link], frame: &[Detection]) -> Vec<Option<Sighting>> {
+    let sky = Sky::new(frame);
+    let mut free = vec![true; sky.len()];
+    let mut out = vec![None; links.len()];
+    let mut order: Vec<usize> = (0..links.len()).collect();
+    order.sort_by_key(|&b| std::cmp::Reverse(links[b].nodes.len()));
+    for b in order {
+        let mut found = sightings(&links[b], &sky, &free, 60).into_iter();
+        let Some(best) = found.next().filter(|s| s.support >= 3) else { continue };
+        let rival = found.take_while(|s| s.support + 1 >= best.support.max(4)).any(|s| {
+            links[b].template.iter().any(|&t| (place(&s.fit.pose, t) - place(&best.fit.pose, t)).norm() > 2.0)
+        });
+        if rival {
+            continue;
+        }
+        for d in best.picks.iter().flatten() {
+            free[*d] = false;
+        }
+        out[b] = Some(best);
+    }
+    out
+}
+
+/// Groups of points of one frame that keep their distances: for each body its points, px.
+fn groups(base: &[Detection], others: &[&[Detection]]) -> Vec<Vec<Vector2<f64>>> {
+    let n = base.len();
+    let link = link_of(base.iter().map(at).collect(), FLOOR_PX);
+    let mut together = vec![0_u32; n * n];
+    let mut both = vec![0_u32; n * n];
+    let mut seen = vec![0_u32; n];
+    for other in others {
+        let sky = Sky::new(other);
+        let mut used_b = vec![false; other.len()];
+        let mut motion: Vec<Option<usize>> = vec![None; n];
+        for (m, s) in sightings(&link, &sky, &vec![true; other.len()], PAIRS).iter().enumerate() {
+            let fresh: Vec<(usize, usize)> = s
+                .picks
+                .iter()
+                .enumerate()
+                .filter_map(|(i, d)| d.map(|d| (i, d)))
+                .filter(|&(i, d)| motion[i].is_none() && !used_b[d])
+                .collect();
+            if s.support < 3 {
+                break;
+            }
+            if fresh.len() < 3 {
+                continue;
+            }
+            for (i, d) in fresh {
+                motion[i] = Some(m);
+                used_b[d] = true;
+            }
+        }
+        for i in 0..n {
+            let Some(mi) = motion[i] else { continue };
+            seen[i] += 1;
+            for j in 0..n {
+                if let Some(mj) = motion[j] {
+                    both[i * n + j] += 1;
+                    together[i * n + j] += u32::from(mi == mj);
+                }
+            }
+        }
+    }
+    let least = (others.len() as u32 / 10).max(4);
+    let mut taken: Vec<bool> = seen.iter().map(|&s| s < least).collect();
+    let mut out = Vec::new();
+    for i in 0..n {
+        if taken[i] {
+            continue;
+        }
+        let members: Vec<usize> = (0..n)
+            .filter(|&j| !taken[j] && both[i * n + j] >= 3 && 2 * together[i * n + j] > both[i * n + j])
+            .collect();
+        if members.len() >= 3 {
+            for &j in &members {
+                taken[j] = true;
+            }
+            out.push(members.iter().map(|&j| at(&base[j])).collect());
+        }
+    }
+    out
+}
+
+/// The bodies of three or more nodes, each in its own coordinates.
+pub fn find_bodies(sample: &Sample) -> Vec<Link> {
+    let m = sample.frames.len();
+    // Bases: the frames with most detections that are not a crowd of glints, spread over the recording.
+    let mut counts: Vec<usize> = sample.moving.iter().map(Vec::len).collect();
+    counts.sort_unstable();
+    let Some(&usual) = counts.get(m / 2) else { return Vec::new() };
+    let mut bases: Vec<usize> = (0..m)
+        .filter(|&f| sample.moving[f].len() >= usual.max(3) && sample.moving[f].len() <= CROWD)
+        .collect();
+    if bases.len() > BASES {
+        bases = (0..BASES).map(|k| bases[k * bases.len() / BASES]).collect();
+    }
+    let compared: Vec<&[Detection]> = (0..m.min(COMPARED))
+        .map(|k| sample.moving[k * m / m.min(COMPARED)].as_slice())
+        .filter(|d| d.len() >= 3)
+        .collect();
+    let mut best: Vec<Vec<Vector2<f64>>> = Vec::new();
+    for &f in &bases {
+        let found = groups(&sample.moving[f], &compared);
+        let size = |g: &[Vec<Vector2<f64>>]| g.iter().map(Vec::len).sum::<usize>();
+        // More nodes; for as many the more bodies: two that stood alike are not one.
+        if (size(&found), found.len()) > (size(&best), best.len()) {
+            best = found;
+        }
+    }
+    let mut links: Vec<Link> = best.into_iter().map(|p| link_of(p, FLOOR_PX)).collect();
+    complete(&mut links, sample);
+    links
+}
+
+/// Adds to each body the points that stay with it in several frames, and drops nodes that are never seen.
+fn complete(links: &mut Vec<Link>, sample: &Sample) {
+    for _ in 0..4 {
+        let mut local: Vec<Vec<Vec<Vector2<f64>>>> =
+            links.iter().map(|l| vec![Vec::new(); l.nodes.len()]).collect();
+        let mut spare: Vec<Vec<(usize, Vector2<f64>)>> = vec![Vec::new(); links.len()];
+        let mut known = vec![0_usize; links.len()];
+        for (f, frame) in sample.moving.iter().enumerate() {
+            let found = poses(links, frame);
+            let mut used = vec![false; frame.len()];
+            for s in found.iter().flatten() {
+                for d in s.picks.iter().flatten() {
+                    used[*d] = true;
+                }
+            }
+            for (b, s) in found.iter().enumerate() {
+                let Some(s) = s else { continue };
+                known[b] += 1;
+                let back: Isometry2<f64> = s.fit.pose.inverse();
+                for (j, d) in s.picks.iter().enumerate() {
+                    if let Some(d) = d {
+                        local[b][j].push(place(&back, at(&frame[*d])));
+                    }
+                }
+                for (d, used) in used.iter().enumerate() {
+                    if !used {
+                        spare[b].push((f, place(&back, at(&frame[d]))));
+                    }
+                }
+            }
+        }
+        let mut changed = false;
+        for (b, link) in links.iter_mut().enumerate() {
+            let mut points: Vec<Vector2<f64>> = Vec::new();
+            for (j, seen) in local[b].iter().enumerate() {
+                if seen.len() * 50 >= known[b] && seen.len() >= 3 {
+                    points.push(middle(seen));
+                } else {
+                    changed = true;
+                    let _ = j;
+                }
+            }
+            let before = points.len();
+            let least = (known[b] / 25).max(6);
+            for p in crowds(&spare[b], least) {
+                if points.iter().all(|q| (p - q).norm() > 3.0) {
+                    points.push(p);
+                }
+            }
+            changed |= points.len() != before;
+            *link = link_of(points, FLOOR_PX);
+        }
+        links.retain(|l| l.nodes.len() >= 3);
+        if !changed {
+            return;
+        }
+    }
+}
+
+/// Coordinate-wise median.
+pub fn middle(points: &[Vector2<f64>]) -> Vector2<f64> {
+    let mut x: Vec<f64> = points.iter().map(|p| p.x).collect();
+    let mut y: Vec<f64> = points.iter().map(|p| p.y).collect();
+    x.sort_by(f64::total_cmp);
+    y.sort_by(f64::total_cmp);
+    Vector2::new(x[x.len() / 2], y[y.len() / 2])
+}
+
+/// Places to which points of at least `least` frames come.
+fn crowds(points: &[(usize, Vector2<f64>)], least: usize) -> Vec<Vector2<f64>> {
+    const NEAR_PX: f64 = 0.8;
+    let stars: Vec<Detection> =
+        points.iter().map(|p| Detection { x_px: p.1.x, y_px: p.1.y, ..Default::default() }).collect();
+    let sky = Sky::new(&stars);
+    let mut near = Vec::new();
+    let mut taken = vec![false; points.len()];
+    let mut out = Vec::new();
+    // Strided seeds: a crowd of many frames is met by one of them.
+    let step = (points.len() / 3000).max(1);
+    for k in (0..points.len()).step_by(step) {
+        if taken[k] {
+            continue;
+        }
+        sky.within(points[k].1, NEAR_PX, &mut near);
+        let mut frames: Vec<usize> = near.iter().map(|&i| points[i].0).collect();
+        frames.dedup();
+        if frames.len() >= least {
+            let centre = middle(&near.iter().map(|&i| points[i].1).collect::<Vec<_>>());
+            sky.within(centre, 4.0 * NEAR_PX, &mut near);
+            for &i in &near {
+                taken[i] = true;
+            }
+            out.push(centre);
+        }
+    }
+    out
+}

@@ -1,0 +1,120 @@
+//! The rig of a recording, found in its detections: nodes, bodies, joints, reference frame.
+//!
+//! Owns: [`discover`], [`Discovery`]. Must not: name markers frame by frame (`track` does), or look at pixels.
+
+mod arrange;
+mod bodies;
+mod lone;
+mod sample;
+
+use nalgebra::Vector2;
+
+use crate::error::{Error, Fault, Result};
+use crate::rig::Rig;
+use crate::store::DetectionStore;
+use crate::track::rigid::place;
+use arrange::Found;
+use sample::Sample;
+
+/// A rig and what a user should know of it.
+#[derive(Debug, Clone)]
+pub struct Discovery {
+    /// The rig.
+    pub rig: Rig,
+    /// Places that stand still and belong to no body: a ruler, a screw. px.
+    pub standing: Vec<[f64; 2]>,
+    /// What a user should know, a sentence each.
+    pub warnings: Vec<String>,
+}
+
+/// Finds the rig of a recording of `image_px` (width, height) pixels.
+///
+/// # Errors
+/// [`Error::Rig`] if there are no markers or none moves.
+pub fn discover(store: &DetectionStore, image_px: [u32; 2]) -> Result<Discovery> {
+    let sample = Sample::take(store);
+    if sample.frames.is_empty() {
+        return Err(Error::Rig(
+            Fault::new("recording", "no markers are seen in any frame")
+                .advice("Look at a frame and set --threshold or --polarity"),
+        ));
+    }
+    let mut warnings = Vec::new();
+    if sample.at_rest {
+        return Err(Error::Rig(
+            Fault::new("recording", "nothing moves, so bodies cannot be told apart")
+                .advice("Give a rig with --rig, or a longer recording"),
+        ));
+    }
+    let links = bodies::find_bodies(&sample);
+    let mut found: Vec<Found> = links
+        .into_iter()
+        .map(|link| Found { link, poses: Vec::with_capacity(sample.frames.len()) })
+        .collect();
+    let links: Vec<_> = found.iter().map(|f| f.link.clone()).collect();
+    for frame in &sample.moving {
+        for (f, s) in found.iter_mut().zip(bodies::poses(&links, frame)) {
+            f.poses.push(s.map(|s| s.fit.pose));
+        }
+    }
+    let mut standing = sample.standing.clone();
+    if found.is_empty() {
+        found = lone::find_lone(store, &sample, &mut standing);
+    }
+    if found.is_empty() {
+        return Err(Error::Rig(
+            Fault::new("recording", "no marker can be followed")
+                .advice("Look at the picture of `tracker setup`, or give a rig with --rig"),
+        ));
+    }
+    let (reference, whole) = reference(&sample, &found, image_px);
+    if !whole {
+        warnings.push(
+            "no frame shows every marker: their places are put together from several frames".to_string(),
+        );
+    }
+    let index = store.stamp(sample.frames[reference]).index;
+    let rig = arrange::arrange(&found, reference, Some(index), image_px);
+    rig.check("discovered rig")?;
+    if !standing.is_empty() {
+        let n = standing.len();
+        warnings.push(format!(
+            "{n} bright place{} stand{} still and belong{} to no body",
+            if n == 1 { "" } else { "s" },
+            if n == 1 { "s" } else { "" },
+            if n == 1 { "s" } else { "" },
+        ));
+    }
+    Ok(Discovery { rig, standing: standing.iter().map(|p| [p.x, p.y]).collect(), warnings })
+}
+
+/// The frame of the sample in which most nodes are seen, the first of those, and whether it shows all.
+fn reference(sample: &Sample, found: &[Found], image_px: [u32; 2]) -> (usize, bool) {
+    let [w, h] = image_px.map(f64::from);
+    let inside = |p: Vector2<f64>| p.x > 0.0 && p.y > 0.0 && p.x < w - 1.0 && p.y < h - 1.0;
+    let all: usize = found.iter().map(|f| f.link.nodes.len()).sum();
+    let mut best = (0, 0);
+    for (k, frame) in sample.moving.iter().enumerate() {
+        let sky = crate::track::nearest::Sky::new(frame);
+        let mut seen = 0;
+        for f in found {
+            let Some(pose) = &f.poses[k] else { continue };
+            for &t in &f.link.template {
+                let p = place(pose, t);
+                if !inside(p) {
+                    // A node outside the image cannot be written into a rig.
+                    seen = 0;
+                    break;
+                }
+                seen += usize::from(sky.nearest(p, 1.5).is_some_and(|(d, _)| sky.whole(d)));
+            }
+        }
+        if found.iter().all(|f| f.poses[k].is_some()) && seen > best.1 {
+            best = (k, seen);
+        }
+        if best.1 == all {
+            break;
+        }
+    }
+    (best.0, best.1 == all)
+}

@@ -1,0 +1,111 @@
+//! Frames that differ from each other, and what stands still in them.
+//!
+//! Owns: [`Sample`]. Must not: know of bodies.
+
+use nalgebra::Vector2;
+
+use crate::detect::Detection;
+use crate::store::DetectionStore;
+use crate::track::nearest::Sky;
+
+/// Frames looked at, at most.
+const FRAMES: usize = 3000;
+/// Frames kept, at most.
+const KEPT: usize = 400;
+/// Below this a place has not changed, px.
+const SAME_PLACE_PX: f64 = 1.5;
+/// Part of the kept frames in which a standing point is seen at least.
+const STANDING_PART: f64 = 0.6;
+
+/// Frames of a recording that differ, with their moving detections.
+#[derive(Debug, Default)]
+pub struct Sample {
+    /// Indices in the store.
+    pub frames: Vec<usize>,
+    /// For each frame the detections that do not stand still.
+    pub moving: Vec<Vec<Detection>>,
+    /// Places that stay, px.
+    pub standing: Vec<Vector2<f64>>,
+    /// Whether all frames look alike.
+    pub at_rest: bool,
+}
+
+fn at(d: &Detection) -> Vector2<f64> {
+    Vector2::new(d.x_px, d.y_px)
+}
+
+impl Sample {
+    /// Looks through a recording.
+    pub fn take(store: &DetectionStore) -> Self {
+        let n = store.len();
+        let mut all: Vec<(usize, Vec<Detection>)> = Vec::new();
+        let mut scratch = Vec::new();
+        for k in 0..n.min(FRAMES) {
+            let i = if n <= FRAMES { k } else { (k as u128 * n as u128 / FRAMES as u128) as usize };
+            store.read(i, &mut scratch);
+            if scratch.is_empty() {
+                continue;
+            }
+            if let Some((_, last)) = all.last() {
+                let sky = Sky::new(last);
+                let moved = scratch.iter().filter(|d| sky.nearest(at(d), SAME_PLACE_PX).is_none()).count();
+                // Noise and a glint make no new frame; a single mover among standing points does.
+                if moved == 0 {
+                    continue;
+                }
+            }
+            all.push((i, scratch.clone()));
+        }
+        let m = all.len();
+        let kept: Vec<(usize, Vec<Detection>)> = if m <= KEPT {
+            all
+        } else {
+            let mut keep = vec![false; m];
+            for k in 0..KEPT {
+                keep[k * m / KEPT] = true;
+            }
+            all.into_iter().zip(keep).filter(|(_, k)| *k).map(|(f, _)| f).collect()
+        };
+        let mut sample = Self { at_rest: kept.len() < 5, ..Self::default() };
+        if !sample.at_rest {
+            sample.standing = standing(&kept);
+        }
+        let still: Vec<Detection> = sample
+            .standing
+            .iter()
+            .map(|p| Detection { x_px: p.x, y_px: p.y, ..Default::default() })
+            .collect();
+        let sky = Sky::new(&still);
+        for (i, detections) in kept {
+            sample.frames.push(i);
+            sample.moving.push(
+                detections.into_iter().filter(|d| sky.nearest(at(d), SAME_PLACE_PX).is_none()).collect(),
+            );
+        }
+        sample
+    }
+}
+
+/// Places at which something is seen in most of the frames.
+fn standing(kept: &[(usize, Vec<Detection>)]) -> Vec<Vector2<f64>> {
+    let skies: Vec<Sky<'_>> = kept.iter().map(|(_, d)| Sky::new(d)).collect();
+    let mut out: Vec<Vector2<f64>> = Vec::new();
+    // A standing point is in most frames, so in one of a few.
+    for seed in [0, kept.len() / 4, kept.len() / 2, 3 * kept.len() / 4, kept.len() - 1] {
+        for d in &kept[seed].1 {
+            let place = at(d);
+            if out.iter().any(|p| (p - place).norm() < SAME_PLACE_PX) {
+                continue;
+            }
+            let hits: Vec<Vector2<f64>> = skies
+                .iter()
+                .filter_map(|s| s.nearest(place, SAME_PLACE_PX).map(|(k, _)| s.place(k)))
+                .collect();
+            if hits.len() as f64 >= STANDING_PART * kept.len() as f64 {
+                out.push(hits.iter().sum::<Vector2<f64>>() / hits.len() as f64);
+            }
+        }
+    }
+    out.sort_by(|a, b| a.y.total_cmp(&b.y).then(a.x.total_cmp(&b.x)));
+    out
+}
