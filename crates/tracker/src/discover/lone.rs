@@ -40,7 +40,7 @@ impl Path {
 }
 
 /// Bodies of one marker each, with their places in the sample's frames.
-pub fn find_lone(store: &DetectionStore, sample: &Sample, standing: &mut Vec<Vector2<f64>>) -> Vec<Found> {
+pub fn find_lone(store: &DetectionStore, sample: &Sample, standing: &[Vector2<f64>]) -> Vec<Found> {
     let mut open: Vec<Path> = Vec::new();
     let mut done: Vec<Path> = Vec::new();
     let mut scratch = Vec::new();

@@ -57,9 +57,9 @@ pub fn discover(store: &DetectionStore, image_px: [u32; 2]) -> Result<Discovery>
             f.poses.push(s.map(|s| s.fit.pose));
         }
     }
-    let mut standing = sample.standing.clone();
+    let standing = sample.standing.clone();
     if found.is_empty() {
-        found = lone::find_lone(store, &sample, &mut standing);
+        found = lone::find_lone(store, &sample, &standing);
     }
     if found.is_empty() {
         return Err(Error::Rig(
