@@ -11,7 +11,9 @@
 //! A frame's time is the middle of its exposure. Everything random comes from the scene's seed and the frame's
 //! index, so frames may be made in any order and by any number of threads. The noise model is in [`noise`].
 
+mod camera_raw;
 pub mod coverage;
+pub mod encode;
 mod motion;
 mod motion_file;
 pub mod noise;
@@ -20,6 +22,8 @@ mod render;
 pub mod scene;
 mod spline;
 mod truth;
+mod truth_table;
+mod write;
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -28,6 +32,8 @@ pub use motion::MotionTable;
 pub use presets::{PRESETS, paper_layout, preset};
 pub use scene::Scene;
 pub use truth::{FrameTruth, NodeTruth};
+pub use truth_table::{Truth, TruthWriter};
+pub use write::{WriteOptions, write};
 
 use crate::error::Result;
 use crate::frame::{Frame, PixelFormat, TimeBase};

@@ -179,27 +179,25 @@ impl Mechanism {
         }
         let mut links = Vec::with_capacity(scene.links.len());
         for (i, l) in scene.links.iter().enumerate() {
-            let angle = match (&l.motion, table) {
-                (Some(LinkMotion::Tumble { phi_rad, rate_rad_s, frequency_hz }), _) => Angle::Waves {
-                    phi_rad: *phi_rad,
-                    waves: tumble(scene.seed, i, *rate_rad_s, *frequency_hz),
-                },
-                (Some(law), _) => Angle::Law(law.clone()),
-                (None, Some(t)) => {
-                    let column = t.phi_rad.get(i).filter(|c| !c.is_empty()).ok_or_else(|| {
-                        Error::Film(
-                            Fault::new(
-                                &t.name,
-                                format!("there is no phi{}_rad for link {:?}", i + 1, l.name),
-                            )
-                            .at(Place::Key(format!("phi{}_rad", i + 1)))
-                            .advice("Add the column or give the link a motion of its own"),
-                        )
-                    })?;
+            let column = table.and_then(|t| t.phi_rad.get(i)).filter(|c| !c.is_empty());
+            let angle = match (column, &l.motion, table) {
+                (Some(column), _, Some(t)) => {
                     uses_table = true;
                     Angle::Table(Spline::new(&t.time_s, column))
                 }
-                (None, None) => Angle::Law(LinkMotion::Rest { phi_rad: 0.0 }),
+                (_, Some(LinkMotion::Tumble { phi_rad, rate_rad_s, frequency_hz }), _) => Angle::Waves {
+                    phi_rad: *phi_rad,
+                    waves: tumble(scene.seed, i, *rate_rad_s, *frequency_hz),
+                },
+                (_, Some(law), _) => Angle::Law(law.clone()),
+                (_, None, Some(t)) => {
+                    return Err(Error::Film(
+                        Fault::new(&t.name, format!("there is no phi{}_rad for link {:?}", i + 1, l.name))
+                            .at(Place::Key(format!("phi{}_rad", i + 1)))
+                            .advice("Add the column or give the link a motion of its own"),
+                    ));
+                }
+                (_, None, None) => Angle::Law(LinkMotion::Rest { phi_rad: 0.0 }),
             };
             let place = match table.and_then(|t| t.place_px.get(i).map(|p| (t, p))) {
                 Some((t, [x, y])) if !x.is_empty() && !y.is_empty() && l.parent.is_none() => {

@@ -37,7 +37,7 @@ pub struct Scene {
     /// The light and the ground behind everything.
     #[serde(default)]
     pub light: Light,
-    /// A table of link angles over time; links with a motion of their own do not use it.
+    /// A table of link angles over time; a link that has no column in it moves by its own motion.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub motion: Option<MotionFile>,
     /// Random glints.
@@ -210,7 +210,7 @@ pub struct Link {
     /// Light on the bar and its markers relative to the rest: 2 is twice as bright.
     #[serde(default = "one")]
     pub light: f64,
-    /// How it turns; `None` is by the table, or at rest hanging down if there is none.
+    /// How it turns if no motion table says it; `None` without a table is at rest, hanging down.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub motion: Option<LinkMotion>,
 }
@@ -325,12 +325,11 @@ impl Scene {
     /// [`Error::Film`] naming the file and the line or key.
     pub fn read(path: &Path) -> Result<Self> {
         let name = path.display().to_string();
-        let text =
-            std::fs::read_to_string(path).map_err(|e| {
-                Error::Film(Fault::new(&name, format!("the scene cannot be read ({e})")).advice(
-                    "Give a scene in TOML, e.g. one that `tracker film --preset clean --scene` prints",
-                ))
-            })?;
+        let text = std::fs::read_to_string(path).map_err(|e| {
+            Error::Film(Fault::new(&name, format!("the scene cannot be read ({e})")).advice(
+                "Give a scene in TOML, e.g. one that `tracker film --preset clean --print-scene` prints",
+            ))
+        })?;
         let mut scene = Self::parse(&text, &name)?;
         if let (Some(motion), Some(folder)) = (&mut scene.motion, path.parent()) {
             motion.file = folder.join(&motion.file);
@@ -349,7 +348,7 @@ impl Scene {
             Error::Film(
                 Fault::new(name, e.message().replace('\n', " "))
                     .at(Place::Line(line))
-                    .advice("`tracker film --preset clean --scene` prints a scene with every part"),
+                    .advice("`tracker film --preset clean --print-scene` prints a scene with every part"),
             )
         })?;
         scene.check(name)?;

@@ -1,2 +1,21 @@
-//! Binary.
-fn main() {}
+//! The program `tracker`: a film in, a node table out.
+//!
+//! Exit status: 0 done; 1 done, but the recording ended early or nodes stayed lost; 2 an error; 130 interrupted.
+
+mod args;
+mod film;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+fn main() -> ExitCode {
+    match args::Cli::parse().run() {
+        Ok(status) => status,
+        Err(error) => {
+            eprintln!("tracker: {error:#}");
+            let interrupted = matches!(error.downcast_ref(), Some(tracker::error::Error::Interrupted));
+            ExitCode::from(if interrupted { 130 } else { 2 })
+        }
+    }
+}

@@ -1,0 +1,31 @@
+//! The command line as a whole. Each subcommand has its own file with its `Args` and its `run`; here they are listed.
+//!
+//! Must not: touch the disk.
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+use crate::film;
+
+/// A film of markers on rigid links in; where each marker is in each frame out.
+#[derive(Debug, Parser)]
+#[command(name = "tracker", version, arg_required_else_help = true, max_term_width = 100)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Film(film::Args),
+}
+
+impl Cli {
+    /// Runs the subcommand.
+    pub fn run(self) -> anyhow::Result<ExitCode> {
+        match self.command {
+            Command::Film(args) => film::run(args),
+        }
+    }
+}

@@ -1,0 +1,160 @@
+//! `tracker film`: a scene in, a film and its truth out.
+
+use std::io::IsTerminal;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use anyhow::Context;
+use indicatif::{ProgressBar, ProgressStyle};
+use tracker::error::{Error, Fault, Place};
+use tracker::film::encode::Codec;
+use tracker::film::{Film, MotionTable, PRESETS, Scene, WriteOptions, preset, write};
+
+/// Make a film of markers on links, with its truth: to try a marker layout, a light and a frame rate before the rig
+/// is built, or to test a tracker.
+///
+/// The ending of OUTPUT decides what is written: .mp4 .mov .mkv .avi (video), .mraw (Photron, with its .cih), .tif
+/// (pages), .y4m (or - for standard output), frames/%05d.png (.tif, .bmp: numbered images).
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The scene, TOML.
+    #[arg(required_unless_present = "preset", conflicts_with = "preset")]
+    scene: Option<PathBuf>,
+    /// A scene that comes with the program: clean, noisy, dim, glints, late, dropout, occluded, fast.
+    #[arg(long, value_name = "NAME", value_parser = PRESETS)]
+    preset: Option<String>,
+    /// Where the film goes.
+    #[arg(short, long, value_name = "OUTPUT", required_unless_present_any = ["print_scene", "rig"])]
+    output: Option<PathBuf>,
+    /// Where the truth goes: .parquet or .csv, a row per frame and marker.
+    #[arg(long, value_name = "TABLE", requires = "output")]
+    truth: Option<PathBuf>,
+    /// Where the rig goes, as a perfect `tracker setup` would find it in frame 0.
+    #[arg(long, value_name = "RIG.toml")]
+    rig: Option<PathBuf>,
+    /// Print the scene as TOML, with all that was left out filled in; edit it and film it.
+    #[arg(long)]
+    print_scene: bool,
+    /// Angles of the links over time, .csv or .parquet with time_s, phi1_rad, phi2_rad, ...
+    #[arg(long, value_name = "TABLE")]
+    motion: Option<PathBuf>,
+    /// Seed of noise, glints and random motion; replaces the scene's.
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Number of frames; replaces the scene's.
+    #[arg(long, value_name = "N")]
+    frames: Option<u64>,
+    /// Frames per second; replaces the scene's.
+    #[arg(long, value_name = "F")]
+    fps: Option<f64>,
+    /// Codec of a video file; by the ending if not given.
+    #[arg(long, value_enum)]
+    codec: Option<CodecName>,
+    /// H.264: constant rate factor, 0 (no loss) to 51; MJPEG: 1 (best) to 31.
+    #[arg(long, value_name = "Q")]
+    quality: Option<u32>,
+    /// H.264: x264's preset, e.g. ultrafast, medium, veryslow.
+    #[arg(long, value_name = "PRESET")]
+    speed: Option<String>,
+    /// H.264: no colour planes; smaller, but not every player shows it.
+    #[arg(long)]
+    gray: bool,
+    /// Bits per pixel of an .mraw: 8, 10, 12 or 16.
+    #[arg(long)]
+    bits: Option<u32>,
+    /// No progress bar.
+    #[arg(short, long)]
+    quiet: bool,
+}
+
+#[derive(Debug, Clone, Copy, clap::ValueEnum)]
+enum CodecName {
+    /// Small, lossy, plays everywhere.
+    H264,
+    /// Without loss, 8 to 16 bit.
+    Ffv1,
+    /// JPEG pictures, lossy.
+    Mjpeg,
+    /// Uncompressed.
+    Raw,
+}
+
+impl Args {
+    fn scene(&self) -> anyhow::Result<Scene> {
+        let mut scene = match (&self.scene, &self.preset) {
+            (Some(path), _) => Scene::read(path)?,
+            (None, Some(name)) => preset(name, self.seed.unwrap_or(0))?,
+            (None, None) => anyhow::bail!("give a scene or --preset"),
+        };
+        scene.seed = self.seed.unwrap_or(scene.seed);
+        scene.frames = self.frames.unwrap_or(scene.frames);
+        scene.rate_hz = self.fps.unwrap_or(scene.rate_hz);
+        Ok(scene)
+    }
+
+    fn codec(&self) -> Option<Codec> {
+        self.codec.map(|c| match c {
+            CodecName::H264 => Codec::H264,
+            CodecName::Ffv1 => Codec::Ffv1,
+            CodecName::Mjpeg => Codec::Mjpeg,
+            CodecName::Raw => Codec::Raw,
+        })
+    }
+}
+
+/// Refuses to write over the scene or the motion.
+fn distinct(output: &Path, inputs: [Option<&PathBuf>; 2]) -> Result<(), Error> {
+    if inputs.into_iter().flatten().any(|i| i == output) {
+        return Err(Error::Film(
+            Fault::new(output.display(), "the film would replace what it is made from")
+                .at(Place::Key("output".into()))
+                .advice("Give another name"),
+        ));
+    }
+    Ok(())
+}
+
+/// Makes the film.
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let scene = args.scene()?;
+    if args.print_scene {
+        print!("{}", scene.to_toml()?);
+    }
+    let film = match &args.motion {
+        Some(path) => Film::with_motion(&scene, &MotionTable::read(path)?)?,
+        None => Film::new(&scene)?,
+    };
+    if let Some(path) = &args.rig {
+        std::fs::write(path, film.rig(0).to_toml()?)
+            .with_context(|| format!("{}: the rig cannot be written", path.display()))?;
+    }
+    let Some(output) = &args.output else { return Ok(ExitCode::SUCCESS) };
+    distinct(output, [args.scene.as_ref(), args.motion.as_ref()])?;
+    let options = WriteOptions {
+        codec: args.codec(),
+        quality: args.quality,
+        speed: args.speed.clone(),
+        gray_only: args.gray,
+        bits: args.bits,
+        truth: args.truth.clone(),
+    };
+    let stop = Arc::new(AtomicBool::new(false));
+    let flag = Arc::clone(&stop);
+    ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed))?;
+    let bar = if args.quiet || !std::io::stderr().is_terminal() {
+        ProgressBar::hidden()
+    } else {
+        ProgressBar::new(film.frames()).with_style(
+            ProgressStyle::with_template("{bar:30} {pos}/{len} frames, {per_sec}, {eta} left")
+                .unwrap_or_else(|_| ProgressStyle::default_bar()),
+        )
+    };
+    write(&film, output, &options, &mut |done| {
+        bar.set_position(done);
+        if stop.load(Ordering::Relaxed) { Err(Error::Interrupted) } else { Ok(()) }
+    })?;
+    bar.finish_and_clear();
+    Ok(ExitCode::SUCCESS)
+}

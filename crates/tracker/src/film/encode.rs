@@ -1,0 +1,300 @@
+//! Gray frames into a video file through FFmpeg's libraries.
+//!
+//! Owns: [`Codec`], [`VideoWriter`], [`encode_image`]. Must not: know of scenes; whoever has gray frames may use it.
+
+use std::path::Path;
+
+use ffmpeg_next as ffmpeg;
+
+use ffmpeg::codec::{Context, Id, encoder};
+use ffmpeg::format::Pixel;
+use ffmpeg::{Dictionary, Packet, Rational, color, format, frame};
+
+use crate::error::{Error, Fault, Place, Result};
+use crate::frame::TimeBase;
+
+/// How a video file holds its frames.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Codec {
+    /// H.264 by libx264, 8 bit, lossy: small, and plays everywhere.
+    H264,
+    /// FFV1, 8 to 16 bit, without loss.
+    Ffv1,
+    /// JPEG pictures in a row, 8 bit, lossy.
+    Mjpeg,
+    /// Uncompressed gray, 8 or 16 bit.
+    Raw,
+}
+
+/// What a writer needs to know of the frames and of the file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct VideoSettings {
+    /// Width, px.
+    pub width: u32,
+    /// Height, px.
+    pub height: u32,
+    /// Significant bits per sample; above 8, frames have two bytes per sample, little-endian.
+    pub depth_bits: u32,
+    /// Seconds per frame.
+    pub time_base: TimeBase,
+    /// Codec.
+    pub codec: Codec,
+    /// H.264: constant rate factor, 0 (no loss) to 51; MJPEG: quantiser, 1 (best) to 31. `None` is 12 and 2.
+    pub quality: Option<u32>,
+    /// H.264: x264's preset; `None` is `medium`.
+    pub speed: Option<String>,
+    /// H.264: a plane of brightness and nothing else. Smaller, but some players need colour planes, which otherwise
+    /// are there and empty.
+    pub gray_only: bool,
+}
+
+/// A video file being written.
+pub struct VideoWriter {
+    name: String,
+    output: format::context::Output,
+    encoder: encoder::Video,
+    time_base: Rational,
+    stream_time_base: Rational,
+    pixel: Pixel,
+    width: u32,
+    height: u32,
+    bytes_per_pixel: usize,
+    next: i64,
+}
+
+fn fault(name: &str, problem: String, advice: &str) -> Error {
+    Error::Film(Fault::new(name, problem).advice(advice))
+}
+
+/// An error of FFmpeg's as ours.
+fn failed<'a>(name: &'a str, what: &'a str) -> impl Fn(ffmpeg::Error) -> Error + 'a {
+    move |e| Error::Film(Fault::new(name, format!("{what} failed ({e})")))
+}
+
+impl VideoWriter {
+    /// Begins a file; its container is known by its ending.
+    ///
+    /// # Errors
+    /// [`Error::Film`] if the codec cannot hold such frames or the file cannot be made.
+    pub fn create(path: &Path, settings: &VideoSettings) -> Result<Self> {
+        ffmpeg::init().map_err(failed("FFmpeg", "its start"))?;
+        ffmpeg::log::set_level(ffmpeg::log::Level::Error);
+        let name = path.display().to_string();
+        let (codec_name, pixel) = pixel_format(&name, settings)?;
+        let TimeBase { numerator, denominator } = settings.time_base;
+        let (Ok(numerator), Ok(denominator)) = (i32::try_from(numerator), i32::try_from(denominator)) else {
+            return Err(fault(&name, "the frame rate is too fine a fraction".into(), "Give a rounder rate"));
+        };
+        let time_base = Rational(numerator, denominator);
+        let mut output = format::output(path).map_err(failed(&name, "making the file"))?;
+        let codec = encoder::find_by_name(codec_name).ok_or_else(|| {
+            fault(&name, format!("this FFmpeg has no encoder {codec_name}"), "Install FFmpeg with it")
+        })?;
+        let mut context =
+            Context::new_with_codec(codec).encoder().video().map_err(failed(&name, "the encoder"))?;
+        context.set_width(settings.width);
+        context.set_height(settings.height);
+        context.set_format(pixel);
+        context.set_time_base(time_base);
+        context.set_frame_rate(Some(time_base.invert()));
+        // Levels are what the camera recorded, from 0 to the top.
+        context.set_color_range(color::Range::JPEG);
+        if output.format().flags().contains(format::Flags::GLOBAL_HEADER) {
+            context.set_flags(ffmpeg::codec::Flags::GLOBAL_HEADER);
+        }
+        let mut options = Dictionary::new();
+        match settings.codec {
+            Codec::H264 => {
+                options.set("crf", &settings.quality.unwrap_or(12).to_string());
+                options.set("preset", settings.speed.as_deref().unwrap_or("medium"));
+                // x264's output depends on its number of threads; a fixed one makes files repeatable.
+                options.set("threads", "2");
+            }
+            Codec::Mjpeg => {
+                let scale = settings.quality.unwrap_or(2).clamp(1, 31);
+                options.set("flags", "+qscale");
+                options.set("global_quality", &(scale * ffmpeg::ffi::FF_QP2LAMBDA as u32).to_string());
+                options.set("qmin", "1");
+                options.set("threads", "1");
+            }
+            Codec::Ffv1 => {
+                options.set("level", "3");
+                options.set("slicecrc", "1");
+            }
+            Codec::Raw => {}
+        }
+        let opened = context.open_as_with(codec, options).map_err(failed(&name, "opening the encoder"))?;
+        let mut stream = output.add_stream(codec).map_err(failed(&name, "adding the stream"))?;
+        stream.set_parameters(&opened);
+        stream.set_time_base(time_base);
+        stream.set_avg_frame_rate(time_base.invert());
+        stream.set_rate(time_base.invert());
+        output.write_header().map_err(failed(&name, "writing the header"))?;
+        let stream_time_base = output.stream(0).map_or(time_base, |s| s.time_base());
+        Ok(Self {
+            name,
+            output,
+            encoder: opened.0,
+            time_base,
+            stream_time_base,
+            pixel,
+            width: settings.width,
+            height: settings.height,
+            bytes_per_pixel: if settings.depth_bits > 8 { 2 } else { 1 },
+            next: 0,
+        })
+    }
+
+    /// Adds a frame: samples row by row without padding.
+    ///
+    /// # Errors
+    /// [`Error::Film`] if encoding or writing fails, or the frame has another size.
+    pub fn write(&mut self, samples: &[u8]) -> Result<()> {
+        let mut picture =
+            picture(&self.name, self.pixel, self.width, self.height, self.bytes_per_pixel, samples)?;
+        picture.set_pts(Some(self.next));
+        self.next += 1;
+        self.encoder.send_frame(&picture).map_err(failed(&self.name, "encoding"))?;
+        self.drain()
+    }
+
+    fn drain(&mut self) -> Result<()> {
+        let mut packet = Packet::empty();
+        loop {
+            match self.encoder.receive_packet(&mut packet) {
+                Ok(()) => {
+                    packet.set_stream(0);
+                    // The last frame lasts as long as the others.
+                    packet.set_duration(1);
+                    packet.rescale_ts(self.time_base, self.stream_time_base);
+                    packet.write_interleaved(&mut self.output).map_err(failed(&self.name, "writing"))?;
+                }
+                Err(ffmpeg::Error::Eof) => return Ok(()),
+                Err(ffmpeg::Error::Other { errno }) if errno == ffmpeg::error::EAGAIN => return Ok(()),
+                Err(e) => return Err(failed(&self.name, "encoding")(e)),
+            }
+        }
+    }
+
+    /// Ends the file.
+    ///
+    /// # Errors
+    /// [`Error::Film`] if the last frames cannot be written.
+    pub fn finish(mut self) -> Result<()> {
+        self.encoder.send_eof().map_err(failed(&self.name, "encoding"))?;
+        self.drain()?;
+        self.output.write_trailer().map_err(failed(&self.name, "writing the end"))
+    }
+}
+
+/// The encoder's name and what it takes.
+fn pixel_format(name: &str, s: &VideoSettings) -> Result<(&'static str, Pixel)> {
+    let deep = s.depth_bits > 8;
+    match s.codec {
+        Codec::H264 | Codec::Mjpeg if deep => Err(Error::Film(
+            Fault::new(name, format!("{} bits do not fit into 8-bit video", s.depth_bits))
+                .at(Place::Key("codec".into()))
+                .advice("Choose ffv1 or raw, or film with 8 bits"),
+        )),
+        Codec::H264 if s.gray_only => Ok(("libx264", Pixel::GRAY8)),
+        Codec::H264 if s.width % 2 == 1 || s.height % 2 == 1 => Err(Error::Film(
+            Fault::new(name, format!("{} x {} px have no half for colour planes", s.width, s.height))
+                .at(Place::Key("image_px".into()))
+                .advice("Give an even width and height or ask for gray only"),
+        )),
+        Codec::H264 => Ok(("libx264", Pixel::YUV420P)),
+        Codec::Mjpeg => Ok(("mjpeg", Pixel::YUVJ420P)),
+        Codec::Ffv1 => Ok((
+            "ffv1",
+            match s.depth_bits {
+                8 => Pixel::GRAY8,
+                9 | 10 => Pixel::GRAY10LE,
+                11 | 12 => Pixel::GRAY12LE,
+                _ => Pixel::GRAY16LE,
+            },
+        )),
+        Codec::Raw => Ok(("rawvideo", if deep { Pixel::GRAY16LE } else { Pixel::GRAY8 })),
+    }
+}
+
+/// A picture of FFmpeg's with `samples` as its brightness and no colour.
+fn picture(
+    name: &str,
+    pixel: Pixel,
+    width: u32,
+    height: u32,
+    bytes_per_pixel: usize,
+    samples: &[u8],
+) -> Result<frame::Video> {
+    let row = width as usize * bytes_per_pixel;
+    if row == 0 || samples.len() != row * height as usize {
+        return Err(fault(name, format!("a frame of {} bytes is not {width} x {height}", samples.len()), ""));
+    }
+    let mut picture = frame::Video::new(pixel, width, height);
+    picture.set_color_range(color::Range::JPEG);
+    let stride = picture.stride(0);
+    for (to, from) in picture.data_mut(0).chunks_mut(stride).zip(samples.chunks(row)) {
+        if pixel == Pixel::GRAY16BE {
+            for (t, f) in to.chunks_exact_mut(2).zip(from.chunks_exact(2)) {
+                t.copy_from_slice(&[f[1], f[0]]);
+            }
+        } else {
+            to[..row].copy_from_slice(from);
+        }
+    }
+    for plane in 1..picture.planes() {
+        picture.data_mut(plane).fill(128);
+    }
+    Ok(picture)
+}
+
+/// One gray frame as the bytes of a PNG, TIFF or BMP file; 16-bit samples keep their values.
+///
+/// # Errors
+/// [`Error::Film`] for a kind that cannot hold the depth or if encoding fails.
+pub fn encode_image(
+    name: &str,
+    kind: ImageKind,
+    width: u32,
+    height: u32,
+    depth_bits: u32,
+    samples: &[u8],
+) -> Result<Vec<u8>> {
+    let deep = depth_bits > 8;
+    let (id, pixel) = match kind {
+        ImageKind::Png => (Id::PNG, if deep { Pixel::GRAY16BE } else { Pixel::GRAY8 }),
+        ImageKind::Tiff => (Id::TIFF, if deep { Pixel::GRAY16LE } else { Pixel::GRAY8 }),
+        ImageKind::Bmp if deep => {
+            return Err(fault(name, format!("BMP does not hold {depth_bits} bits"), "Write PNG or TIFF"));
+        }
+        ImageKind::Bmp => (Id::BMP, Pixel::GRAY8),
+    };
+    let codec = encoder::find(id)
+        .ok_or_else(|| fault(name, format!("this FFmpeg cannot write {id:?}"), "Install FFmpeg with it"))?;
+    let mut context =
+        Context::new_with_codec(codec).encoder().video().map_err(failed(name, "the encoder"))?;
+    context.set_width(width);
+    context.set_height(height);
+    context.set_format(pixel);
+    context.set_time_base(Rational(1, 25));
+    let mut opened = context.open_as(codec).map_err(failed(name, "opening the encoder"))?;
+    let mut picture = picture(name, pixel, width, height, if deep { 2 } else { 1 }, samples)?;
+    picture.set_pts(Some(0));
+    opened.send_frame(&picture).map_err(failed(name, "encoding"))?;
+    opened.send_eof().map_err(failed(name, "encoding"))?;
+    let mut packet = Packet::empty();
+    opened.receive_packet(&mut packet).map_err(failed(name, "encoding"))?;
+    Ok(packet.data().unwrap_or_default().to_vec())
+}
+
+/// Kinds of image files.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ImageKind {
+    /// PNG, 8 or 16 bit.
+    Png,
+    /// TIFF, 8 or 16 bit.
+    Tiff,
+    /// BMP, 8 bit.
+    Bmp,
+}
