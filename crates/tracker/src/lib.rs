@@ -16,6 +16,7 @@ pub mod error;
 pub mod film;
 pub mod frame;
 pub mod rig;
+pub mod score;
 pub mod source;
 pub mod store;
 pub mod track;

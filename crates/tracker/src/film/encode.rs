@@ -23,7 +23,7 @@ pub enum Codec {
     Ffv1,
     /// JPEG pictures in a row, 8 bit, lossy.
     Mjpeg,
-    /// Uncompressed gray, 8 or 16 bit.
+    /// Uncompressed gray, 8 bit.
     Raw,
 }
 
@@ -112,10 +112,10 @@ impl VideoWriter {
                 options.set("threads", "2");
             }
             Codec::Mjpeg => {
-                let scale = settings.quality.unwrap_or(2).clamp(1, 31);
-                options.set("flags", "+qscale");
-                options.set("global_quality", &(scale * ffmpeg::ffi::FF_QP2LAMBDA as u32).to_string());
-                options.set("qmin", "1");
+                let scale = settings.quality.unwrap_or(2).clamp(1, 31).to_string();
+                // The same quantiser for every frame.
+                options.set("qmin", &scale);
+                options.set("qmax", &scale);
                 options.set("threads", "1");
             }
             Codec::Ffv1 => {
@@ -135,7 +135,7 @@ impl VideoWriter {
         Ok(Self {
             name,
             output,
-            encoder: opened.0,
+            encoder: opened,
             time_base,
             stream_time_base,
             pixel,
@@ -214,7 +214,12 @@ fn pixel_format(name: &str, s: &VideoSettings) -> Result<(&'static str, Pixel)> 
                 _ => Pixel::GRAY16LE,
             },
         )),
-        Codec::Raw => Ok(("rawvideo", if deep { Pixel::GRAY16LE } else { Pixel::GRAY8 })),
+        Codec::Raw if deep => Err(Error::Film(
+            Fault::new(name, format!("no video container holds {} bits uncompressed", s.depth_bits))
+                .at(Place::Key("codec".into()))
+                .advice("Choose ffv1 in .mkv, or .mraw or images"),
+        )),
+        Codec::Raw => Ok(("rawvideo", Pixel::GRAY8)),
     }
 }
 

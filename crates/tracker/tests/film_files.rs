@@ -1,0 +1,167 @@
+//! Films written to files and read back: without loss where the codec has none, close where it has some.
+
+use std::path::Path;
+
+use tracker::film::encode::Codec;
+use tracker::film::{Film, Scene, Truth, WriteOptions, preset, write};
+use tracker::frame::TimeBase;
+use tracker::source::{Ending, OpenOptions, open};
+
+/// The paper's layout in a small image, 12 frames.
+fn scene(depth_bits: u32) -> Scene {
+    let mut s = preset("noisy", 7).unwrap();
+    s.image_px = [176, 144];
+    s.frames = 12;
+    s.rate_hz = 1000.0;
+    s.links[0].joint_px = [60.0, 20.0];
+    s.camera.depth_bits = depth_bits;
+    if depth_bits > 8 {
+        let gain = f64::from(1u32 << (depth_bits - 8));
+        s.camera.read_noise *= gain;
+        s.camera.shot_gain *= gain;
+        s.camera.black *= gain;
+        s.light.background *= gain;
+        s.links.iter_mut().for_each(|l| l.level *= gain);
+        s.markers.iter_mut().for_each(|m| m.level *= gain);
+    }
+    s
+}
+
+/// Writes, reads back, and gives the largest and the root mean square difference in levels.
+fn round_trip(film: &Film, path: &Path, options: &WriteOptions) -> (u32, f64) {
+    let mut told = 0;
+    write(film, path, options, &mut |done| {
+        told = done;
+        Ok(())
+    })
+    .unwrap();
+    assert_eq!(told, film.frames());
+    let mut source = open(path.to_str().unwrap(), &OpenOptions::default()).unwrap();
+    let [w, h] = film.scene().image_px.map(|v| v as usize);
+    let deep = film.bytes_per_pixel() == 2;
+    let (mut worst, mut squares, mut expected) = (0, 0.0, Vec::new());
+    let mut count = 0;
+    while let Some(frame) = source.next_frame().unwrap() {
+        film.render(count, &mut expected);
+        assert_eq!((frame.index, frame.width as usize, frame.height as usize), (count, w, h));
+        let seconds = source.info().time_base.seconds(frame.ticks);
+        assert!((seconds - film.time_s(count)).abs() < 1e-12, "frame {count} at {seconds} s");
+        let plane = frame.plane.as_ref().unwrap().bytes();
+        assert_eq!(frame.format, film.format());
+        let bytes = w * film.bytes_per_pixel();
+        for y in 0..h {
+            let (got, want) = (&plane[y * frame.stride..][..bytes], &expected[y * bytes..][..bytes]);
+            for k in (0..bytes).step_by(if deep { 2 } else { 1 }) {
+                let value = |row: &[u8]| {
+                    if deep { u32::from(u16::from_le_bytes([row[k], row[k + 1]])) } else { u32::from(row[k]) }
+                };
+                let difference = value(got).abs_diff(value(want));
+                worst = worst.max(difference);
+                squares += f64::from(difference * difference);
+            }
+        }
+        count += 1;
+    }
+    assert_eq!(source.ending(), Ending::Complete);
+    assert_eq!(count, film.frames());
+    (worst, (squares / (w * h) as f64 / count as f64).sqrt())
+}
+
+#[test]
+fn lossless_codecs_give_back_every_bit() {
+    let folder = tempfile::tempdir().unwrap();
+    let eight = Film::new(&scene(8)).unwrap();
+    let twelve = Film::new(&scene(12)).unwrap();
+    let sixteen = Film::new(&scene(16)).unwrap();
+    for (film, name, codec) in [
+        (&eight, "a.mkv", Codec::Ffv1),
+        (&eight, "b.avi", Codec::Raw),
+        (&eight, "c.avi", Codec::Ffv1),
+        (&twelve, "d.mkv", Codec::Ffv1),
+        (&sixteen, "e.mkv", Codec::Ffv1),
+    ] {
+        let options = WriteOptions { codec: Some(codec), ..WriteOptions::default() };
+        assert_eq!(round_trip(film, &folder.path().join(name), &options), (0, 0.0), "{name}");
+    }
+}
+
+#[test]
+fn h264_without_loss_is_without_loss() {
+    let folder = tempfile::tempdir().unwrap();
+    let film = Film::new(&scene(8)).unwrap();
+    let options = WriteOptions { quality: Some(0), gray_only: true, ..WriteOptions::default() };
+    assert_eq!(round_trip(&film, &folder.path().join("a.mp4"), &options), (0, 0.0));
+}
+
+#[test]
+fn lossy_codecs_stay_close_and_closer_with_quality() {
+    let folder = tempfile::tempdir().unwrap();
+    let film = Film::new(&scene(8)).unwrap();
+    let noise = film.variance(26.0).sqrt();
+    for (name, codec, fine, coarse) in
+        [("h.mp4", Codec::H264, 8, 30), ("h.mov", Codec::H264, 8, 30), ("m.avi", Codec::Mjpeg, 1, 20)]
+    {
+        let rms = |q| {
+            let options = WriteOptions { codec: Some(codec), quality: Some(q), ..WriteOptions::default() };
+            round_trip(&film, &folder.path().join(name), &options).1
+        };
+        let (fine, coarse) = (rms(fine), rms(coarse));
+        // A fine quantiser keeps most of the noise, a coarse one takes it out: the difference is then the noise.
+        assert!(
+            fine < 0.5 * noise && fine < coarse && coarse < 2.0 * noise,
+            "{name}: {fine} {coarse} {noise}"
+        );
+    }
+}
+
+#[test]
+fn truth_tables_say_the_same_in_both_forms() {
+    let folder = tempfile::tempdir().unwrap();
+    let film = Film::new(&scene(8)).unwrap();
+    let truth = Truth::of(&film);
+    for name in ["t.parquet", "t.csv"] {
+        let path = folder.path().join(name);
+        let options = WriteOptions { truth: Some(path.clone()), ..WriteOptions::default() };
+        write(&film, &folder.path().join("a.avi"), &options, &mut |_| Ok(())).unwrap();
+        let read = Truth::read(&path).unwrap();
+        assert_eq!(read.nodes, truth.nodes);
+        for (a, b) in read.frames.iter().zip(&truth.frames) {
+            assert_eq!((a.frame, a.time_s, &a.phi_rad), (b.frame, b.time_s, &b.phi_rad));
+            for (p, q) in a.nodes.iter().zip(&b.nodes) {
+                assert_eq!((p.x_px, p.y_px, p.visible), (q.x_px, q.y_px, q.visible), "{name}");
+            }
+        }
+        assert_eq!(read.frames.len(), 12);
+    }
+}
+
+#[test]
+fn rates_that_are_no_whole_number_are_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut s = scene(8);
+    s.rate_hz = 30000.0 / 1001.0;
+    let film = Film::new(&s).unwrap();
+    assert_eq!(film.time_base(), TimeBase { numerator: 1001, denominator: 30000 });
+    let options = WriteOptions { quality: Some(0), ..WriteOptions::default() };
+    assert_eq!(round_trip(&film, &folder.path().join("a.mp4"), &options).0, 0);
+}
+
+#[test]
+fn what_cannot_be_written_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let film = Film::new(&scene(12)).unwrap();
+    let message = |name: &str, options: &WriteOptions| {
+        write(&film, &folder.path().join(name), options, &mut |_| Ok(())).unwrap_err().to_string()
+    };
+    let default = WriteOptions::default();
+    assert!(message("a.mp4", &default).contains("12 bits do not fit into 8-bit video"));
+    assert!(message("a.gif", &default).contains("no film is written to a file that ends in \"gif\""));
+    assert!(message("a.png", &default).contains("Number them"));
+    assert!(message("a.avi", &default).contains("no video container holds 12 bits uncompressed"));
+    assert!(message("%d.bmp", &default).contains("BMP does not hold 12 bits"));
+    assert!(message("no/folder/a.mkv", &default).contains("a.mkv"));
+    let eight = WriteOptions { bits: Some(8), ..WriteOptions::default() };
+    assert!(message("a.mraw", &eight).contains("8 bits per pixel cannot hold a film of 12 bits"));
+    let text = WriteOptions { truth: Some(folder.path().join("t.txt")), ..WriteOptions::default() };
+    assert!(message("a.mkv", &text).contains(".parquet or .csv"));
+}
