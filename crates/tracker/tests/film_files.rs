@@ -1,5 +1,7 @@
 //! Films written to files and read back: without loss where the codec has none, close where it has some.
 
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a failure here is a failed test")]
+
 use std::path::Path;
 
 use tracker::film::encode::Codec;

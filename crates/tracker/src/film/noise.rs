@@ -65,18 +65,29 @@ fn quantile(p: f64) -> f64 {
     }
 }
 
-/// 65536 equally probable standard normal numbers; the two outermost are only a mark, their tails are drawn.
-fn normal_table() -> &'static [f32] {
-    static TABLE: OnceLock<Vec<f32>> = OnceLock::new();
-    TABLE.get_or_init(|| (0..65536u32).map(|i| quantile((f64::from(i) + 0.5) / 65536.0) as f32).collect())
+/// Equally probable intervals of the standard normal law; the two outermost are drawn exactly.
+const INTERVALS: usize = 4096;
+/// Steps into which each interval is divided evenly: 12 + 4 bits make a number.
+const STEPS: usize = 16;
+
+/// For each interval its first number and its step.
+fn normal_table() -> &'static [[f32; 2]; INTERVALS] {
+    static TABLE: OnceLock<Box<[[f32; 2]; INTERVALS]>> = OnceLock::new();
+    TABLE.get_or_init(|| {
+        let mut table = Box::new([[0.0; 2]; INTERVALS]);
+        for (i, entry) in table.iter_mut().enumerate().take(INTERVALS - 1).skip(1) {
+            let edge = |k: usize| quantile(k as f64 / INTERVALS as f64);
+            let step = (edge(i + 1) - edge(i)) / STEPS as f64;
+            *entry = [(edge(i) + 0.5 * step) as f32, step as f32];
+        }
+        table
+    })
 }
 
 /// Standard normal numbers of one frame, in the order of its pixels.
 pub(crate) struct FrameNoise {
     rng: ChaCha8Rng,
-    table: &'static [f32],
-    bits: u64,
-    left: u32,
+    table: &'static [[f32; 2]; INTERVALS],
 }
 
 impl FrameNoise {
@@ -84,26 +95,28 @@ impl FrameNoise {
     pub(crate) fn new(seed: u64, index: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(index);
-        Self { rng, table: normal_table(), bits: 0, left: 0 }
+        Self { rng, table: normal_table() }
     }
 
-    /// The next number.
+    /// The next four numbers.
     #[inline]
-    pub(crate) fn next(&mut self) -> f32 {
-        if self.left == 0 {
-            self.bits = self.rng.next_u64();
-            self.left = 4;
-        }
-        let i = (self.bits & 0xffff) as usize;
-        self.bits >>= 16;
-        self.left -= 1;
-        if i == 0 || i == 0xffff { self.tail(i == 0) } else { self.table[i] }
+    pub(crate) fn next4(&mut self) -> [f32; 4] {
+        let bits = self.rng.next_u64();
+        [0, 16, 32, 48].map(|shift| {
+            let b = (bits >> shift) as usize;
+            let i = b % INTERVALS;
+            if i == 0 || i == INTERVALS - 1 {
+                return self.tail(i == 0);
+            }
+            let [first, step] = self.table[i];
+            first + step * ((b / INTERVALS) % STEPS) as f32
+        })
     }
 
-    /// A number beyond the 1/65536 quantile, of either sign.
+    /// A number of one of the outermost intervals.
     #[cold]
     fn tail(&mut self, negative: bool) -> f32 {
-        let p = ((self.rng.next_u64() >> 11) as f64 + 0.5) / (1u64 << 53) as f64 / 65536.0;
+        let p = ((self.rng.next_u64() >> 11) as f64 + 0.5) / (1u64 << 53) as f64 / INTERVALS as f64;
         let z = quantile(p) as f32;
         if negative { z } else { -z }
     }
@@ -111,25 +124,34 @@ impl FrameNoise {
 
 /// Writes the recorded levels of one frame into `out`, one byte or two (little-endian) per pixel.
 pub(crate) fn record(camera: &Camera, seed: u64, index: u64, expected: &[f32], out: &mut Vec<u8>) {
+    out.clear();
+    let deep = camera.depth_bits > 8;
+    out.reserve(expected.len() * if deep { 2 } else { 1 });
     let top = camera.top() as f32;
     let read2 = (camera.read_noise * camera.read_noise) as f32;
     let gain = camera.shot_gain as f32;
     let black = camera.black as f32;
-    let noisy = read2 > 0.0 || gain > 0.0;
     let mut noise = FrameNoise::new(seed, index);
-    let mut level = |mu: f32| {
-        let x = if noisy { mu + noise.next() * (read2 + gain * (mu - black).max(0.0)).sqrt() } else { mu };
-        // Adding one half and cutting off rounds what is not negative; the clip comes first.
-        (x.clamp(0.0, top) + 0.5) as u16
-    };
-    out.clear();
-    if camera.depth_bits > 8 {
-        out.reserve(expected.len() * 2);
-        for &mu in expected {
-            out.extend_from_slice(&level(mu).to_le_bytes());
+    // Clipped first, then adding one half and cutting off rounds.
+    let level = |x: f32| (x.clamp(0.0, top) + 0.5) as u16;
+    let mut put = |levels: &[u16]| {
+        if deep {
+            levels.iter().for_each(|v| out.extend_from_slice(&v.to_le_bytes()));
+        } else {
+            out.extend(levels.iter().map(|&v| v as u8));
         }
-    } else {
-        out.extend(expected.iter().map(|&mu| level(mu) as u8));
+    };
+    for four in expected.chunks(4) {
+        let mut levels = [0u16; 4];
+        if read2 == 0.0 && gain == 0.0 {
+            levels.iter_mut().zip(four).for_each(|(l, &mu)| *l = level(mu));
+        } else {
+            let z = noise.next4();
+            for ((l, &mu), z) in levels.iter_mut().zip(four).zip(z) {
+                *l = level(mu + z * (read2 + gain * (mu - black).max(0.0)).sqrt());
+            }
+        }
+        put(&levels[..four.len()]);
     }
 }
 
@@ -142,8 +164,7 @@ mod tests {
         let mut noise = FrameNoise::new(7, 3);
         let n = 2_000_000;
         let (mut m1, mut m2, mut m4, mut beyond) = (0.0, 0.0, 0.0, 0);
-        for _ in 0..n {
-            let z = f64::from(noise.next());
+        for z in (0..n / 4).flat_map(|_| noise.next4()).map(f64::from) {
             m1 += z;
             m2 += z * z;
             m4 += z * z * z * z;
