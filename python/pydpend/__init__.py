@@ -9,6 +9,7 @@ from __future__ import annotations
 from pydpend.angles import LinkAngles, read_angles, write_angles
 from pydpend.errors import (
     AnglesError,
+    ArgumentError,
     DetectError,
     EncoderError,
     FilmError,
@@ -21,21 +22,26 @@ from pydpend.errors import (
     TableError,
     TrackerError,
 )
+from pydpend.nodes import Nodes, Rig, read_nodes
 
 __all__ = [
     "AnglesError",
+    "ArgumentError",
     "DetectError",
     "EncoderError",
     "FilmError",
     "FitError",
     "LinkAngles",
     "ModelError",
+    "Nodes",
     "PydpendError",
+    "Rig",
     "RigError",
     "SimulationError",
     "SourceError",
     "TableError",
     "TrackerError",
     "read_angles",
+    "read_nodes",
     "write_angles",
 ]

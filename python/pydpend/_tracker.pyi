@@ -1,14 +1,58 @@
-"""The compiled half of pydpend; private. Everything here is wrapped by a public name."""
+"""The compiled half of pydpend; private. Everything here is wrapped by a public name.
 
-from typing import Any
+Shapes: T frames, N nodes. Images are (H, W), uint8 or uint16. What is not seen is NaN.
+"""
+
+from typing import Any, TypeAlias
 
 import numpy as np
-import numpy.typing as npt
+from numpy.typing import NDArray
+
+VERSION: str
+
+HeldColumns: TypeAlias = tuple[
+    NDArray[np.int64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.float32],
+    NDArray[np.float32],
+    NDArray[np.uint8],
+]
+Columns: TypeAlias = tuple[
+    NDArray[np.int64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.float32],
+    NDArray[np.float32],
+    NDArray[np.uint8],
+    str,
+]
+
+def read_table(path: str) -> Columns:
+    """frame (T,), time in s (T,), centres in px (T, N, 2), sigma in px, area in px and status (T, N), JSON."""
+
+def read_meta(path: str) -> str:
+    """The metadata of a node table as JSON."""
+
+def write_table(path: str, held: HeldColumns, meta: str) -> None:
+    """Writes a node table, Parquet or CSV by the ending."""
+
+def check_table(held: HeldColumns, meta: str) -> None:
+    """Checks the invariants of a node table."""
+
+def arrow_reader(held: HeldColumns, rig: str) -> Any:
+    """The rows as an Arrow stream; `rig` is JSON."""
+
+def read_rig(path: str) -> str:
+    """A rig file as JSON."""
+
+def rig_toml(rig: str) -> str:
+    """A rig's TOML from its JSON."""
 
 def simulate_motion(
     model: dict[str, float],
     state: list[float],
-    times_s: npt.NDArray[np.float64],
+    times_s: NDArray[np.float64],
     *,
     tolerance: float,
     width_rad_s: float | None = None,
@@ -16,13 +60,13 @@ def simulate_motion(
 ) -> dict[str, Any]: ...
 def simulate_ensemble(
     models: list[dict[str, float]],
-    states: npt.NDArray[np.float64],
-    times_s: npt.NDArray[np.float64],
+    states: NDArray[np.float64],
+    times_s: NDArray[np.float64],
     *,
     tolerance: float,
     width_rad_s: float | None = None,
     pinned: bool = False,
-) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.bool_]]: ...
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]: ...
 def poincare_section(
     model: dict[str, float],
     state: list[float],
@@ -33,7 +77,7 @@ def poincare_section(
     direction: float,
     tolerance: float,
     pinned: bool = False,
-) -> npt.NDArray[np.float64]: ...
+) -> NDArray[np.float64]: ...
 def tangent_growth(
     model: dict[str, float],
     state: list[float],
@@ -41,4 +85,4 @@ def tangent_growth(
     skipped: int,
     counted: int,
     tolerance: float,
-) -> npt.NDArray[np.float64]: ...
+) -> NDArray[np.float64]: ...

@@ -35,6 +35,10 @@ class FilmError(TrackerError):
     """A film that cannot be made or an overlay that cannot be drawn."""
 
 
+class ArgumentError(TrackerError, ValueError):
+    """An argument of the tracker that makes no sense: an array of the wrong type or shape, a range, a rate."""
+
+
 class AnglesError(PydpendError):
     """Angles that cannot be had from these nodes, or an angles table that is not one."""
 

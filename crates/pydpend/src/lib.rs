@@ -1,11 +1,21 @@
-//! Python module `pydpend._tracker`.
+//! Python module `pydpend._tracker`: converts arguments, releases the GIL, maps errors. No algorithm.
+//!
+//! Each area has its file and is registered by one line in the module below; `python/pydpend` wraps it all.
+
+mod errors;
 mod simulation;
+mod tables;
 
 use pyo3::prelude::*;
 
-/// The compiled half of pydpend.
+/// The compiled half of pydpend; private.
 #[pymodule]
 mod _tracker {
     #[pymodule_export]
     use super::simulation::{poincare_section, simulate_ensemble, simulate_motion, tangent_growth};
+    #[pymodule_export]
+    use super::tables::{arrow_reader, check_table, read_meta, read_rig, read_table, rig_toml, write_table};
+
+    #[pymodule_export]
+    const VERSION: &str = env!("CARGO_PKG_VERSION");
 }

@@ -43,6 +43,18 @@ impl Status {
             Status::Ambiguous => "ambiguous",
         }
     }
+
+    /// Whether the place is given.
+    pub fn is_seen(self) -> bool {
+        matches!(self, Status::Seen | Status::Reacquired)
+    }
+
+    /// The status of a number, `None` if there is none.
+    pub fn from_number(number: u8) -> Option<Self> {
+        [Status::Missing, Status::Seen, Status::Reacquired, Status::Ambiguous]
+            .get(usize::from(number))
+            .copied()
+    }
 }
 
 /// One node in one frame. The place is NaN unless its status is seen or reacquired.

@@ -190,7 +190,7 @@ impl Swing {
                 })
                 .collect();
             detections.sort_by(|a, b| a.y_px.total_cmp(&b.y_px).then(a.x_px.total_cmp(&b.x_px)));
-            store.push(FrameStamp { index: k as u64, ticks: k as i64, decoded: true }, &detections);
+            store.push(FrameStamp { index: k as u64, ticks: k as i64, decoded: true }, &detections).unwrap();
             truth.push(row);
         }
         let reference = truth.iter().position(|r| r.iter().all(|t| t.1)).unwrap_or(0);

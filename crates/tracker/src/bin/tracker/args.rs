@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-use crate::film;
+use crate::{completions, film, track};
 
 /// A film of markers on rigid links in; where each marker is in each frame out.
 #[derive(Debug, Parser)]
@@ -18,14 +18,18 @@ pub struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Track(track::Args),
     Film(film::Args),
+    Completions(completions::Args),
 }
 
 impl Cli {
     /// Runs the subcommand.
     pub fn run(self) -> anyhow::Result<ExitCode> {
         match self.command {
+            Command::Track(args) => track::run(args),
             Command::Film(args) => film::run(args),
+            Command::Completions(args) => completions::run(args),
         }
     }
 }

@@ -3,7 +3,10 @@
 //! Exit status: 0 done; 1 done, but the recording ended early or nodes stayed lost; 2 an error; 130 interrupted.
 
 mod args;
+mod completions;
 mod film;
+mod track;
+mod watch;
 
 use std::process::ExitCode;
 

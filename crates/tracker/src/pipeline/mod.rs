@@ -1,0 +1,412 @@
+//! The one way through: source, detect, track, table, in that order, for every front end.
+//!
+//! Owns: [`run`], [`RunSettings`], [`RunSummary`], [`Observer`], what a killed run leaves and how it goes on.
+//! Must not: print, read a clock, or do any of the four parts' work.
+
+mod ahead;
+mod detecting;
+mod observer;
+mod state;
+
+use std::ops::Range;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use serde_json::json;
+
+pub use observer::{Observer, Silent, Stage};
+pub use state::partial_path;
+
+use crate::detect::{DetectSettings, Levels};
+use crate::discover::discover;
+use crate::error::{Error, Fault, Result};
+use crate::frame::{Ending, FrameSource};
+use crate::rig::Rig;
+use crate::source::{self, OpenOptions};
+use crate::store::DetectionStore;
+use crate::table::{
+    Form, NodeSummary, NodeTable, Rows, RunEnding, SCHEMA_VERSION, SourceFacts, TableMeta, TableWriter, Tally,
+};
+use crate::track::track_recording;
+use state::State;
+
+/// What to do where the output is there already.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Existing {
+    /// Refuse.
+    #[default]
+    Refuse,
+    /// Begin anew and replace it.
+    Replace,
+    /// Go on where an earlier run stopped; begin anew where none did.
+    Resume,
+}
+
+/// What to run.
+#[derive(Debug, Clone, Default)]
+pub struct RunSettings {
+    /// The recording, as [`source::open`] takes it.
+    pub input: String,
+    /// The table; `None` only collects rows in memory.
+    pub output: Option<PathBuf>,
+    /// What to do where the output is there already.
+    pub existing: Existing,
+    /// Whether the summary holds the table.
+    pub collect: bool,
+    /// The rig; `None` is found in the recording.
+    pub rig: Option<Rig>,
+    /// How the recording is read.
+    pub open: OpenOptions,
+    /// Frames to follow, the last one not among them; `None` is all.
+    pub frames: Option<Range<u64>>,
+    /// How markers are detected.
+    pub detect: DetectSettings,
+    /// Threads for detection; 0 is one for each core. The result is the same for any number.
+    pub threads: usize,
+}
+
+/// What came of a run.
+#[derive(Debug, Clone)]
+pub struct RunSummary {
+    /// What the table says of itself.
+    pub meta: TableMeta,
+    /// Frames in the table.
+    pub frames: u64,
+    /// Frames taken over from an earlier run.
+    pub resumed: u64,
+    /// What became of each node.
+    pub nodes: Vec<NodeSummary>,
+    /// What a user should know, a sentence each.
+    pub warnings: Vec<String>,
+    /// The table, if it was asked for.
+    pub table: Option<NodeTable>,
+}
+
+impl RunSummary {
+    /// Names of nodes that were never seen or stayed lost: gone at the end for longer than they ever were before.
+    pub fn lost(&self) -> Vec<&str> {
+        self.nodes.iter().filter(|n| n.stayed_lost()).map(|n| n.node.as_str()).collect()
+    }
+}
+
+/// Frames looked at before detection.
+const SAMPLES: usize = 12;
+
+/// Follows the markers of a recording and writes the table.
+///
+/// If the observer asks to stop, the table of what was done so far is written and says so; with an output the
+/// state to go on from is kept beside it.
+///
+/// # Errors
+/// The error of the part that failed; [`Error::Interrupted`] if the run was stopped before there was anything to
+/// write; [`Error::Table`] if the output is there already.
+pub fn run(settings: &RunSettings, observer: &mut dyn Observer) -> Result<RunSummary> {
+    check(settings)?;
+    if let Some(done) = already_done(settings)? {
+        return Ok(done);
+    }
+    observer.stage(Stage::Open, None);
+    let mut source = source::open(&settings.input, &settings.open)?;
+    let mut run = Run::begin(settings, source.as_mut(), observer)?;
+    let ending = run.detect(source, observer)?;
+    run.finish(ending, observer)
+}
+
+/// What can be refused before anything is read.
+fn check(settings: &RunSettings) -> Result<()> {
+    if let Some(frames) = &settings.frames
+        && frames.is_empty()
+    {
+        return Err(Error::Argument(
+            Fault::new("frames", format!("{}..{} holds no frame", frames.start, frames.end))
+                .advice("Give the first frame and one past the last, for example 0..1000"),
+        ));
+    }
+    let Some(output) = &settings.output else { return Ok(()) };
+    Form::of(output)?;
+    let resume = settings.existing == Existing::Resume;
+    if resume && settings.input == "-" {
+        return Err(Error::Argument(
+            Fault::new("--resume", "standard input cannot be read again").advice("Give a file"),
+        ));
+    }
+    if settings.existing == Existing::Refuse {
+        if output.exists() {
+            return Err(Error::Table(
+                Fault::new(output.display(), "it is there already")
+                    .advice("Choose another name, or replace it with --force"),
+            ));
+        }
+        let partial = partial_path(output);
+        if partial.exists() {
+            return Err(Error::Table(
+                Fault::new(partial.display(), "an earlier run was stopped and can go on")
+                    .advice("Go on with --resume, or begin anew with --force"),
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// The summary of a finished table, where there is nothing to go on with.
+fn already_done(settings: &RunSettings) -> Result<Option<RunSummary>> {
+    let Some(output) = &settings.output else { return Ok(None) };
+    if settings.existing != Existing::Resume || partial_path(output).exists() || !output.exists() {
+        return Ok(None);
+    }
+    let table = crate::table::read_table(output)?;
+    if table.meta.ending == RunEnding::Interrupted {
+        let partial = partial_path(output);
+        return Err(Error::Table(
+            Fault::new(
+                output.display(),
+                format!("its run was stopped, but its state {} is gone", partial.display()),
+            )
+            .advice("Begin anew with --force"),
+        ));
+    }
+    Ok(Some(RunSummary {
+        frames: table.frames() as u64,
+        resumed: table.frames() as u64,
+        nodes: table.summary(),
+        warnings: vec![format!("{} was complete already", output.display())],
+        meta: table.meta.clone(),
+        table: settings.collect.then_some(table),
+    }))
+}
+
+/// A run between its steps.
+struct Run<'a> {
+    settings: &'a RunSettings,
+    detect: DetectSettings,
+    facts: SourceFacts,
+    levels: Arc<Levels>,
+    store: DetectionStore,
+    resumed: u64,
+    /// How the recording ended, if an earlier run read all of it.
+    finished: Option<Ending>,
+    warnings: Vec<String>,
+}
+
+impl<'a> Run<'a> {
+    /// Learns what detection needs, or takes it from an earlier run.
+    fn begin(
+        settings: &'a RunSettings,
+        source: &mut dyn FrameSource,
+        observer: &mut dyn Observer,
+    ) -> Result<Self> {
+        let info = source.info();
+        let facts = SourceFacts::of(info);
+        let warnings = info.warnings.clone();
+        let mut detect = settings.detect.clone();
+        if let Some(rig) = &settings.rig {
+            fits(rig, &facts)?;
+            detect.region = detect.region.or_else(|| rig.region.clone());
+            detect.lens = detect.lens.or_else(|| rig.lens.clone());
+        }
+        let state = State::new(settings, &facts, &detect);
+        if settings.existing == Existing::Resume
+            && let Some(output) = &settings.output
+            && let Some(earlier) = state.resume(output)?
+        {
+            let store = DetectionStore::on_spool(earlier.spool)?;
+            let (resumed, levels) = (store.len() as u64, Arc::new(earlier.levels));
+            let finished = earlier.ending;
+            return Ok(Self { settings, detect, facts, levels, store, resumed, finished, warnings });
+        }
+        observer.stage(Stage::Learn, None);
+        let samples = source.sample(SAMPLES)?;
+        let levels = Levels::learn(&samples, &detect)?;
+        drop(samples);
+        if observer.interrupted() {
+            return Err(Error::Interrupted);
+        }
+        let store = match &settings.output {
+            Some(output) => DetectionStore::on_spool(state.create(output, &levels)?)?,
+            None => DetectionStore::new(),
+        };
+        let levels = Arc::new(levels);
+        Ok(Self { settings, detect, facts, levels, store, resumed: 0, finished: None, warnings })
+    }
+
+    /// Reads the recording through. `None` if the user stopped it.
+    fn detect(
+        &mut self,
+        source: Box<dyn FrameSource>,
+        observer: &mut dyn Observer,
+    ) -> Result<Option<Ending>> {
+        if let Some(ending) = self.finished.take() {
+            return Ok(Some(ending));
+        }
+        let frames = self.settings.frames.clone().unwrap_or(0..u64::MAX);
+        let total = self.facts.declared_frames.map(|n| n.min(frames.end).saturating_sub(frames.start));
+        observer.stage(Stage::Detect, total);
+        let detectors =
+            detecting::Detectors::new(self.settings.threads, &self.levels, &self.detect, &self.facts)?;
+        let outcome = detecting::detect_all(source, frames, &detectors, &mut self.store, observer);
+        let ending = match outcome {
+            Ok(ending) => ending,
+            Err(error) => {
+                // What was done is kept; if the disk is full, what is on it already.
+                let _ = self.store.close(None);
+                return Err(error);
+            }
+        };
+        let finished = ending.as_ref().map(state::finished).transpose()?;
+        self.store.close(finished.as_ref())?;
+        Ok(ending)
+    }
+
+    /// Finds the rig if it is not given, follows the markers, writes the table.
+    fn finish(mut self, ending: Option<Ending>, observer: &mut dyn Observer) -> Result<RunSummary> {
+        if self.store.is_empty() && ending.is_none() {
+            return Err(Error::Interrupted);
+        }
+        let stopped = ending.is_none();
+        let followed = self.follow(ending, observer);
+        if stopped && matches!(followed, Err(Error::Rig(_))) {
+            // Too little was seen for a table; the state to go on from is there.
+            return Err(Error::Interrupted);
+        }
+        followed
+    }
+
+    fn follow(&mut self, ending: Option<Ending>, observer: &mut dyn Observer) -> Result<RunSummary> {
+        if self.store.is_empty() {
+            return Err(self.no_frames(ending));
+        }
+        let image_px = [self.facts.width, self.facts.height];
+        let rig = match &self.settings.rig {
+            Some(rig) => rig.clone(),
+            None => {
+                observer.stage(Stage::Rig, None);
+                let mut found = discover(&self.store, image_px)?;
+                self.store.check()?;
+                self.warnings.append(&mut found.warnings);
+                found.rig.region = found.rig.region.or_else(|| self.detect.region.clone());
+                found.rig.lens = found.rig.lens.or_else(|| self.detect.lens.clone());
+                found.rig
+            }
+        };
+        let total = self.store.len() as u64;
+        observer.stage(Stage::Track, Some(total));
+        let mut writer = match &self.settings.output {
+            Some(output) => Some(TableWriter::create(output, &rig)?),
+            None => None,
+        };
+        let mut rows = self.settings.collect.then(Rows::default);
+        let mut tally = Tally::new(&rig);
+        let time_base = self.facts.time_base();
+        // A run that was stopped while it read is only stopped here if the user does not want to wait.
+        let mut stop = ending.is_none();
+        let reading_was_stopped = stop;
+        let mut done = 0;
+        let tracked = track_recording(&self.store, &rig, &mut |stamp, observations| {
+            let time_s = time_base.seconds(stamp.ticks);
+            if let Some(writer) = &mut writer {
+                writer.push(stamp.index, time_s, observations)?;
+            }
+            if let Some(rows) = &mut rows {
+                rows.push(stamp.index, time_s, observations);
+            }
+            tally.push(observations);
+            done += 1;
+            if done % 256 == 0 {
+                observer.progress(done);
+                let leave = if reading_was_stopped { observer.abandoned() } else { observer.interrupted() };
+                if leave {
+                    stop = true;
+                    return Err(Error::Interrupted);
+                }
+            }
+            Ok(())
+        });
+        match tracked {
+            Ok(_) => observer.progress(done),
+            Err(Error::Interrupted) if stop && done > 0 => {}
+            Err(error) => return Err(error),
+        }
+        self.store.check()?;
+        let meta = TableMeta {
+            schema_version: SCHEMA_VERSION,
+            tool: TableMeta::this_tool(),
+            settings: self.settings_json(),
+            source: self.facts.clone(),
+            ending: match ending {
+                _ if stop => RunEnding::Interrupted,
+                Some(Ending::Early { frames, byte, reason }) => {
+                    RunEnding::Early { frames, byte, reason: self.base_names(&reason) }
+                }
+                _ => RunEnding::Complete,
+            },
+            rig,
+        };
+        if let Some(writer) = writer {
+            writer.finish(&meta)?;
+        }
+        if let (Some(output), false) = (&self.settings.output, stop) {
+            state::remove(output)?;
+        }
+        Ok(RunSummary {
+            frames: done,
+            resumed: self.resumed,
+            nodes: tally.summary(),
+            warnings: std::mem::take(&mut self.warnings),
+            table: rows.map(|rows| NodeTable { meta: meta.clone(), rows }),
+            meta,
+        })
+    }
+
+    fn no_frames(&self, ending: Option<Ending>) -> Error {
+        let fault = match (&self.settings.frames, ending) {
+            (_, Some(Ending::Early { reason, .. })) => {
+                Fault::new(&self.settings.input, format!("not one frame could be read ({reason})"))
+                    .advice("Copy the recording again")
+            }
+            (Some(frames), _) => {
+                Fault::new(&self.settings.input, format!("it ends before frame {}", frames.start))
+                    .advice("Give a range of frames that are there")
+            }
+            (None, _) => {
+                Fault::new(&self.settings.input, "it has no frames").advice("Copy the recording again")
+            }
+        };
+        Error::Source(fault)
+    }
+
+    /// What was asked for and what was learned. Neither threads nor folders: they change nothing.
+    fn settings_json(&self) -> serde_json::Value {
+        json!({
+            "detect": self.detect,
+            "levels": *self.levels,
+            "fps": self.settings.open.fps,
+            "decoder": self.settings.open.decoder,
+            "frames": self.settings.frames.as_ref().map(|r| [Some(r.start), (r.end < u64::MAX).then_some(r.end)]),
+            "rig": if self.settings.rig.is_some() { "given" } else { "found" },
+        })
+    }
+
+    /// A message with the recording's name without its folder.
+    fn base_names(&self, text: &str) -> String {
+        text.replace(&self.settings.input, &self.facts.name)
+    }
+}
+
+/// Whether a rig belongs to a recording of this size.
+fn fits(rig: &Rig, facts: &SourceFacts) -> Result<()> {
+    let image_px = [facts.width, facts.height];
+    if rig.image_px != image_px {
+        let [w, h] = rig.image_px;
+        return Err(Error::Rig(
+            Fault::new(
+                "rig",
+                format!(
+                    "it is for images of {w} x {h} px, the recording has {} x {}",
+                    image_px[0], image_px[1]
+                ),
+            )
+            .advice("Make one for this recording with `tracker setup`"),
+        ));
+    }
+    Ok(())
+}

@@ -1,0 +1,144 @@
+//! What a run leaves beside its output until the table is whole, so that a killed one can go on.
+//!
+//! Owns: the name of that file, the header in it, what must agree for a run to go on. The detections in it are
+//! what a finished table is made of, whether one run made them or several: so the table's bytes are the same.
+
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+
+use super::RunSettings;
+use crate::detect::{DetectSettings, Levels};
+use crate::error::{Error, Fault, Place, Result};
+use crate::frame::Ending;
+use crate::store::{Finished, Spool};
+use crate::table::{SourceFacts, TableMeta};
+
+/// Where the state of a run for `output` is kept.
+pub fn partial_path(output: &Path) -> PathBuf {
+    let mut name = output.as_os_str().to_owned();
+    name.push(".partial");
+    PathBuf::from(name)
+}
+
+/// What must be the same for a run to go on: recording, detection, range of frames, program.
+pub struct State {
+    identity: Value,
+}
+
+/// What an earlier run left.
+pub struct Earlier {
+    pub spool: Spool,
+    pub levels: Levels,
+    /// How the recording ended, if it was read through.
+    pub ending: Option<Ending>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Header {
+    identity: Value,
+    levels: Levels,
+}
+
+impl State {
+    pub fn new(settings: &RunSettings, facts: &SourceFacts, detect: &DetectSettings) -> Self {
+        let identity = json!({
+            "program": TableMeta::this_tool(),
+            "recording": facts,
+            "detection settings": detect,
+            "--decoder": settings.open.decoder,
+            "--fps": settings.open.fps,
+            "--frames": settings.frames.as_ref().map(|r| [r.start, r.end]),
+        });
+        Self { identity }
+    }
+
+    /// Begins a new state; an older one is gone.
+    pub fn create(&self, output: &Path, levels: &Levels) -> Result<Spool> {
+        let header = Header { identity: self.identity.clone(), levels: levels.clone() };
+        let text =
+            serde_json::to_string(&header).map_err(|e| Error::Table(Fault::new("state", e.to_string())))?;
+        Spool::create(&partial_path(output), &text)
+    }
+
+    /// Opens what an earlier run left, if one did.
+    pub fn resume(&self, output: &Path) -> Result<Option<Earlier>> {
+        let path = partial_path(output);
+        if !path.exists() {
+            return Ok(None);
+        }
+        let (spool, text) = Spool::resume(&path)?;
+        let advice = "Begin anew with --force";
+        let header: Header = serde_json::from_str(&text).map_err(|e| {
+            Error::Table(
+                Fault::new(path.display(), format!("its header is of another program ({e})")).advice(advice),
+            )
+        })?;
+        if let Some(object) = self.identity.as_object() {
+            for (key, value) in object {
+                if header.identity.get(key) != Some(value) {
+                    return Err(Error::Table(
+                        Fault::new(path.display(), format!("the earlier run had another {key}"))
+                            .at(Place::Key(difference(header.identity.get(key), value)))
+                            .advice("Run with what it had, or begin anew with --force"),
+                    ));
+                }
+            }
+        }
+        let ending = spool.finished().map(|f| read_ending(&f.ending, &path)).transpose()?;
+        Ok(Some(Earlier { spool, levels: header.levels, ending }))
+    }
+}
+
+/// What differs, in few words.
+fn difference(before: Option<&Value>, now: &Value) -> String {
+    match (before.and_then(Value::as_object), now.as_object()) {
+        (Some(before), Some(now)) => {
+            let key = now.keys().find(|&k| before.get(k) != now.get(k)).cloned().unwrap_or_default();
+            let show = |v: Option<&Value>| v.map_or_else(|| "nothing".into(), ToString::to_string);
+            format!("{key} was {}, is {}", show(before.get(&key)), show(now.get(&key)))
+        }
+        _ => format!("was {}, is {now}", before.map_or_else(|| "nothing".into(), ToString::to_string)),
+    }
+}
+
+#[derive(Serialize, Deserialize)]
+struct EndingText {
+    early: Option<(u64, Option<u64>, String)>,
+}
+
+/// How a recording ended, as the state file has it.
+pub fn finished(ending: &Ending) -> Result<Finished> {
+    let early = match ending {
+        Ending::Complete => None,
+        Ending::Early { frames, byte, reason } => Some((*frames, *byte, reason.clone())),
+    };
+    let ending = serde_json::to_string(&EndingText { early })
+        .map_err(|e| Error::Table(Fault::new("state", e.to_string())))?;
+    Ok(Finished { ending })
+}
+
+fn read_ending(text: &str, path: &Path) -> Result<Ending> {
+    let text: EndingText = serde_json::from_str(text).map_err(|e| {
+        Error::Table(
+            Fault::new(path.display(), format!("its last record is of another program ({e})"))
+                .advice("Begin anew with --force"),
+        )
+    })?;
+    Ok(match text.early {
+        None => Ending::Complete,
+        Some((frames, byte, reason)) => Ending::Early { frames, byte, reason },
+    })
+}
+
+/// Removes the state of a run whose table is whole.
+pub fn remove(output: &Path) -> Result<()> {
+    let path = partial_path(output);
+    std::fs::remove_file(&path).map_err(|e| {
+        Error::Table(
+            Fault::new(path.display(), format!("the table is whole, but this cannot be removed ({e})"))
+                .advice("Remove it yourself"),
+        )
+    })
+}

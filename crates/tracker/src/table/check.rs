@@ -1,0 +1,92 @@
+//! What makes a node table valid.
+//!
+//! Owns: [`NodeTable::check`]. Must not: read or write.
+
+use rayon::prelude::*;
+
+use super::{NodeTable, STATUS_WORDS, row_fault};
+use crate::error::{Error, Fault, Result};
+use crate::track::Status;
+
+impl NodeTable {
+    /// Checks everything a reader may rely on: as many rows as frames times nodes; frames and times increasing;
+    /// a place, an uncertainty and an area exactly where a node is seen; no two nodes at one place in a frame.
+    ///
+    /// # Errors
+    /// [`Error::Table`] naming the first row at fault; `name` is for the message.
+    pub fn check(&self, name: &str) -> Result<()> {
+        let (frames, nodes, rows) = (self.frames(), self.nodes(), &self.rows);
+        let cells = frames * nodes;
+        let lengths = [
+            rows.time_s.len() * nodes,
+            rows.xy_px.len() / 2,
+            rows.sigma_px.len(),
+            rows.area_px.len(),
+            rows.status.len(),
+        ];
+        if lengths.iter().any(|&n| n != cells) || rows.xy_px.len() % 2 != 0 {
+            return Err(Error::Table(Fault::new(
+                name,
+                format!("columns hold {lengths:?} values, expected {frames} frames x {nodes} nodes"),
+            )));
+        }
+        let first =
+            (0..frames).into_par_iter().filter_map(|t| self.frame_fault(t)).min_by_key(|(row, _)| *row);
+        match first {
+            Some((row, problem)) => Err(row_fault(name, row, problem)),
+            None => Ok(()),
+        }
+    }
+
+    /// The first row of the `t`-th frame that is wrong, and what is wrong with it.
+    fn frame_fault(&self, t: usize) -> Option<(usize, String)> {
+        let (rows, nodes) = (&self.rows, self.nodes());
+        let at = |n: usize| t * nodes + n;
+        if rows.frame[t] < 0 {
+            return Some((at(0), format!("frame {} is below 0", rows.frame[t])));
+        }
+        if !rows.time_s[t].is_finite() {
+            return Some((at(0), format!("time_s of frame {} is {}", rows.frame[t], rows.time_s[t])));
+        }
+        if t > 0 && rows.frame[t] <= rows.frame[t - 1] {
+            let problem = format!("frame {} comes after frame {}", rows.frame[t], rows.frame[t - 1]);
+            return Some((at(0), problem));
+        }
+        if t > 0 && rows.time_s[t] <= rows.time_s[t - 1] {
+            let problem = format!("time_s {} comes after {}", rows.time_s[t], rows.time_s[t - 1]);
+            return Some((at(0), problem));
+        }
+        for n in 0..nodes {
+            let k = at(n);
+            let node = &self.meta.rig.nodes[n].name;
+            let Some(status) = Status::from_number(rows.status[k]) else {
+                return Some((
+                    k,
+                    format!("status {} of node {node} is none of {STATUS_WORDS:?}", rows.status[k]),
+                ));
+            };
+            let (x, y, s, a) = (rows.xy_px[2 * k], rows.xy_px[2 * k + 1], rows.sigma_px[k], rows.area_px[k]);
+            let problem = if status.is_seen() {
+                if !(x.is_finite() && y.is_finite()) {
+                    format!("node {node} is {} but its place is ({x}, {y})", status.as_str())
+                } else if !(s.is_finite() && s > 0.0) {
+                    format!("node {node} is {} but its sigma_px is {s}", status.as_str())
+                } else if !(a.is_finite() && a >= 0.0) {
+                    format!("node {node} is {} but its area_px is {a}", status.as_str())
+                } else if let Some(m) =
+                    (0..n).find(|&m| rows.xy_px[2 * at(m)] == x && rows.xy_px[2 * at(m) + 1] == y)
+                {
+                    format!("nodes {} and {node} are at one place ({x}, {y})", self.meta.rig.nodes[m].name)
+                } else {
+                    continue;
+                }
+            } else if !(x.is_nan() && y.is_nan() && s.is_nan() && a.is_nan()) {
+                format!("node {node} is {} but has a place, a sigma_px or an area_px", status.as_str())
+            } else {
+                continue;
+            };
+            return Some((k, problem));
+        }
+        None
+    }
+}

@@ -1,0 +1,208 @@
+//! Reads a node table from CSV and the `.json` beside it.
+//!
+//! Owns: the grammar of a line, what each column must hold. Columns may come in any order and others beside them.
+
+use std::fs::File;
+use std::io::{BufRead, BufReader, ErrorKind};
+use std::path::{Path, PathBuf};
+
+use super::file::{json_beside, read_fault};
+use super::{COLUMNS, NodeTable, Rows, STATUS_WORDS, TableMeta};
+use crate::error::{Error, Fault, Place, Result};
+
+pub(super) fn read_meta(path: &Path) -> Result<TableMeta> {
+    let json = json_beside(path);
+    let text = std::fs::read_to_string(&json).map_err(|e| {
+        let problem = if e.kind() == ErrorKind::NotFound {
+            format!("its metadata file {} is not there", json.display())
+        } else {
+            format!("its metadata file {} cannot be read ({e})", json.display())
+        };
+        // If the table itself is not there, that is what to say.
+        match File::open(path) {
+            Err(e) => read_fault(path, &e),
+            Ok(_) => Error::Table(
+                Fault::new(path.display(), problem)
+                    .advice("Keep the .json that was written with the CSV beside it"),
+            ),
+        }
+    })?;
+    TableMeta::from_json(&text, &json.display().to_string())
+}
+
+pub(super) fn read(path: &Path) -> Result<NodeTable> {
+    let meta = read_meta(path)?;
+    let file = File::open(path).map_err(|e| read_fault(path, &e))?;
+    let mut lines = Lines {
+        path: path.to_owned(),
+        reader: BufReader::with_capacity(1 << 18, file),
+        number: 0,
+        line: String::new(),
+    };
+    if !lines.next()? {
+        return Err(lines.fault("the file is empty", "Run `tracker track` again"));
+    }
+    let columns = columns_of(&lines)?;
+    let mut rows = Rows::default();
+    let nodes = meta.rig.nodes.len();
+    let mut n = 0;
+    let mut unquoted = String::new();
+    let mut ends = Vec::new();
+    while lines.next()? {
+        split(&lines.line, &mut unquoted, &mut ends)
+            .map_err(|problem| lines.fault(problem, "Write the table again"))?;
+        let cell = |column: usize| -> Result<&str> {
+            let at = columns[column];
+            match ends.get(at) {
+                Some(&end) => Ok(&unquoted[if at == 0 { 0 } else { ends[at - 1] }..end]),
+                None => Err(lines.fault(
+                    format!("the row has {} fields, column {} is missing", ends.len(), COLUMNS[column]),
+                    "The table may be cut off here: copy it again, or run `tracker track` again",
+                )),
+            }
+        };
+        let frame: i64 = lines.number_in(cell(0)?, COLUMNS[0])?;
+        let time_s: f64 = lines.number_in(cell(1)?, COLUMNS[1])?;
+        if n == 0 {
+            rows.frame.push(frame);
+            rows.time_s.push(time_s);
+        } else if rows.frame.last() != Some(&frame) || rows.time_s.last() != Some(&time_s) {
+            return Err(lines.fault(
+                format!("frame {frame} at {time_s} s begins before all {nodes} nodes of the frame before it"),
+                "Each frame needs one row per node, in the order of the rig",
+            ));
+        }
+        let node = &meta.rig.nodes[n];
+        if cell(2)? != node.name || cell(3)? != node.body {
+            return Err(lines.fault(
+                format!(
+                    "node {:?} of body {:?}, expected {:?} of {:?}",
+                    cell(2)?,
+                    cell(3)?,
+                    node.name,
+                    node.body
+                ),
+                "Each frame needs one row per node, in the order of the rig",
+            ));
+        }
+        let word = cell(8)?;
+        let Some(status) = STATUS_WORDS.iter().position(|w| *w == word) else {
+            return Err(lines.fault(format!("status {word:?} is none of {STATUS_WORDS:?}"), ""));
+        };
+        rows.status.push(status as u8);
+        rows.xy_px.push(lines.optional(cell(4)?, COLUMNS[4])?);
+        rows.xy_px.push(lines.optional(cell(5)?, COLUMNS[5])?);
+        rows.sigma_px.push(lines.optional(cell(6)?, COLUMNS[6])? as f32);
+        rows.area_px.push(lines.optional(cell(7)?, COLUMNS[7])? as f32);
+        n = (n + 1) % nodes;
+    }
+    if n != 0 {
+        return Err(lines.fault(
+            format!("the last frame has rows for {n} of {nodes} nodes"),
+            "The table is cut off: copy it again, or run `tracker track` again",
+        ));
+    }
+    Ok(NodeTable { meta, rows })
+}
+
+/// For each of [`COLUMNS`] its place in the file.
+fn columns_of(lines: &Lines) -> Result<[usize; COLUMNS.len()]> {
+    let header: Vec<&str> =
+        lines.line.trim_start_matches('\u{feff}').split(',').map(|c| c.trim().trim_matches('"')).collect();
+    let mut columns = [0; COLUMNS.len()];
+    for (place, name) in columns.iter_mut().zip(COLUMNS) {
+        *place = header.iter().position(|c| *c == name).ok_or_else(|| {
+            Error::Table(
+                Fault::new(
+                    lines.path.display(),
+                    format!("there is no column {name}, only {}", header.join(", ")),
+                )
+                .at(Place::Line(1))
+                .advice("Give a node table written by `tracker track`"),
+            )
+        })?;
+    }
+    Ok(columns)
+}
+
+struct Lines {
+    path: PathBuf,
+    reader: BufReader<File>,
+    number: u64,
+    line: String,
+}
+
+impl Lines {
+    fn next(&mut self) -> Result<bool> {
+        self.line.clear();
+        let read = self.reader.read_line(&mut self.line);
+        self.number += 1;
+        match read {
+            Ok(0) => return Ok(false),
+            Ok(_) => {}
+            Err(e) if e.kind() == ErrorKind::InvalidData => {
+                return Err(self.fault("it is not text (UTF-8)", "Give a CSV file"));
+            }
+            Err(e) => return Err(read_fault(&self.path, &e)),
+        }
+        let whole = self.line.trim_end_matches(['\r', '\n']).len();
+        self.line.truncate(whole);
+        Ok(true)
+    }
+
+    fn fault(&self, problem: impl Into<String>, advice: &str) -> Error {
+        Error::Table(Fault::new(self.path.display(), problem).at(Place::Line(self.number)).advice(advice))
+    }
+
+    fn number_in<T: std::str::FromStr>(&self, text: &str, column: &str) -> Result<T> {
+        text.trim().parse().map_err(|_| {
+            self.fault(
+                format!("column {column}: {text:?} is not a number"),
+                "Correct the row or write the table again",
+            )
+        })
+    }
+
+    /// An empty field is what is not seen.
+    fn optional(&self, text: &str, column: &str) -> Result<f64> {
+        if text.trim().is_empty() {
+            return Ok(f64::NAN);
+        }
+        let value: f64 = self.number_in(text, column)?;
+        if value.is_finite() {
+            Ok(value)
+        } else {
+            Err(self.fault(
+                format!("column {column}: {text} is not a finite number"),
+                "Leave the field empty where nothing is seen",
+            ))
+        }
+    }
+}
+
+/// Splits a line into fields, one after the other in `out`, each up to its entry in `ends`.
+fn split(line: &str, out: &mut String, ends: &mut Vec<usize>) -> std::result::Result<(), String> {
+    out.clear();
+    ends.clear();
+    let mut rest = line;
+    loop {
+        if let Some(quoted) = rest.strip_prefix('"') {
+            rest = quoted;
+            loop {
+                let Some(at) = rest.find('"') else { return Err("a quoted name has no end".into()) };
+                out.push_str(&rest[..at]);
+                rest = &rest[at + 1..];
+                let Some(more) = rest.strip_prefix('"') else { break };
+                out.push('"');
+                rest = more;
+            }
+        }
+        let at = rest.find(',').unwrap_or(rest.len());
+        out.push_str(&rest[..at]);
+        ends.push(out.len());
+        if at == rest.len() {
+            return Ok(());
+        }
+        rest = &rest[at + 1..];
+    }
+}

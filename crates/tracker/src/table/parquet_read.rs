@@ -1,0 +1,361 @@
+//! Reads a node table from Parquet, row groups side by side.
+//!
+//! Owns: what each column must hold. Columns may come in any order, others beside them, and names may be plain
+//! strings: a table that pandas, polars or DuckDB has written again is read too, as long as its metadata are kept.
+
+use std::fs::File;
+use std::io::{BufReader, Read};
+use std::os::unix::fs::FileExt;
+use std::path::Path;
+use std::sync::Arc;
+
+use ::parquet::arrow::ProjectionMask;
+use ::parquet::arrow::arrow_reader::{
+    ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReaderBuilder,
+};
+use ::parquet::errors::{ParquetError, Result as ParquetResult};
+use ::parquet::file::reader::{ChunkReader, Length};
+use arrow::array::{Array, ArrayRef, AsArray, RecordBatch, StringArray};
+use arrow::compute::cast;
+use arrow::datatypes::{DataType, Float32Type, Float64Type, Int32Type, Int64Type};
+use bytes::Bytes;
+use rayon::prelude::*;
+
+use super::file::read_fault;
+use super::parquet::KEY_PREFIX;
+use super::{COLUMNS, NodeTable, Rows, STATUS_WORDS, TableMeta, row_fault};
+use crate::error::{Error, Fault, Place, Result};
+
+pub(super) fn read_meta(path: &Path) -> Result<TableMeta> {
+    Ok(open(path)?.2)
+}
+
+/// A file read at offsets, so that many can read it at once.
+#[derive(Clone)]
+struct Shared {
+    file: Arc<File>,
+    length: u64,
+}
+
+impl Length for Shared {
+    fn len(&self) -> u64 {
+        self.length
+    }
+}
+
+impl ChunkReader for Shared {
+    type T = BufReader<From>;
+
+    fn get_read(&self, start: u64) -> ParquetResult<Self::T> {
+        Ok(BufReader::new(From { file: Arc::clone(&self.file), at: start }))
+    }
+
+    fn get_bytes(&self, start: u64, length: usize) -> ParquetResult<Bytes> {
+        if start.checked_add(length as u64).is_none_or(|end| end > self.length) {
+            return Err(ParquetError::EOF(format!("{length} bytes from byte {start} of {}", self.length)));
+        }
+        let mut bytes = vec![0; length];
+        self.file.read_exact_at(&mut bytes, start)?;
+        Ok(bytes.into())
+    }
+}
+
+/// A file read from an offset on.
+struct From {
+    file: Arc<File>,
+    at: u64,
+}
+
+impl Read for From {
+    fn read(&mut self, out: &mut [u8]) -> std::io::Result<usize> {
+        let read = self.file.read_at(out, self.at)?;
+        self.at += read as u64;
+        Ok(read)
+    }
+}
+
+fn open(path: &Path) -> Result<(Shared, ArrowReaderMetadata, TableMeta)> {
+    let file = File::open(path).map_err(|e| read_fault(path, &e))?;
+    let length = file.metadata().map_err(|e| read_fault(path, &e))?.len();
+    let file = Shared { file: Arc::new(file), length };
+    let metadata = ArrowReaderMetadata::load(&file, ArrowReaderOptions::new()).map_err(|e| {
+        Error::Table(
+            Fault::new(path.display(), format!("it is not a whole Parquet file ({e})"))
+                .advice("It may be cut off: copy it again, or run `tracker track` again"),
+        )
+    })?;
+    let name = path.display().to_string();
+    let pairs = metadata.metadata().file_metadata().key_value_metadata();
+    let find = |key: &str| {
+        let full = format!("{KEY_PREFIX}{key}");
+        pairs?.iter().find(|kv| kv.key == full)?.value.clone()
+    };
+    let meta = TableMeta::from_entries(find, &name)?;
+    for column in COLUMNS {
+        if metadata.schema().field_with_name(column).is_err() {
+            let there: Vec<&str> = metadata.schema().fields().iter().map(|f| f.name().as_str()).collect();
+            return Err(Error::Table(
+                Fault::new(&name, format!("there is no column {column}, only {}", there.join(", ")))
+                    .advice("Give a node table written by `tracker track`"),
+            ));
+        }
+    }
+    Ok((file, metadata, meta))
+}
+
+pub(super) fn read(path: &Path) -> Result<NodeTable> {
+    let (file, metadata, meta) = open(path)?;
+    let name = path.display().to_string();
+    let groups = metadata.metadata().row_groups();
+    let mut first_rows = Vec::with_capacity(groups.len());
+    let mut total = 0usize;
+    for group in groups {
+        first_rows.push(total);
+        total += group.num_rows().max(0) as usize;
+    }
+    let nodes = meta.rig.nodes.len();
+    if !total.is_multiple_of(nodes) {
+        return Err(Error::Table(
+            Fault::new(
+                &name,
+                format!("it has {total} rows, which is not a whole number of frames of {nodes} nodes"),
+            )
+            .advice("Each frame needs one row per node, in the order of the rig"),
+        ));
+    }
+    let columns = ProjectionMask::columns(metadata.parquet_schema(), COLUMNS);
+    // Each group fills its own part of the table, so the parts can be filled side by side.
+    let mut table = Cells::new(total);
+    let parts = table.split(&first_rows);
+    parts.into_par_iter().enumerate().try_for_each(|(g, mut part)| -> Result<()> {
+        let rows = groups[g].num_rows().max(1) as usize;
+        let damaged = |e: String| {
+            Error::Table(
+                Fault::new(&name, format!("row group {g} cannot be read ({e})"))
+                    .at(Place::Row(first_rows[g] as u64))
+                    .advice("It is damaged: copy it again, or run `tracker track` again"),
+            )
+        };
+        let reader = ParquetRecordBatchReaderBuilder::new_with_metadata(file.clone(), metadata.clone())
+            .with_row_groups(vec![g])
+            .with_projection(columns.clone())
+            .with_batch_size(rows)
+            .build()
+            .map_err(|e| damaged(e.to_string()))?;
+        let mut done = 0;
+        for batch in reader {
+            let batch = batch.map_err(|e| damaged(e.to_string()))?;
+            let here =
+                part.split_off_front(batch.num_rows()).ok_or_else(|| damaged("too many rows".into()))?;
+            here.fill(&batch, &meta, first_rows[g] + done, &name)?;
+            done += batch.num_rows();
+        }
+        if part.frame.is_empty() { Ok(()) } else { Err(damaged(format!("it has {done} of {rows} rows"))) }
+    })?;
+    table.into_rows(nodes, &name).map(|rows| NodeTable { meta, rows })
+}
+
+/// The columns as the file has them, one entry per row.
+struct Cells {
+    frame: Vec<i64>,
+    time_s: Vec<f64>,
+    xy_px: Vec<f64>,
+    sigma_px: Vec<f32>,
+    area_px: Vec<f32>,
+    status: Vec<u8>,
+}
+
+/// A run of rows of [`Cells`].
+struct Part<'a> {
+    frame: &'a mut [i64],
+    time_s: &'a mut [f64],
+    xy_px: &'a mut [f64],
+    sigma_px: &'a mut [f32],
+    area_px: &'a mut [f32],
+    status: &'a mut [u8],
+}
+
+impl Cells {
+    fn new(rows: usize) -> Self {
+        Self {
+            frame: vec![0; rows],
+            time_s: vec![0.0; rows],
+            xy_px: vec![0.0; 2 * rows],
+            sigma_px: vec![0.0; rows],
+            area_px: vec![0.0; rows],
+            status: vec![0; rows],
+        }
+    }
+
+    fn split(&mut self, first_rows: &[usize]) -> Vec<Part<'_>> {
+        let total = self.frame.len();
+        let mut rest = Part {
+            frame: &mut self.frame,
+            time_s: &mut self.time_s,
+            xy_px: &mut self.xy_px,
+            sigma_px: &mut self.sigma_px,
+            area_px: &mut self.area_px,
+            status: &mut self.status,
+        };
+        let ends = first_rows.iter().skip(1).copied().chain([total]);
+        let mut parts = Vec::with_capacity(first_rows.len());
+        for (&start, end) in first_rows.iter().zip(ends) {
+            parts.extend(rest.split_off_front(end - start));
+        }
+        parts
+    }
+
+    /// One entry per frame where the file has one per row.
+    fn into_rows(self, nodes: usize, name: &str) -> Result<Rows> {
+        let frames = self.frame.len() / nodes;
+        for t in 0..frames {
+            let (frame, time_s) = (self.frame[t * nodes], self.time_s[t * nodes]);
+            for k in t * nodes..(t + 1) * nodes {
+                if self.frame[k] != frame || self.time_s[k] != time_s {
+                    let problem = format!(
+                        "frame {} at {} s begins before all {nodes} nodes of frame {frame}",
+                        self.frame[k], self.time_s[k]
+                    );
+                    return Err(row_fault(name, k, problem));
+                }
+            }
+        }
+        Ok(Rows {
+            frame: self.frame.into_iter().step_by(nodes).collect(),
+            time_s: self.time_s.into_iter().step_by(nodes).collect(),
+            xy_px: self.xy_px,
+            sigma_px: self.sigma_px,
+            area_px: self.area_px,
+            status: self.status,
+        })
+    }
+}
+
+impl<'a> Part<'a> {
+    fn split_off_front(&mut self, rows: usize) -> Option<Part<'a>> {
+        Some(Part {
+            frame: self.frame.split_off_mut(..rows)?,
+            time_s: self.time_s.split_off_mut(..rows)?,
+            xy_px: self.xy_px.split_off_mut(..2 * rows)?,
+            sigma_px: self.sigma_px.split_off_mut(..rows)?,
+            area_px: self.area_px.split_off_mut(..rows)?,
+            status: self.status.split_off_mut(..rows)?,
+        })
+    }
+
+    fn fill(self, batch: &RecordBatch, meta: &TableMeta, first_row: usize, name: &str) -> Result<()> {
+        let column = |at: usize, to: DataType| -> Result<ArrayRef> {
+            let fault =
+                |problem: String| Error::Table(Fault::new(name, problem).at(Place::Key(COLUMNS[at].into())));
+            let Some(array) = batch.column_by_name(COLUMNS[at]) else {
+                return Err(fault("the column is missing".into()));
+            };
+            let array = if array.data_type() == &to {
+                Arc::clone(array)
+            } else {
+                cast(array, &to)
+                    .map_err(|e| fault(format!("{} cannot be read as {to} ({e})", array.data_type())))?
+            };
+            let may_be_null = (4..8).contains(&at);
+            if !may_be_null && array.null_count() > 0 {
+                let row = first_row + (0..array.len()).find(|&i| array.is_null(i)).unwrap_or(0);
+                return Err(row_fault(name, row, format!("column {} is empty", COLUMNS[at])));
+            }
+            Ok(array)
+        };
+        self.frame.copy_from_slice(column(0, DataType::Int64)?.as_primitive::<Int64Type>().values());
+        self.time_s.copy_from_slice(column(1, DataType::Float64)?.as_primitive::<Float64Type>().values());
+        for (at, offset) in [(4, 0), (5, 1)] {
+            let array = column(at, DataType::Float64)?;
+            let values = array.as_primitive::<Float64Type>();
+            no_nan(values.values(), &array, at, first_row, name)?;
+            for (to, value) in self.xy_px[offset..].iter_mut().step_by(2).zip(values.values()) {
+                *to = *value;
+            }
+            if let Some(nulls) = array.nulls().filter(|n| n.null_count() > 0) {
+                for (to, seen) in self.xy_px[offset..].iter_mut().step_by(2).zip(nulls) {
+                    if !seen {
+                        *to = f64::NAN;
+                    }
+                }
+            }
+        }
+        for (at, to) in [(6, self.sigma_px), (7, self.area_px)] {
+            let array = column(at, DataType::Float32)?;
+            let values = array.as_primitive::<Float32Type>();
+            no_nan(values.values(), &array, at, first_row, name)?;
+            to.copy_from_slice(values.values());
+            if let Some(nulls) = array.nulls().filter(|n| n.null_count() > 0) {
+                for (to, seen) in to.iter_mut().zip(nulls) {
+                    if !seen {
+                        *to = f32::NAN;
+                    }
+                }
+            }
+        }
+        let coded = DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8));
+        let nodes = &meta.rig.nodes;
+        for (at, expected) in [
+            (2, nodes.iter().map(|n| n.name.as_str()).collect::<Vec<_>>()),
+            (3, nodes.iter().map(|n| n.body.as_str()).collect()),
+        ] {
+            let array = column(at, coded.clone())?;
+            let (keys, words) = dictionary(&array, at, name)?;
+            // For each node in turn the keys that may stand for it: a dictionary may hold a word twice.
+            for (i, &key) in keys.iter().enumerate() {
+                let row = first_row + i;
+                let want = expected[row % nodes.len()];
+                if words.value(key as usize) != want {
+                    let problem = format!(
+                        "{} is {:?}, expected {want:?}: each frame needs one row per node, in the order of the rig",
+                        COLUMNS[at],
+                        words.value(key as usize)
+                    );
+                    return Err(row_fault(name, row, problem));
+                }
+            }
+        }
+        let array = column(8, coded)?;
+        let (keys, words) = dictionary(&array, 8, name)?;
+        let numbers: Vec<Option<u8>> = words
+            .iter()
+            .map(|w| STATUS_WORDS.iter().position(|known| Some(*known) == w).map(|n| n as u8))
+            .collect();
+        for (i, (to, &key)) in self.status.iter_mut().zip(keys).enumerate() {
+            *to = numbers[key as usize].ok_or_else(|| {
+                let problem = format!("status {:?} is none of {STATUS_WORDS:?}", words.value(key as usize));
+                row_fault(name, first_row + i, problem)
+            })?;
+        }
+        Ok(())
+    }
+}
+
+/// What is not seen is null; a NaN is somebody's mistake.
+fn no_nan<T: Copy + Into<f64>>(
+    values: &[T],
+    array: &ArrayRef,
+    at: usize,
+    first_row: usize,
+    name: &str,
+) -> Result<()> {
+    // Under a null the value may be anything.
+    match values.iter().enumerate().position(|(i, &v)| v.into().is_nan() && array.is_valid(i)) {
+        None => Ok(()),
+        Some(i) => {
+            let problem = format!("column {} is NaN; what is not seen is null", COLUMNS[at]);
+            Err(row_fault(name, first_row + i, problem))
+        }
+    }
+}
+
+/// Keys and words of a column of names.
+fn dictionary<'a>(array: &'a ArrayRef, at: usize, name: &str) -> Result<(&'a [i32], &'a StringArray)> {
+    let dictionary = array.as_dictionary::<Int32Type>();
+    match dictionary.values().as_string_opt::<i32>() {
+        Some(words) => Ok((dictionary.keys().values(), words)),
+        None => {
+            Err(Error::Table(Fault::new(name, "the column holds no text").at(Place::Key(COLUMNS[at].into()))))
+        }
+    }
+}

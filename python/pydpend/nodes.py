@@ -1,0 +1,277 @@
+"""Node tables in Python: where each marker is in each frame, and the rig it belongs to.
+
+Image coordinates: x right, y down, pixel centres at integers, the first pixel is (0, 0).
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pydpend import _tracker
+from pydpend.errors import ArgumentError, fault
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+MISSING, SEEN, REACQUIRED, AMBIGUOUS = range(4)
+"""Numbers in `Nodes.status`: not seen; seen; the first frame back; may be it, but another name is possible."""
+
+STATUS_WORDS = ("missing", "seen", "reacquired", "ambiguous")
+
+
+@dataclass(frozen=True)
+class Node:
+    """One marker: its name, its body's name, its centre in the reference frame (px)."""
+
+    name: str
+    body: str
+    x_px: float
+    y_px: float
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A point that two bodies share, or with one body the fixed pivot; its place in the reference frame (px)."""
+
+    name: str
+    bodies: tuple[str, ...]
+    x_px: float
+    y_px: float
+
+
+@dataclass(frozen=True)
+class Rig:
+    """Nodes, bodies and joints, and the frame in which they stand so.
+
+    `nodes` are by body, along it; `bodies` from the pivot outwards; `joints` with the pivot first.
+    `region` and `lens` are as in the rig file, or None.
+    """
+
+    image_px: tuple[int, int]
+    nodes: tuple[Node, ...]
+    bodies: tuple[str, ...]
+    joints: tuple[Joint, ...] = ()
+    reference_frame: int | None = None
+    region: dict[str, Any] | None = None
+    lens: dict[str, Any] | None = None
+
+    @staticmethod
+    def read(path: str | os.PathLike[str]) -> Rig:
+        """Reads a rig file (TOML), as `tracker setup` writes it.
+
+        Raises:
+            RigError: naming the line or key at fault.
+        """
+        return Rig.from_json(_tracker.read_rig(os.fspath(path)))
+
+    @staticmethod
+    def from_json(text: str) -> Rig:
+        """From the JSON of a table's metadata."""
+        return _rig(json.loads(text))
+
+    def to_json(self) -> str:
+        """As the JSON of a table's metadata."""
+        value: dict[str, Any] = {"schema": 1, "image_px": list(self.image_px)}
+        for key in ("reference_frame", "region", "lens"):
+            if getattr(self, key) is not None:
+                value[key] = getattr(self, key)
+        value["body"] = [{"name": name} for name in self.bodies]
+        value["node"] = [{"name": n.name, "body": n.body, "x_px": n.x_px, "y_px": n.y_px} for n in self.nodes]
+        value["joint"] = [
+            {"name": j.name, "bodies": list(j.bodies), "x_px": j.x_px, "y_px": j.y_px} for j in self.joints
+        ]
+        return json.dumps(value)
+
+    def to_toml(self) -> str:
+        """As the text of a rig file.
+
+        Raises:
+            RigError: if the rig is wrong in itself.
+        """
+        return _tracker.rig_toml(self.to_json())
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Writes a rig file.
+
+        Raises:
+            RigError: if the rig is wrong in itself.
+            OSError: if the file cannot be written.
+        """
+        Path(path).write_text(self.to_toml(), encoding="utf-8")
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the nodes, in the order of the arrays."""
+        return tuple(n.name for n in self.nodes)
+
+    def indices(self, body: str) -> NDArray[np.intp]:
+        """Indices of a body's nodes, in the order of the arrays.
+
+        Raises:
+            ArgumentError: if there is no such body.
+        """
+        if body not in self.bodies:
+            raise ArgumentError(
+                fault("body", f"{body!r} is not in the rig", f"It has {', '.join(self.bodies)}")
+            )
+        return np.array([i for i, n in enumerate(self.nodes) if n.body == body], dtype=np.intp)
+
+    def places_px(self) -> NDArray[np.float64]:
+        """Centres in the reference frame, (N, 2), px."""
+        return np.array([[n.x_px, n.y_px] for n in self.nodes])
+
+
+def _rig(value: dict[str, Any]) -> Rig:
+    width, height = value["image_px"]
+    return Rig(
+        image_px=(int(width), int(height)),
+        nodes=tuple(Node(**n) for n in value.get("node", ())),
+        bodies=tuple(b["name"] for b in value.get("body", ())),
+        joints=tuple(
+            Joint(j["name"], tuple(j["bodies"]), j["x_px"], j["y_px"]) for j in value.get("joint", ())
+        ),
+        reference_frame=value.get("reference_frame"),
+        region=value.get("region"),
+        lens=value.get("lens"),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Nodes:
+    """T frames of N nodes. What is not seen is NaN.
+
+    Attributes:
+        frame: index in the recording, from 0, (T,).
+        t_s: time in s, from the recording's time base, increasing, (T,).
+        xy_px: centres in px, (T, N, 2); x right, y down.
+        sigma_px: standard uncertainty of each coordinate in px, (T, N).
+        area_px: blob area in px, (T, N).
+        status: `MISSING`, `SEEN`, `REACQUIRED` or `AMBIGUOUS`, (T, N).
+        rig: the rig; its nodes are in the order of the arrays.
+        meta: recording (`source`), `settings`, program (`tool`) and `ending` of the run, as in the table.
+    """
+
+    frame: NDArray[np.int64]
+    t_s: NDArray[np.float64]
+    xy_px: NDArray[np.float64]
+    sigma_px: NDArray[np.float32]
+    area_px: NDArray[np.float32]
+    status: NDArray[np.uint8]
+    rig: Rig
+    meta: dict[str, Any] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        """Number of frames."""
+        return len(self.frame)
+
+    def __repr__(self) -> str:
+        """A line for people."""
+        seen = 100 * float(np.mean(self.seen)) if self.status.size else 0.0
+        name = self.meta.get("source", {}).get("name", "nodes")
+        return f"<Nodes {name}: {len(self)} frames x {len(self.rig.nodes)} nodes, {seen:.1f} % seen>"
+
+    @property
+    def seen(self) -> NDArray[np.bool_]:
+        """Where a place is known, (T, N)."""
+        return (self.status == SEEN) | (self.status == REACQUIRED)
+
+    @property
+    def complete(self) -> bool:
+        """Whether the run came to the end of what it was asked for and the recording was whole."""
+        ending = self.meta.get("ending", {})
+        return bool(ending.get("kind") == "complete")
+
+    def check(self) -> None:
+        """Checks the table's invariants: shapes, increasing frames and times, places exactly where seen.
+
+        Raises:
+            TableError: naming the first row at fault.
+            ArgumentError: if an array has the wrong type or shape.
+        """
+        _tracker.check_table(self._columns(), self._meta_json())
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Writes the table, Parquet or CSV (with its `.json`) by the ending, replacing what is there.
+
+        Raises:
+            TableError: if the table is not valid or the file cannot be written.
+            ArgumentError: if an array has the wrong type or shape.
+        """
+        _tracker.write_table(os.fspath(path), self._columns(), self._meta_json())
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """The table as pandas has it: one row per frame and node, names as categories."""
+        import pyarrow as pa
+
+        frame: pd.DataFrame = pa.table(self).to_pandas()
+        return frame
+
+    def __arrow_c_stream__(self, requested_schema: object | None = None) -> object:
+        """The table as an Arrow stream: `pyarrow.table(nodes)`, `polars.from_arrow(nodes)`."""
+        reader = _tracker.arrow_reader(self._columns(), self.rig.to_json())
+        return reader.__arrow_c_stream__(requested_schema)
+
+    def _columns(self) -> _tracker.HeldColumns:
+        columns = (self.frame, self.t_s, self.xy_px, self.sigma_px, self.area_px, self.status)
+        wanted = (
+            ("frame", np.int64, 1),
+            ("t_s", np.float64, 1),
+            ("xy_px", np.float64, 3),
+            ("sigma_px", np.float32, 2),
+            ("area_px", np.float32, 2),
+            ("status", np.uint8, 2),
+        )
+        for array, (name, dtype, dimensions) in zip(columns, wanted, strict=True):
+            if not isinstance(array, np.ndarray) or array.dtype != dtype or array.ndim != dimensions:
+                found = (
+                    f"{array.dtype} of {array.ndim} dimensions"
+                    if isinstance(array, np.ndarray)
+                    else "no array"
+                )
+                raise ArgumentError(
+                    fault(name, f"it is {found}", f"Give {np.dtype(dtype)} of {dimensions} dimensions")
+                )
+        return columns
+
+    def _meta_json(self) -> str:
+        meta = {key: value for key, value in self.meta.items() if key != "rig"}
+        missing = [
+            key for key in ("schema_version", "tool", "source", "settings", "ending") if key not in meta
+        ]
+        if missing:
+            raise ArgumentError(
+                fault(
+                    "meta",
+                    f"it lacks {', '.join(missing)}",
+                    "Keep the meta of the nodes that these come from",
+                )
+            )
+        return json.dumps({**meta, "rig": json.loads(self.rig.to_json())})
+
+
+def nodes_of(columns: _tracker.Columns) -> Nodes:
+    """Nodes of what the compiled half hands over."""
+    frame, t_s, xy_px, sigma_px, area_px, status, text = columns
+    meta = json.loads(text)
+    rig = _rig(meta.pop("rig"))
+    return Nodes(frame, t_s, xy_px, sigma_px, area_px, status, rig, meta)
+
+
+def read_nodes(path: str | os.PathLike[str]) -> Nodes:
+    """Reads a node table, Parquet or CSV by the ending, and checks every value.
+
+    Args:
+        path: a table written by `tracker track` or `Nodes.write`.
+
+    Raises:
+        TableError: naming the row, line or column at fault, or a schema version that is not known.
+        RigError: if the rig in it is wrong.
+    """
+    return nodes_of(_tracker.read_table(os.fspath(path)))
