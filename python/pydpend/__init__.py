@@ -7,6 +7,7 @@ hanging down, unwrapped over turns.
 from __future__ import annotations
 
 from pydpend.angles import LinkAngles, read_angles, write_angles
+from pydpend.damping import DampingFit, Prediction, fit_damping
 from pydpend.errors import (
     AnglesError,
     ArgumentError,
@@ -27,6 +28,7 @@ from pydpend.nodes import Nodes, Rig, read_nodes
 __all__ = [
     "AnglesError",
     "ArgumentError",
+    "DampingFit",
     "DetectError",
     "EncoderError",
     "FilmError",
@@ -34,6 +36,7 @@ __all__ = [
     "LinkAngles",
     "ModelError",
     "Nodes",
+    "Prediction",
     "PydpendError",
     "Rig",
     "RigError",
@@ -41,6 +44,7 @@ __all__ = [
     "SourceError",
     "TableError",
     "TrackerError",
+    "fit_damping",
     "read_angles",
     "read_nodes",
     "write_angles",

@@ -3,6 +3,7 @@
 Shapes: T frames, N nodes. Images are (H, W), uint8 or uint16. What is not seen is NaN.
 """
 
+from collections.abc import Callable, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -86,3 +87,43 @@ def tangent_growth(
     counted: int,
     tolerance: float,
 ) -> NDArray[np.float64]: ...
+
+_Floats = NDArray[np.float64]
+_Ints = NDArray[np.int64]
+_Angles = tuple[_Floats, _Floats, _Floats]
+
+def shooting_segments(
+    recordings: Sequence[_Angles], spans: Sequence[tuple[float, float]], length_s: float, chained: bool
+) -> tuple[_Ints, _Floats, _Floats]: ...
+def shooting_fit(
+    recordings: Sequence[_Angles],
+    segment_rows: _Ints,
+    segment_times: _Floats,
+    segment_states: _Floats,
+    model: dict[str, float],
+    zeros: Sequence[tuple[float, float]],
+    *,
+    free: Sequence[str],
+    bounded: Sequence[str],
+    clock: bool,
+    free_zeros: bool,
+    slack: Sequence[float],
+    learned: bool,
+    huber: float,
+    max_iterations: int,
+    stretch: float = 1.0,
+    progress: Callable[[int, int, float], object] | None = None,
+) -> dict[str, Any]: ...
+def shooting_trace(
+    recordings: Sequence[_Angles],
+    segment_rows: _Ints,
+    segment_times: _Floats,
+    segment_states: _Floats,
+    model: dict[str, float],
+    stretch: float,
+) -> tuple[_Ints, _Floats, _Floats]: ...
+def follow_motion(
+    model: dict[str, float], state: tuple[float, float, float, float], start_s: float, times_s: _Floats
+) -> _Floats: ...
+def term_names() -> list[tuple[str, str]]: ...
+def unit_powers(model: dict[str, float], state: _Floats, accelerations: _Floats) -> _Floats: ...

@@ -24,6 +24,7 @@ pub mod motion;
 pub mod parameters;
 pub mod scalar;
 pub mod section;
+pub mod shooting;
 pub mod simulate;
 mod tableau;
 pub mod terms;

@@ -2,6 +2,7 @@
 //!
 //! Each area has its file and is registered by one line in the module below; `python/pydpend` wraps it all.
 
+mod dynamics;
 mod errors;
 mod simulation;
 mod tables;
@@ -18,4 +19,9 @@ mod _tracker {
 
     #[pymodule_export]
     const VERSION: &str = env!("CARGO_PKG_VERSION");
+
+    #[pymodule_export]
+    use super::dynamics::{
+        follow_motion, shooting_fit, shooting_segments, shooting_trace, term_names, unit_powers,
+    };
 }

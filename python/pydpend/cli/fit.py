@@ -1,0 +1,216 @@
+"""Damping of each joint from the angles of one or several free decays.
+
+Writes fit.json, coefficients.csv, an energy table and figures per recording into DIR; with several
+recordings also trials.json and its figure. docs/damping.md says what is estimated and how to read it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pydpend.angles import LinkAngles
+    from pydpend.damping import DampingFit
+    from pydpend.model import Model
+
+HELP = "damping of each joint from angles of free decays"
+
+
+def add_arguments(p: argparse.ArgumentParser) -> None:
+    """The command's arguments."""
+    add_angles_arguments(p, many=True)
+    p.add_argument(
+        "--model", default="derived", help="derived (default), published, or a pendulum's TOML file"
+    )
+    p.add_argument("--method", choices=("trajectory", "energy"), default="trajectory")
+    p.add_argument(
+        "--laws",
+        default="full",
+        help="full (default), paper, or coefficients separated by commas (mu_v1,tau_c1)",
+    )
+    p.add_argument(
+        "--ratios",
+        choices=("free", "fixed"),
+        default="free",
+        help="whether the inertial ratios are fitted too (default) or the model's are believed",
+    )
+    p.add_argument("--free", default="", help="further parameters: added_inertia, offset1, offset2")
+    p.add_argument(
+        "--angle-maps", action="store_true", help="learn repeatable angle-dependent bias of the tracking"
+    )
+    p.add_argument(
+        "--no-prediction", action="store_true", help="do not fit again without each part to predict it"
+    )
+    p.add_argument("--no-figures", action="store_true")
+    add_output_arguments(p)
+
+
+def add_angles_arguments(p: argparse.ArgumentParser, *, many: bool) -> None:
+    """Arguments that say which angles, and which part of them."""
+    p.add_argument(
+        "angles",
+        metavar="ANGLES",
+        nargs="+" if many else None,
+        help="angles table (Parquet, CSV) or a folder of the paper's authors' form (DPmean_data_RB0.npy ...)",
+    )
+    p.add_argument("--start", type=float, metavar="S", help="start of the free decay, s (default: found)")
+    p.add_argument("--stop", type=float, metavar="S", help="its end, s (default: found)")
+    p.add_argument(
+        "--columns",
+        default="",
+        metavar="OURS=THEIRS,...",
+        help="the file's columns: time_s=t,phi1_rad=theta1",
+    )
+    p.add_argument("--hanging-rad", type=float, default=0.0, help="what the file's angles read when hanging")
+
+
+def add_output_arguments(p: argparse.ArgumentParser) -> None:
+    """Where results go and how much is said."""
+    p.add_argument("-o", "--output", required=True, metavar="DIR", type=Path)
+    p.add_argument("--json", action="store_true", help="the result as JSON on stdout")
+    p.add_argument("--quiet", action="store_true", help="no progress")
+
+
+def read(path: str, args: argparse.Namespace) -> LinkAngles:
+    """Angles as the arguments say."""
+    from pydpend.angles import read_angles
+    from pydpend.errors import AnglesError, fault
+
+    pairs = [item.split("=", 1) for item in args.columns.split(",") if item]
+    if any(len(pair) != 2 for pair in pairs):
+        raise AnglesError(
+            fault("--columns", f"{args.columns!r} is not OURS=THEIRS,...", "Write time_s=t,...")
+        )
+    return read_angles(path, columns=dict(pairs) or None, hanging_rad=args.hanging_rad)
+
+
+def load_model(name: str) -> Model:
+    """``derived``, ``published`` or a TOML file."""
+    from pydpend import model
+
+    if name == "derived":
+        return model.derived("A")
+    return model.published() if name == "published" else model.Model.from_toml(name)
+
+
+def progress(label: str, quiet: bool) -> Callable[[int, int, float], None] | None:
+    """Iteration, chi-square and time left on stderr, when it is a terminal."""
+    if quiet or not sys.stderr.isatty():
+        return None
+    begun = time.monotonic()
+
+    def report(step: int, most: int, chi2: float) -> None:
+        left = (time.monotonic() - begun) / step * (most - step)
+        print(
+            f"\r{label}: step {step}, chi-square {chi2:.4g}, at most {left:.0f} s left ",
+            end="",
+            file=sys.stderr,
+        )
+
+    return report
+
+
+def run(args: argparse.Namespace) -> int:
+    """Fits and writes. 1 when the fit did not converge."""
+    import warnings
+
+    from pydpend.damping import fit_damping
+
+    recordings = [read(path, args) for path in args.angles]
+    with warnings.catch_warnings():
+        # The published constants' warning is one of the reasons in the refusal that follows.
+        warnings.simplefilter("ignore")
+        model = load_model(args.model)
+    options = {
+        "method": args.method,
+        "laws": args.laws,
+        "start_s": args.start,
+        "stop_s": args.stop,
+        "ratios": args.ratios == "free",
+        "free": [name for name in args.free.split(",") if name],
+        "angle_maps": args.angle_maps,
+    }
+    report = progress("fit", args.quiet)
+    fit = fit_damping(
+        recordings,
+        model,
+        predict=args.method == "trajectory" and not args.no_prediction,
+        progress=report,
+        **options,
+    )
+    if report is not None:
+        print(file=sys.stderr)
+    args.output.mkdir(parents=True, exist_ok=True)
+    _write(fit, recordings, args.output, not args.no_figures)
+    if len(recordings) > 1:
+        from pydpend.trials import summary
+
+        trials = summary([fit_damping(r, model, **options) for r in recordings], fit)
+        write_json(args.output / "trials.json", trials.to_json())
+        if not args.no_figures:
+            from pydpend.plots.damping import trials_figure
+            from pydpend.plots.style import save
+
+            save(trials_figure(trials), args.output / "trials.png")
+    if args.json:
+        print(json.dumps(fit.to_json(), indent=1, allow_nan=False))
+    else:
+        for line in describe(fit):
+            print(line)
+    return 0 if fit.status == "converged" else 1
+
+
+def write_json(path: Path, content: dict[str, object]) -> None:
+    """One JSON file, whole or not at all."""
+    temporary = path.with_name(f".{path.name}.part")
+    temporary.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    temporary.replace(path)
+
+
+def _write(fit: DampingFit, recordings: list[LinkAngles], folder: Path, figures: bool) -> None:
+    write_json(folder / "fit.json", fit.to_json())
+    rows = ["name,value,sigma,unit"]
+    for name, e in (*fit.coefficients.items(), *((f"{k}/psi", e) for k, e in fit.ratios.items())):
+        rows.append(f"{name},{e.value!r},{e.sigma!r},{e.unit}")
+    (folder / "coefficients.csv").write_text("\n".join(rows) + "\n", encoding="utf-8")
+    for k, curve in enumerate(fit.energy):
+        suffix = "" if len(recordings) == 1 else f"-{k + 1}"
+        head = ["time_s", "energy_j", "model_j", *(f"{n}_j" for n in fit.coefficients)]
+        table = [curve.t_s, curve.energy_j, curve.model_j, *curve.works_j.T]
+        lines = [",".join(head)]
+        lines += [",".join(f"{v:.9g}" for v in row) for row in zip(*table, strict=True)]
+        (folder / f"energy{suffix}.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    if figures:
+        from pydpend.damping import Maps
+        from pydpend.plots.damping import energy_figure, maps_figure, shares_figure
+        from pydpend.plots.style import save
+
+        for k in range(len(fit.energy)):
+            suffix = "" if len(recordings) == 1 else f"-{k + 1}"
+            save(energy_figure(fit, k), folder / f"energy{suffix}.png")
+        save(shares_figure(fit), folder / "shares.png")
+        if fit.maps is not None:
+            save(maps_figure(Maps.from_json(fit.maps)), folder / "maps.png")
+
+
+def describe(fit: DampingFit) -> list[str]:
+    """The result in lines for a reader."""
+    lines = [fit.message]
+    for name, e in fit.coefficients.items():
+        lines.append(f"{name:12s} {e.value: .4e} +- {e.sigma:.1e} {e.unit}")
+    for name, e in fit.ratios.items():
+        lines.append(f"{name + '/psi':12s} {e.value: .6g} +- {e.sigma:.1e} {e.unit}")
+    for group in ("law", "joint"):
+        parts = ", ".join(
+            f"{k} {100 * e.value:.1f} +- {100 * e.sigma:.1f} %" for k, e in fit.shares[group].items()
+        )
+        lines.append(f"energy by {group}: {parts}")
+    for window, p in fit.prediction.items():
+        lines.append(f"prediction, {window} s windows: {p['phi1_deg']:.3f}/{p['phi2_deg']:.3f} deg RMS")
+    return [*lines, *fit.identifiability.sentences, *fit.notes]

@@ -1,0 +1,60 @@
+"""How well a fit predicts a recording: only the initial state of each window and the angle zeros are fitted.
+
+Writes predict.json, windows.csv and a figure into DIR.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+
+from pydpend.cli.fit import add_angles_arguments, add_output_arguments, read, write_json
+
+HELP = "predict a recording from a fit to others"
+
+
+def add_arguments(p: argparse.ArgumentParser) -> None:
+    """The command's arguments."""
+    add_angles_arguments(p, many=False)
+    p.add_argument(
+        "--fit", required=True, type=Path, metavar="DIR", help="folder (or fit.json) of pydpend fit"
+    )
+    p.add_argument("--windows", default="0.5,1,2", help="window lengths, s (default 0.5,1,2)")
+    add_output_arguments(p)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Predicts and writes."""
+    from pydpend.damping.stored import load_fit
+    from pydpend.errors import FitError, fault
+
+    stored = load_fit(args.fit)
+    try:
+        windows = [float(w) for w in args.windows.split(",")]
+    except ValueError:
+        windows = []
+    if not windows or min(windows) <= 0:
+        raise FitError(fault("--windows", f"{args.windows!r} is no list of lengths in s", "Write 0.5,1,2"))
+    result = stored.predict(read(args.angles, args), windows, start_s=args.start, stop_s=args.stop)
+    args.output.mkdir(parents=True, exist_ok=True)
+    write_json(args.output / "predict.json", result.to_json())
+    lines = ["window_s,start_s,phi1_rms_deg,phi2_rms_deg"]
+    for window, rows in result.rows.items():
+        lines += [f"{window},{start:.6f},{a:.6f},{b:.6f}" for start, a, b in rows]
+    (args.output / "windows.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    from pydpend.plots.damping import prediction_figure
+    from pydpend.plots.style import save
+
+    save(prediction_figure(result), args.output / "windows.png")
+    if args.json:
+        print(json.dumps(result.to_json(), indent=1, allow_nan=False))
+    else:
+        print(result.message)
+        for title, group in (("in window", result.in_window), ("forecast", result.forecast)):
+            for window, w in group.items():
+                print(
+                    f"{title} {window} s: RMS {w.rms_deg[0]:.3f}/{w.rms_deg[1]:.3f} deg, "
+                    f"median {w.median_deg[0]:.3f}/{w.median_deg[1]:.3f} deg, {w.n} windows"
+                )
+    return 0

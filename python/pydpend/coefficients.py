@@ -1,0 +1,82 @@
+"""Which damping laws a fit has: names, units, groups, and the model as the compiled part wants it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from pydpend.errors import FitError, fault
+from pydpend.model import UNITS, Model
+
+PAPER = ("mu_v1", "mu_v2", "mu_q1", "mu_q2", "rmu1", "rmu2")
+"""The paper's laws (Table 5 corrected): viscous, quadratic and load-proportional dry friction at each
+joint."""
+
+FULL = (*PAPER, "tau_c1", "tau_c2", "strip_drag")
+"""The paper's, a constant dry torque at each joint, and drag of the lower link in its true relative wind."""
+
+RATIOS = ("lambda", "sigma", "kappa", "a3")
+"""Constants whose ratio to psi free motion determines; psi itself is a common factor that it does not."""
+
+RATIO_UNITS = {"lambda": "1", "sigma": "1/s2", "kappa": "1/s2", "a3": "1"}
+
+LAW_OF = {
+    "mu_v1": "viscous",
+    "mu_v2": "viscous",
+    "mu_q1": "drag",
+    "mu_q2": "drag",
+    "strip_drag": "drag",
+    "rmu1": "dry",
+    "rmu2": "dry",
+    "tau_c1": "dry",
+    "tau_c2": "dry",
+}
+"""Law in whose share each coefficient counts: the paper's viscous, quadratic (here: all drag), Coulomb (all
+dry)."""
+
+JOINT_OF = {name: "lower" if name.endswith("2") or name == "strip_drag" else "upper" for name in FULL}
+"""Joint and link in whose share each coefficient counts."""
+
+
+def coefficients(laws: str | Sequence[str]) -> tuple[str, ...]:
+    """The coefficients of ``laws``: ``"paper"``, ``"full"``, or names (a sequence or comma-separated).
+
+    Raises FitError for a name that is none.
+    """
+    if isinstance(laws, str):
+        if laws in ("paper", "full"):
+            return PAPER if laws == "paper" else FULL
+        laws = [name.strip() for name in laws.split(",") if name.strip()]
+    unknown = [name for name in laws if name not in FULL]
+    if unknown or not laws:
+        raise FitError(
+            fault(
+                "laws",
+                f"{unknown[0]!r} is not a coefficient" if unknown else "there are none",
+                f"Use paper, full, or some of {', '.join(FULL)}",
+            )
+        )
+    return tuple(name for name in FULL if name in laws)
+
+
+def unit(name: str) -> str:
+    """Unit of a coefficient or ratio."""
+    return UNITS.get(name) or RATIO_UNITS[name]
+
+
+def parameters(model: Model) -> dict[str, float]:
+    """The model's constants under the compiled part's names, SI."""
+    return {
+        "psi": model.psi_kg_m2,
+        "lambda": model.lambda_kg_m2,
+        "zeta": model.zeta_kg_m2,
+        "a3": model.a3_kg_m2,
+        "sigma": model.sigma_j,
+        "kappa": model.kappa_j,
+        "m1": model.m1_kg,
+        "m2": model.m2_kg,
+        "l1": model.l1_m,
+        "g": model.g_m_s2,
+        "lower_inner": model.lower_inner_m,
+        # A link of no stated extent gets a millimetre, so that strip drag is that of its end alone.
+        "lower_outer": max(model.lower_outer_m, model.lower_inner_m + 1e-3),
+    }

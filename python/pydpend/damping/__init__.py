@@ -1,0 +1,21 @@
+"""Damping: every coefficient with an error bar that is true (paper Section 7.1 and beyond;
+docs/damping.md)."""
+
+from __future__ import annotations
+
+from pydpend.damping.fit import fit_damping
+from pydpend.damping.maps import Maps
+from pydpend.damping.prediction import Prediction, Window, predict
+from pydpend.damping.result import DampingFit, EnergyCurve, Estimate, Identifiability
+
+__all__ = [
+    "DampingFit",
+    "EnergyCurve",
+    "Estimate",
+    "Identifiability",
+    "Maps",
+    "Prediction",
+    "Window",
+    "fit_damping",
+    "predict",
+]

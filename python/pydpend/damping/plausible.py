@@ -1,0 +1,110 @@
+"""Whether a model's constants can be this pendulum's, before anything is fitted with them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pydpend.damping.shooting import Track
+from pydpend.errors import FitError, fault
+from pydpend.model import Model
+
+Floats = NDArray[np.float64]
+
+RISE = 0.05
+"""Rise of the energy, relative to its start, that no free decay shows. Constants a few percent off give 2
+%."""
+
+
+SCALE = 5.0
+"""Factor between the recording's and the model's frequencies that no motion of that pendulum has; units off by a
+thousand give 30."""
+
+
+def modes_hz(model: Model) -> tuple[float, float]:
+    """Frequencies of the two small oscillations about hanging, Hz."""
+    mass = model.mass_matrix(np.zeros(2))
+    stiffness = np.diag([model.sigma_j, model.kappa_j])
+    squared = np.linalg.eigvals(np.linalg.solve(mass, stiffness)).real
+    low, high = np.sort(np.sqrt(np.maximum(squared, 0.0)) / (2 * np.pi))
+    return float(low), float(high)
+
+
+def energy_rise(track: Track, span: tuple[float, float], model: Model) -> float:
+    """Largest rise of the energy of the measured motion, relative to its value at the start.
+
+    Local cubics over 24 ms give the rates; a running mean of 0.2 s takes the noise off before rises are
+    sought.
+    """
+    t, phi, _ = track
+    keep = (t >= span[0]) & (t <= span[1]) & np.isfinite(phi).all(axis=1)
+    t, phi = t[keep], phi[keep]
+    dt = float(np.median(np.diff(t)))
+    half = max(2, round(0.012 / dt))
+    u = np.arange(-half, half + 1)
+    weights = np.linalg.pinv(np.vander(u, 4, increasing=True).astype(np.float64))
+    smooth = np.column_stack([np.convolve(c, weights[0][::-1], "valid") for c in phi.T])
+    rate = np.column_stack([np.convolve(c, weights[1][::-1], "valid") for c in phi.T]) / dt
+    even = np.abs(t[2 * half :] - t[: -2 * half] - 2 * half * dt) < 0.5 * dt
+    energy = model.energy(smooth, rate)[even]
+    width = max(1, round(0.2 / dt))
+    if energy.size < 2 * width:
+        return 0.0
+    energy = np.convolve(energy, np.ones(width) / width, "valid")
+    rise = energy - np.minimum.accumulate(energy)
+    return float(rise.max() / max(energy[:width].mean(), 1e-300))
+
+
+def typical_hz(track: Track, span: tuple[float, float]) -> float:
+    """RMS acceleration over RMS rate of the upper link, as a frequency, Hz: between the modes when the links swing,
+    and of their size when they tumble. From local parabolas over 48 ms; NaN when too little is seen."""
+    t, phi, _ = track
+    keep = (t >= span[0]) & (t <= span[1]) & np.isfinite(phi[:, 0])
+    if keep.sum() < 50:
+        return float("nan")
+    t, x = t[keep], phi[keep, 0]
+    dt = float(np.median(np.diff(t)))
+    half = max(2, round(0.024 / dt))
+    u = np.arange(-half, half + 1)
+    weights = np.linalg.pinv(np.vander(u, 3, increasing=True).astype(np.float64))
+    rate = np.convolve(x, weights[1][::-1], "valid") / dt
+    acceleration = 2 * np.convolve(x, weights[2][::-1], "valid") / dt**2
+    even = np.abs(t[2 * half :] - t[: -2 * half] - 2 * half * dt) < 0.5 * dt
+    rms = float(np.sqrt(np.mean(rate[even] ** 2)))
+    return float(np.sqrt(np.mean(acceleration[even] ** 2))) / rms / (2 * np.pi) if rms > 0 else float("nan")
+
+
+def check_model(track: Track, span: tuple[float, float], model: Model, name: str, chi2: float | None) -> None:
+    """Refuses constants under which the measured motion gains energy, or whose frequencies are of another
+    scale.
+
+    Raises FitError in plain words.
+    """
+    low, high = modes_hz(model)
+    seen = typical_hz(track, span)
+    if np.isfinite(seen) and (low > SCALE * seen or high < seen / SCALE):
+        factor = (low / seen) ** 2 if low > seen else (high / seen) ** 2
+        raise FitError(
+            fault(
+                name,
+                f"the model {model.name!r} swings at {low:.3g} and {high:.3g} Hz, the recording at "
+                f"about {seen:.2g} Hz: "
+                f"sigma/psi is off by about {factor:.2g}",
+                "Check the units of the model (kg, m, s) and of the times",
+            )
+        )
+    rise = energy_rise(track, span, model)
+    if rise > RISE:
+        words = "" if chi2 is None else f", and with these constants fixed chi-square is {chi2:.0f}, not 1"
+        raise FitError(
+            fault(
+                name,
+                f"the constants of the model {model.name!r} are not this pendulum's: the energy of the "
+                "measured "
+                f"motion rises and falls by {100 * rise:.0f} % of its start although nothing drives it"
+                f"{words} "
+                f"(its small oscillations would be at {low:.3g} and {high:.3g} Hz)",
+                "Use constants derived from the parts (--model derived) or your own; no damping fitted with "
+                "these would mean anything",
+            )
+        )

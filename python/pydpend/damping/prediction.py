@@ -1,0 +1,310 @@
+"""Prediction of a recording from a fit that has not seen it: the number a user can trust.
+
+In a window only the initial state is fitted (and the recording's two angle zeros, common to all windows). A
+forecast fits the state to the past alone and looks ahead; while the lower link tumbles that is chaos,
+whatever the model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pydpend.damping import shooting
+from pydpend.damping.maps import Maps, corrected
+from pydpend.damping.result import DampingFit, clean
+from pydpend.damping.shooting import Segments, Track
+from pydpend.damping.trajectory import SEGMENT_S, Recording
+from pydpend.errors import FitError, fault
+
+Floats = NDArray[np.float64]
+
+WINDOWS_S = (0.5, 1.0, 2.0)
+PAST_S = 0.5
+"""Length of the past a forecast's state is fitted to."""
+NO_SLACK = 1e-3
+"""Slack inside a window, relative to a segment's own state: so small that a window is one motion."""
+LOOSE = 5.0
+"""Slack of the first, loose fit in the same unit."""
+HELD_OUT = 0.3
+"""Last part of a single recording that is left out of a fit and predicted."""
+
+
+@dataclass(frozen=True)
+class Window:
+    """Prediction errors over all windows of one length, degrees, per link."""
+
+    rms_deg: tuple[float, float]
+    """Over all samples."""
+    median_deg: tuple[float, float]
+    """Median of the windows' RMS."""
+    n: int
+    """Number of windows."""
+
+    def to_json(self) -> dict[str, Any]:
+        """As in ``predict.json``."""
+        out: dict[str, Any] = clean(
+            {"rms_deg": list(self.rms_deg), "median_deg": list(self.median_deg), "n": self.n}
+        )
+        return out
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """How well a fit predicts one recording."""
+
+    name: str
+    in_window: dict[str, Window]
+    """By window length in s."""
+    forecast: dict[str, Window]
+    """From the past half second only, by how far ahead."""
+    calm: dict[str, Window]
+    """The forecast after the lower link has stopped tumbling."""
+    zeros_rad: tuple[float, float]
+    rows: dict[str, Floats]
+    """Per window length: start time and the two RMS of each window, (n, 3), s and deg."""
+    message: str
+
+    def to_json(self) -> dict[str, Any]:
+        """``predict.json``."""
+
+        def group(windows: Mapping[str, Window]) -> dict[str, Any]:
+            return {k: w.to_json() for k, w in windows.items()}
+
+        out: dict[str, Any] = {
+            "name": self.name,
+            "in_window": group(self.in_window),
+            "forecast": group(self.forecast),
+            "forecast_calm": group(self.calm),
+            "zeros_deg": [float(np.degrees(z)) for z in self.zeros_rad],
+            "message": self.message,
+        }
+        return out
+
+
+def predict(
+    recording: Recording,
+    parameters: dict[str, float],
+    windows_s: Sequence[float] = WINDOWS_S,
+    maps: Maps | None = None,
+    *,
+    forecasts: bool = True,
+) -> Prediction:
+    """Predicts a recording with given parameters of the motion. Raises FitError when no window fits into
+    it."""
+    track = recording.track if maps is None else corrected([recording.track], maps)[0]
+    base = shooting.cut([track], [recording.span], SEGMENT_S)
+    if len(base) == 0:
+        raise FitError(
+            fault(recording.angles.name, "no segment has enough samples", "Give angles with fewer gaps")
+        )
+    # Zeros and smooth states first, with loose joints: no window starts from a bad state.
+    loose = shooting.solve(
+        [track], base, parameters, np.zeros((1, 2)), slack=LOOSE, learned=False, max_iterations=30
+    )
+    base, zeros = loose.segments, loose.zeros_rad
+    in_window: dict[str, Window] = {}
+    rows: dict[str, Floats] = {}
+    for window in windows_s:
+        size = max(1, round(window / SEGMENT_S))
+        errors, start = _windows(track, base, parameters, zeros, size)
+        if start.size:
+            in_window[f"{window:g}"] = _summary(errors)
+            rows[f"{window:g}"] = np.column_stack([start, errors.rms])
+    if not in_window:
+        raise FitError(
+            fault(
+                recording.angles.name,
+                f"no window of {min(windows_s):g} s fits into the free decay without a gap",
+                "Ask for shorter windows",
+            )
+        )
+    forecast: dict[str, Window] = {}
+    calm: dict[str, Window] = {}
+    if forecasts:
+        after = _tumbling_stops(recording)
+        for window in windows_s:
+            errors, start = _forecast(track, base, parameters, zeros, window)
+            if start.size:
+                forecast[f"{window:g}"] = _summary(errors)
+                late = start >= after
+                if late.any():
+                    calm[f"{window:g}"] = _summary(errors.take(late))
+    words = ", ".join(f"{k} s: {w.rms_deg[0]:.3f}/{w.rms_deg[1]:.3f} deg" for k, w in in_window.items())
+    return Prediction(
+        recording.angles.name,
+        in_window,
+        forecast,
+        calm,
+        (float(zeros[0, 0]), float(zeros[0, 1])),
+        rows,
+        f"{recording.decay.message}; RMS in windows {words}",
+    )
+
+
+@dataclass(frozen=True)
+class _Errors:
+    """Squared errors per window, deg^2, and counts, (n, 2)."""
+
+    squares: Floats
+    counts: Floats
+
+    @property
+    def rms(self) -> Floats:
+        out: Floats = np.sqrt(self.squares / np.maximum(self.counts, 1))
+        return out
+
+    def take(self, keep: NDArray[np.bool_]) -> _Errors:
+        return _Errors(self.squares[keep], self.counts[keep])
+
+
+def _summary(errors: _Errors) -> Window:
+    total = np.sqrt(errors.squares.sum(axis=0) / np.maximum(errors.counts.sum(axis=0), 1))
+    middle = np.median(errors.rms, axis=0)
+    return Window(
+        (float(total[0]), float(total[1])), (float(middle[0]), float(middle[1])), len(errors.counts)
+    )
+
+
+def _errors(
+    track: Track,
+    segments: Segments,
+    parameters: dict[str, float],
+    zeros: Floats,
+    label: NDArray[np.int64],
+    count: int,
+    since: Floats | None = None,
+) -> _Errors:
+    """Squared errors of each window; ``label`` says which window a segment belongs to; ``since`` leaves out
+    samples before that time of each segment."""
+    path = shooting.trace([track], segments, parameters)
+    r = np.degrees(shooting.residuals([track], path, zeros))
+    window = label[path.segment]
+    if since is not None:
+        r[track[0][path.sample] < since[path.segment]] = np.nan
+    squares, counts = np.zeros((count, 2)), np.zeros((count, 2))
+    for j in range(2):
+        good = np.isfinite(r[:, j])
+        squares[:, j] = np.bincount(window[good], r[good, j] ** 2, count)
+        counts[:, j] = np.bincount(window[good], minlength=count)
+    return _Errors(squares, counts)
+
+
+def _whole(segments: Segments, size: int) -> Segments:
+    """Each window of ``size`` segments as one segment."""
+    rows = segments.rows[::size].copy()
+    rows[:, 2] = segments.rows[size - 1 :: size, 2]
+    rows[:, 3] = 0
+    times = np.column_stack([segments.times_s[::size, 0], segments.times_s[size - 1 :: size, 1]])
+    return Segments(rows, times, segments.states[::size])
+
+
+def _windows(
+    track: Track, base: Segments, parameters: dict[str, float], zeros: Floats, size: int
+) -> tuple[_Errors, Floats]:
+    """Errors in windows of ``size`` segments with the initial state fitted in each."""
+    chains = base.grouped(size)
+    if len(chains) == 0:
+        return _Errors(np.zeros((0, 2)), np.zeros((0, 2))), np.zeros(0)
+    # Staged: the pieces are tied ever more tightly, then each window is one motion from one state.
+    solution = shooting.solve(
+        [track], chains, parameters, zeros, slack=NO_SLACK, learned=False, max_iterations=40, huber=1e3
+    )
+    whole = _whole(solution.segments, size)
+    count = len(whole)
+    errors = _errors(track, whole, parameters, solution.zeros_rad, np.arange(count), count)
+    return errors, whole.times_s[:, 0]
+
+
+def _forecast(
+    track: Track, base: Segments, parameters: dict[str, float], zeros: Floats, ahead_s: float
+) -> tuple[_Errors, Floats]:
+    """Errors from the end of each stretch of the past to ``ahead_s`` later; zeros are given."""
+    size = max(1, round(PAST_S / SEGMENT_S))
+    chains = base.grouped(size)
+    if len(chains) == 0:
+        return _Errors(np.zeros((0, 2)), np.zeros((0, 2))), np.zeros(0)
+    past = shooting.solve(
+        [track],
+        chains,
+        parameters,
+        zeros,
+        zeros=False,
+        slack=NO_SLACK,
+        learned=False,
+        max_iterations=40,
+        huber=1e3,
+    )
+    whole = _whole(past.segments, size)
+    now = whole.times_s[:, 1]
+    inside = now + ahead_s <= base.times_s[-1, 1] + 1e-9
+    rows, times = whole.rows[inside].copy(), whole.times_s[inside].copy()
+    times[:, 1] += ahead_s
+    rows[:, 2] = np.searchsorted(track[0], times[:, 1])
+    future = Segments(rows, times, whole.states[inside])
+    count = len(future)
+    errors = _errors(track, future, parameters, zeros, np.arange(count), count, since=now[inside])
+    seen = errors.counts.min(axis=1) > 0
+    return errors.take(seen), now[inside][seen]
+
+
+def _tumbling_stops(recording: Recording) -> float:
+    """When the lower link has passed the top for the last time, s."""
+    t, phi = recording.angles.t_s, recording.angles.phi_rad[:, 1]
+    here = (t >= recording.span[0]) & (t <= recording.span[1]) & np.isfinite(phi)
+    turns = np.floor((phi[here] + np.pi) / (2 * np.pi))
+    passed = np.flatnonzero(np.diff(turns))
+    return float(t[here][passed[-1] + 1]) if passed.size else recording.span[0]
+
+
+def held_out(
+    recordings: Sequence[Recording], run: Callable[[Sequence[Recording]], DampingFit]
+) -> tuple[dict[str, dict[str, Any]], str]:
+    """Prediction of what a fit has not seen: each recording from the others, or the last part of the only
+    one.
+
+    Returns RMS by window for ``fit.json`` and a sentence. Too short a recording gives none, and the
+    sentence why.
+    """
+    parts: list[tuple[list[Recording], Recording]] = []
+    if len(recordings) > 1:
+        parts = [([o for o in recordings if o is not r], r) for r in recordings]
+        words = "each recording predicted from a fit to the others"
+    else:
+        only = recordings[0]
+        edge = only.span[1] - HELD_OUT * (only.span[1] - only.span[0])
+        if edge - only.span[0] < 2.0 or only.span[1] - edge < 1.0:
+            return {}, "too short to leave a part out: no prediction of unseen data"
+        early = replace(only, decay=replace(only.decay, stop_s=edge))
+        late = replace(only, decay=replace(only.decay, start_s=edge))
+        parts = [([early], late)]
+        words = (
+            f"the last {100 * HELD_OUT:.0f} % (from {edge:.2f} s) predicted from a fit to what comes before"
+        )
+    collected: dict[str, list[Window]] = {}
+    for known, unknown in parts:
+        try:
+            fit = run(known)
+            maps = None if fit.maps is None else Maps.from_json(fit.maps)
+            result = predict(unknown, fit.parameters, maps=maps, forecasts=False)
+        except FitError as problem:
+            return {}, f"no prediction of unseen data: {problem}"
+        for key, window in result.in_window.items():
+            collected.setdefault(key, []).append(window)
+    out: dict[str, dict[str, Any]] = {}
+    for key, windows in collected.items():
+        n = np.array([w.n for w in windows], dtype=np.float64)
+        rms = np.sqrt(np.average([np.square(w.rms_deg) for w in windows], axis=0, weights=n))
+        middle = np.average([w.median_deg for w in windows], axis=0, weights=n)
+        out[key] = {
+            "phi1_deg": float(rms[0]),
+            "phi2_deg": float(rms[1]),
+            "phi1_median_deg": float(middle[0]),
+            "phi2_median_deg": float(middle[1]),
+            "n": int(n.sum()),
+        }
+    return out, words

@@ -1,0 +1,156 @@
+"""The result of a damping fit."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A number with its standard uncertainty and unit."""
+
+    value: float
+    sigma: float
+    unit: str
+
+    def to_json(self) -> dict[str, Any]:
+        """Value, sigma and unit; null where not finite."""
+        return {"value": number(self.value), "sigma": number(self.sigma), "unit": self.unit}
+
+
+@dataclass(frozen=True)
+class EnergyCurve:
+    """Energy of one recording's motion and what the laws take out of it (Fig. 19). All (T,) in s and J."""
+
+    t_s: Floats
+    energy_j: Floats
+    model_j: Floats
+    """Initial energy minus the works of all laws."""
+    works_j: Floats
+    """Energy taken out by each coefficient since the start, (T, C), in the order of the fit's
+    coefficients."""
+
+
+@dataclass(frozen=True)
+class Identifiability:
+    """What the data determine and what they do not."""
+
+    condition: float
+    """Condition number of the correlation-scaled information matrix of coefficients and ratios."""
+    correlations: dict[str, float]
+    """``"a/b"``: correlation, for pairs beyond 0.9."""
+    sentences: tuple[str, ...]
+    """The same in words."""
+
+
+@dataclass(frozen=True)
+class DampingFit:
+    """Damping coefficients with everything needed to judge them."""
+
+    method: str
+    """``trajectory`` or ``energy``."""
+    status: str
+    """``converged``, ``iteration_limit``, ``stalled``."""
+    message: str
+    chi2: float
+    """Mean squared standardised residual with only the noise's own slack at the joints: 1 for a model that is
+    right. NaN where it is not defined (energy fit)."""
+    n: int
+    """Number of measured values used."""
+    coefficients: dict[str, Estimate]
+    ratios: dict[str, Estimate]
+    """lambda, sigma, kappa and a3 over psi."""
+    shares: dict[str, dict[str, Estimate]]
+    """``law`` and ``joint``: fraction of the dissipated energy, each with its uncertainty."""
+    identifiability: Identifiability
+    parameters: dict[str, float]
+    """All parameters of the equations of motion at the solution, SI (psi as stated by the model)."""
+    names: tuple[str, ...]
+    """Names of the rows of `covariance`: coefficients and ratios."""
+    covariance: Floats
+    inputs: tuple[dict[str, Any], ...]
+    """Each recording: name, the span used, samples, noise, angle zeros."""
+    energy: tuple[EnergyCurve, ...] = field(default=(), repr=False)
+    prediction: dict[str, dict[str, Any]] = field(default_factory=dict)
+    """Window in s: RMS per link in degrees of data the fit did not see."""
+    chi2_slack: float = math.nan
+    """The same mean square with the slack of `slack`."""
+    slack: dict[str, float] = field(default_factory=dict)
+    """Jump allowed at the joints per state component, and relative to what noise alone would need."""
+    iterations: int = 0
+    maps: dict[str, Any] | None = None
+    """Angle-bias maps, if asked for."""
+    notes: tuple[str, ...] = ()
+    """What was left out or should be known."""
+
+    def to_json(self) -> dict[str, Any]:
+        """``fit.json``: plain numbers and text, null for what is not defined."""
+        out = {
+            "method": self.method,
+            "status": self.status,
+            "message": self.message,
+            "chi2": self.chi2,
+            "n": self.n,
+            "coefficients": {k: v.to_json() for k, v in self.coefficients.items()},
+            "ratios": {k: v.value for k, v in self.ratios.items()},
+            "ratio_sigmas": {k: v.sigma for k, v in self.ratios.items()},
+            "shares": {
+                group: {k: {"value": v.value, "sigma": v.sigma} for k, v in shares.items()}
+                for group, shares in self.shares.items()
+            },
+            "prediction": self.prediction,
+            "identifiability": {
+                "condition": self.identifiability.condition,
+                "correlations": self.identifiability.correlations,
+                "sentences": list(self.identifiability.sentences),
+            },
+            "inputs": list(self.inputs),
+            "version": package_version(),
+            "chi2_slack": self.chi2_slack,
+            "slack": self.slack,
+            "iterations": self.iterations,
+            "parameters": self.parameters,
+            "covariance": {"names": list(self.names), "matrix": self.covariance.tolist()},
+            "maps": self.maps,
+            "notes": list(self.notes),
+        }
+        cleaned: dict[str, Any] = clean(out)
+        return cleaned
+
+
+def package_version() -> str:
+    """The installed version, or ``unknown`` from a bare source tree."""
+    try:
+        return version("pydpend")
+    except PackageNotFoundError:
+        return "unknown"
+
+
+def number(value: float) -> float | None:
+    """The number, or None where it is not finite (JSON has no NaN)."""
+    return float(value) if math.isfinite(value) else None
+
+
+def clean(value: Any) -> Any:
+    """Arrays as lists, numbers as Python's, not-finite ones as None, all the way down."""
+    if isinstance(value, dict):
+        return {str(k): clean(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [clean(v) for v in value]
+    if isinstance(value, np.ndarray):
+        return clean(value.tolist())
+    if isinstance(value, bool | np.bool_):
+        return bool(value)
+    if isinstance(value, int | np.integer):
+        return int(value)
+    if isinstance(value, float | np.floating):
+        return number(float(value))
+    return value

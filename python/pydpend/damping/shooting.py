@@ -1,0 +1,200 @@
+"""The compiled multiple-shooting fit, in arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pydpend import _tracker
+from pydpend.errors import FitError, fault
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Track = tuple[Floats, Floats, Floats]
+"""Times (T,), angles (T, 2) and standard uncertainties (T, 2) of one recording; NaN where not seen."""
+
+Progress = Callable[[int, int, float], object]
+"""Called with the step, the most there will be, and chi-square."""
+
+
+@dataclass(frozen=True)
+class Segments:
+    """Pieces of recordings, each with its own free state."""
+
+    rows: Ints
+    """(K, 4): recording, first sample, one past the last, whether the next continues it."""
+    times_s: Floats
+    """(K, 2): start and end."""
+    states: Floats
+    """(K, 4): phi1, phi2, w1, w2 at the start: a guess or a solution."""
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def take(self, keep: NDArray[Any]) -> Segments:
+        """Some of them, in order (their chains must be cut by the caller)."""
+        return Segments(self.rows[keep], self.times_s[keep], self.states[keep])
+
+    def grouped(self, size: int) -> Segments:
+        """Windows of ``size`` consecutive segments, each a chain of its own; incomplete ones are left out."""
+        keep: list[int] = []
+        run: list[int] = []
+        for k in range(len(self)):
+            run.append(k)
+            if len(run) == size:
+                keep += run
+                run = []
+            elif not self.rows[k, 3]:
+                run = []
+        out = self.take(np.array(keep, dtype=np.int64))
+        rows = out.rows.copy()
+        rows[:, 3] = (np.arange(len(rows)) % size != size - 1).astype(np.int64)
+        return replace(out, rows=rows)
+
+
+@dataclass(frozen=True)
+class Solution:
+    """What the compiled fit gives; see ``dynamics::shooting::Fit``."""
+
+    parameters: dict[str, float]
+    zeros_rad: Floats
+    """(R, 2)"""
+    segments: Segments
+    names: tuple[str, ...]
+    """Rows of `information`: free parameters, then two zeros per recording."""
+    information: Floats
+    gradient: Floats
+    scores: Floats
+    """Each segment's part of the gradient with the states eliminated, (K, G)."""
+    slack: Floats
+    own_sigma: Floats
+    joint_chi2: Floats
+    squares: Floats
+    counts: NDArray[np.int64]
+    state_freedom: float
+    stuck: int
+    iterations: int
+    status: str
+    stretch: float
+
+    @property
+    def chi2(self) -> float:
+        """Sum of squares over degrees of freedom, states and common unknowns counted."""
+        freedom = float(self.counts.sum()) - self.state_freedom - len(self.names)
+        return float(self.squares.sum()) / max(freedom, 1.0)
+
+
+def cut(
+    tracks: Sequence[Track], spans: Sequence[tuple[float, float]], length_s: float, chained: bool = True
+) -> Segments:
+    """Segments of about ``length_s`` over each recording's span, with states from local cubics."""
+    rows, times, states = _tracker.shooting_segments(tracks, spans, length_s, chained)
+    good: NDArray[np.bool_] = np.asarray(np.isfinite(states).all(axis=1))
+    segments = Segments(rows, times, states)
+    if not good.all():
+        rows = rows.copy()
+        for k in np.flatnonzero(~good):
+            if k > 0:
+                rows[k - 1, 3] = 0
+        segments = Segments(rows, times, states).take(good)
+    return segments
+
+
+def solve(
+    tracks: Sequence[Track],
+    segments: Segments,
+    parameters: dict[str, float],
+    zeros_rad: Floats,
+    *,
+    free: Sequence[str] = (),
+    bounded: Sequence[str] = (),
+    zeros: bool = True,
+    slack: float | Sequence[float] = 0.02,
+    learned: bool = True,
+    huber: float = 3.5,
+    max_iterations: int = 60,
+    clock: bool = False,
+    stretch: float = 1.0,
+    progress: Progress | None = None,
+) -> Solution:
+    """Runs the fit. Raises FitError when there is nothing to fit or the motion is not determined."""
+    try:
+        out = _tracker.shooting_fit(
+            tracks,
+            segments.rows,
+            segments.times_s,
+            segments.states,
+            parameters,
+            [(float(a), float(b)) for a, b in np.asarray(zeros_rad, dtype=np.float64)],
+            free=list(free),
+            bounded=list(bounded),
+            clock=clock,
+            free_zeros=zeros,
+            slack=[slack] if isinstance(slack, float | int) else list(slack),
+            learned=learned,
+            huber=huber,
+            max_iterations=max_iterations,
+            stretch=stretch,
+            progress=progress,
+        )
+    except ValueError as problem:
+        advice = "Look at the angles around their gaps, and check that the model is this pendulum's"
+        raise FitError(fault("trajectory fit", str(problem), advice)) from problem
+    names = (*free, *(("clock",) if clock else ()))
+    if zeros:
+        names += tuple(f"zero{j}[{r}]" for r in range(len(tracks)) for j in (1, 2))
+    return Solution(
+        {**parameters, **{k: v for k, v in out["parameters"].items() if k in parameters or v != 0.0}},
+        out["zeros_rad"],
+        replace(segments, states=out["states"]),
+        names,
+        out["information"],
+        out["gradient"],
+        out["scores"],
+        np.array(out["slack"]),
+        np.array(out["own_sigma"]),
+        np.array(out["joint_chi2"]),
+        np.array(out["squares"]),
+        np.array(out["counts"]),
+        out["state_freedom"],
+        out["stuck"],
+        out["iterations"],
+        out["status"],
+        out["stretch"],
+    )
+
+
+@dataclass(frozen=True)
+class Trace:
+    """A solution's motion at the samples."""
+
+    recording: Ints
+    sample: Ints
+    segment: Ints
+    state: Floats
+    """(M, 4), zeros not added."""
+    unit_power: Floats
+    """(M, terms), W per unit of each coefficient, in the order of ``_tracker.term_names()``."""
+
+
+def trace(
+    tracks: Sequence[Track], segments: Segments, parameters: dict[str, float], stretch: float = 1.0
+) -> Trace:
+    """Follows each segment from its state."""
+    index, state, power = _tracker.shooting_trace(
+        tracks, segments.rows, segments.times_s, segments.states, parameters, stretch
+    )
+    return Trace(index[:, 0], index[:, 1], index[:, 2], state, power)
+
+
+def residuals(tracks: Sequence[Track], path: Trace, zeros_rad: Floats) -> Floats:
+    """Measured minus model, (M, 2), rad."""
+    out = np.empty((path.sample.size, 2))
+    for r, (_, phi, _) in enumerate(tracks):
+        here = path.recording == r
+        out[here] = phi[path.sample[here]] - path.state[here, :2] - zeros_rad[r]
+    return out

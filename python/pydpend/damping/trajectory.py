@@ -1,0 +1,313 @@
+"""The trajectory fit: multiple shooting on the equations of motion, and everything said about its result."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pydpend.angles import LinkAngles
+from pydpend.coefficients import FULL, RATIOS, parameters, unit
+from pydpend.damping import maps, plausible, shooting
+from pydpend.damping.noise import Noise, noise
+from pydpend.damping.result import DampingFit, Estimate
+from pydpend.damping.shares import energy_curve, shares, unit_works
+from pydpend.damping.shooting import Progress, Segments, Solution, Track
+from pydpend.damping.uncertainty import covariance, identifiability
+from pydpend.decay import Decay, find_decay
+from pydpend.errors import FitError, fault
+from pydpend.model import Model
+
+Floats = NDArray[np.float64]
+
+SEGMENT_S = 0.25
+FLOOR = 0.02
+"""Smallest slack, relative to what a segment's own samples determine its state to: information is then
+shared over 1/0.02 = 50 segments, and a coefficient's error is within a percent of that with none."""
+HUBER = 3.5
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A recording made ready for a fit."""
+
+    angles: LinkAngles
+    decay: Decay
+    noise: Noise
+    track: Track
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """Start and stop of what is fitted, s."""
+        return self.decay.start_s, self.decay.stop_s
+
+
+def prepare(
+    angles: LinkAngles, model: Model, start_s: float | None = None, stop_s: float | None = None
+) -> Recording:
+    """Finds the free decay and the noise. Raises FitError where there is no decay to fit."""
+    if angles.links != 2:
+        raise FitError(
+            fault(angles.name, "the angles are of one link", "Fit them as a single pendulum (pinned=True)")
+        )
+    decay = find_decay(angles, model, start_s, stop_s)
+    level = noise(angles.t_s, angles.phi_rad, angles.sigma_rad, (decay.start_s, decay.stop_s))
+    if not all(
+        np.isfinite(s) or source == "stated"
+        for s, source in zip(level.measured_rad, level.source, strict=True)
+    ):
+        raise FitError(
+            fault(
+                angles.name, "the angles have no 20 stretches of nine samples", "Give angles with fewer gaps"
+            )
+        )
+    return Recording(angles, decay, level, (angles.t_s, angles.phi_rad, level.sigma_rad))
+
+
+def fit_trajectory(
+    recordings: Sequence[Recording],
+    model: Model,
+    names: Sequence[str],
+    *,
+    ratios: bool = True,
+    free: Sequence[str] = (),
+    clock: bool = False,
+    angle_maps: bool = False,
+    segment_s: float = SEGMENT_S,
+    max_iterations: int = 60,
+    progress: Progress | None = None,
+) -> DampingFit:
+    """Fits the coefficients ``names`` (and the inertial ratios) to one or several recordings with them in
+    common.
+
+    ``free``: further parameters (``added_inertia``, ``tilt``, ``offset1``, ``offset2``). Raises FitError for
+    constants the recordings refute, and where nothing is determined.
+    """
+    tracks = [r.track for r in recordings]
+    segments = _segments(recordings, tracks, segment_s)
+    if not ratios:
+        _refuse(recordings, model, None)
+    else:
+        for r in recordings:
+            plausible_or_raise(r, model)
+    wanted = [*(RATIOS if ratios else ()), *names, *free]
+    bounded = [n for n in wanted if n in FULL]
+    start = parameters(model)
+    zeros = np.zeros((len(tracks), 2))
+    bias = None
+    for pass_ in range(3 if angle_maps else 1):
+        solution = shooting.solve(
+            tracks if bias is None else maps.corrected(tracks, bias),
+            segments,
+            start,
+            zeros,
+            free=wanted,
+            bounded=bounded,
+            slack=FLOOR,
+            clock=clock,
+            huber=HUBER,
+            max_iterations=max_iterations,
+            progress=progress,
+        )
+        if angle_maps:
+            bias = maps.learn(tracks, solution)
+            segments, start, zeros = solution.segments, solution.parameters, solution.zeros_rad
+            if pass_ == 2:
+                break
+    used = tracks if bias is None else maps.corrected(tracks, bias)
+    return _judge(recordings, used, model, names, wanted, solution, bias, progress)
+
+
+def plausible_or_raise(recording: Recording, model: Model) -> None:
+    """Refuses a model the recording refutes, with the chi-square of its constants held fixed."""
+    try:
+        plausible.check_model(recording.track, recording.span, model, recording.angles.name, None)
+    except FitError:
+        _refuse([recording], model, 10.0)
+        raise
+
+
+def _refuse(recordings: Sequence[Recording], model: Model, first_s: float | None) -> None:
+    for r in recordings:
+        chi2 = None
+        if first_s is not None:
+            span = (r.span[0], min(r.span[1], r.span[0] + first_s))
+            try:
+                fixed = shooting.solve(
+                    [r.track],
+                    shooting.cut([r.track], [span], SEGMENT_S),
+                    parameters(model),
+                    np.zeros((1, 2)),
+                    free=FULL,
+                    bounded=FULL,
+                    slack=1.0,
+                    learned=False,
+                    max_iterations=15,
+                )
+                chi2 = fixed.chi2
+            except FitError:
+                chi2 = None
+        plausible.check_model(r.track, r.span, model, r.angles.name, chi2)
+
+
+def _segments(recordings: Sequence[Recording], tracks: Sequence[Track], segment_s: float) -> Segments:
+    longest = max(float(np.median(np.diff(r.angles.t_s))) for r in recordings)
+    segment_s = max(segment_s, 12 * longest)
+    segments = shooting.cut(tracks, [r.span for r in recordings], segment_s)
+    if len(segments) < 4:
+        raise FitError(
+            fault(
+                ", ".join(r.angles.name for r in recordings),
+                f"only {len(segments)} segments of {segment_s:.2g} s have enough samples of both links",
+                "Give angles with fewer gaps",
+            )
+        )
+    return segments
+
+
+def tightened(
+    tracks: Sequence[Track],
+    solution: Solution,
+    wanted: Sequence[str],
+    bounded: Sequence[str],
+    progress: Progress | None,
+) -> Solution:
+    """The same fit with no slack beyond the noise's own: what the model must be able to do if it is right."""
+    return shooting.solve(
+        tracks,
+        solution.segments,
+        solution.parameters,
+        solution.zeros_rad,
+        free=wanted,
+        bounded=bounded,
+        slack=list(np.minimum(solution.slack, 0.05 * solution.own_sigma)),
+        huber=1e3,
+        learned=False,
+        max_iterations=12,
+        stretch=solution.stretch,
+        progress=progress,
+    )
+
+
+def _judge(
+    recordings: Sequence[Recording],
+    tracks: Sequence[Track],
+    model: Model,
+    names: Sequence[str],
+    wanted: Sequence[str],
+    solution: Solution,
+    bias: maps.Maps | None,
+    progress: Progress | None,
+) -> DampingFit:
+    relative = solution.slack / solution.own_sigma
+    model_error = bool(relative.max() > 0.2)
+    bounded = [n for n in wanted if n in FULL]
+    strict = tightened(tracks, solution, wanted, bounded, progress) if model_error else solution
+    cov = covariance(solution, model_error=model_error)
+    rows = [i for i, n in enumerate(solution.names) if n in names or n in RATIOS]
+    kept = tuple(solution.names[i] for i in rows)
+    cov = cov[np.ix_(rows, rows)]
+    psi = solution.parameters["psi"]
+    scale = np.array([1 / psi if n in RATIOS else 1.0 for n in kept])
+    cov = cov * np.outer(scale, scale)
+    sigma = dict(zip(kept, np.sqrt(np.diag(cov)), strict=True))
+    values = {n: solution.parameters.get(n, 0.0) for n in FULL} | {
+        n: solution.parameters[n] / psi for n in RATIOS
+    }
+    coefficients = {n: Estimate(values[n], float(sigma[n]), unit(n)) for n in names}
+    ratios = {n: Estimate(values[n], float(sigma.get(n, 0.0)), unit(n)) for n in RATIOS}
+    path = shooting.trace(tracks, solution.segments, solution.parameters, solution.stretch)
+    c_rows = [kept.index(n) for n in names]
+    c_cov = cov[np.ix_(c_rows, c_rows)]
+    fitted = fitted_model(model, solution.parameters)
+    held = [n for n in names if values[n] <= 0.0]
+    duration = float(np.sum(np.diff(solution.segments.times_s, axis=1)))
+    notes = _notes(recordings, solution, relative)
+    return DampingFit(
+        method="trajectory",
+        status=solution.status,
+        message=_message(solution, strict, relative),
+        chi2=strict.chi2,
+        n=int(solution.counts.sum()),
+        coefficients=coefficients,
+        ratios=ratios,
+        shares=shares(names, values, c_cov, unit_works(tracks, path, names)),
+        identifiability=identifiability(kept, cov, values, held, duration),
+        parameters=solution.parameters,
+        names=kept,
+        covariance=cov,
+        inputs=tuple(_input(r, solution.zeros_rad[k]) for k, r in enumerate(recordings)),
+        energy=tuple(energy_curve(tracks, path, names, values, fitted, k) for k in range(len(recordings))),
+        chi2_slack=solution.chi2,
+        slack={
+            f"{quantity}": float(s)
+            for quantity, s in zip(
+                ("phi1_rad", "phi2_rad", "w1_rad_s", "w2_rad_s"), solution.slack, strict=True
+            )
+        }
+        | {
+            f"{quantity}_over_noise": float(s)
+            for quantity, s in zip(("phi1", "phi2", "w1", "w2"), relative, strict=True)
+        },
+        iterations=solution.iterations,
+        maps=None if bias is None else bias.to_json(),
+        notes=notes,
+    )
+
+
+def fitted_model(model: Model, values: dict[str, float]) -> Model:
+    """The model with the fitted constants."""
+    return replace(
+        model,
+        lambda_kg_m2=values["lambda"],
+        a3_kg_m2=values["a3"],
+        sigma_j=values["sigma"],
+        kappa_j=values["kappa"],
+        covariance=None,
+        name=f"{model.name}, fitted",
+    )
+
+
+def _message(solution: Solution, strict: Solution, relative: Floats) -> str:
+    words = f"{solution.status} in {solution.iterations} steps; chi-square {strict.chi2:.3f}"
+    if relative.max() <= 0.2:
+        return words + ": the model describes the angles to within their noise"
+    return (
+        words + f" without slack, {solution.chi2:.3f} with the slack that makes the joints' chi-square 1 (up "
+        f"to {relative.max():.1f} times the noise of a segment's state): the model or the angles have errors "
+        "beyond the noise, and the standard errors carry them"
+    )
+
+
+def _notes(recordings: Sequence[Recording], solution: Solution, relative: Floats) -> tuple[str, ...]:
+    out = []
+    for r in recordings:
+        out.append(f"{r.angles.name}: {r.decay.message}")
+        for j, source in enumerate(r.noise.source):
+            if source == "measured":
+                level = np.degrees(r.noise.measured_rad[j])
+                out.append(
+                    f"{r.angles.name}: phi{j + 1} weighted by its measured high-pass noise {level:.3g} deg "
+                    "(no stated uncertainty agrees with it)"
+                )
+    if solution.stuck:
+        out.append(
+            f"a joint stuck in {solution.stuck} of {len(solution.segments)} segments; followed by events"
+        )
+    return tuple(out)
+
+
+def _input(recording: Recording, zeros: Floats) -> dict[str, Any]:
+    return {
+        "name": recording.angles.name,
+        "source": recording.angles.meta.get("source"),
+        "start_s": recording.decay.start_s,
+        "stop_s": recording.decay.stop_s,
+        "samples": int(recording.angles.t_s.size),
+        "noise_deg": [float(v) for v in np.degrees(recording.noise.measured_rad)],
+        "noise_source": list(recording.noise.source),
+        "zeros_deg": [float(v) for v in np.degrees(zeros)],
+    }

@@ -1,0 +1,101 @@
+"""Covariances that carry model error, and what the data cannot tell apart, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pydpend.coefficients import FULL, RATIOS, unit
+from pydpend.damping.result import Identifiability
+from pydpend.damping.shooting import Solution
+
+Floats = NDArray[np.float64]
+
+BLOCK_S = 1.0
+"""Length of the blocks whose scores are taken as independent, s: several swings' worth of correlated
+residual."""
+STRONG = 0.95
+"""Correlation beyond which two coefficients are named as not told apart."""
+
+
+def invert(information: Floats) -> Floats:
+    """Inverse of a symmetric information matrix, scaled first; directions it lacks get a huge variance."""
+    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
+    scaled = information / np.outer(scale, scale)
+    values, vectors = np.linalg.eigh((scaled + scaled.T) / 2)
+    inverse = (vectors / np.maximum(values, 1e-14)) @ vectors.T
+    out: Floats = inverse / np.outer(scale, scale)
+    return out
+
+
+def covariance(solution: Solution, *, model_error: bool) -> Floats:
+    """Covariance (G, G) of the common unknowns.
+
+    From the information at the solution; with model error also the sandwich from the scores of blocks of
+    about a second, and of each standard error the larger one is taken.
+    """
+    naive = invert(solution.information) * max(1.0, solution.chi2)
+    if not model_error:
+        return naive
+    segments = solution.segments
+    block = np.floor(segments.times_s[:, 0] / BLOCK_S).astype(np.int64) + 1_000_000 * segments.rows[:, 0]
+    _, label = np.unique(block, return_inverse=True)
+    count = int(label.max()) + 1
+    if count < 2 * len(solution.names):
+        return naive
+    sums = np.zeros((count, len(solution.names)))
+    np.add.at(sums, label, solution.scores)
+    bread = invert(solution.information)
+    sandwich = bread @ (sums.T @ sums) @ bread * count / (count - len(solution.names))
+    growth = np.sqrt(np.maximum(1.0, np.diag(sandwich) / np.diag(naive)))
+    out: Floats = naive * np.outer(growth, growth)
+    return out
+
+
+def identifiability(
+    names: Sequence[str], cov: Floats, values: Mapping[str, float], held: Sequence[str], duration_s: float
+) -> Identifiability:
+    """Condition number, strong correlations and sentences for the coefficients and ratios ``names``."""
+    sigma = np.sqrt(np.diag(cov))
+    correlation = cov / np.outer(sigma, sigma)
+    condition = float(np.linalg.cond(correlation)) if len(names) else 1.0
+    pairs: dict[str, float] = {}
+    sentences: list[str] = []
+    for i in range(len(names)):
+        for j in range(i):
+            c = float(correlation[i, j])
+            if abs(c) > 0.9:
+                pairs[f"{names[j]}/{names[i]}"] = c
+            if abs(c) > STRONG and names[i] in FULL and names[j] in FULL:
+                sentences.append(
+                    f"{names[j]} and {names[i]} are not told apart by these data (correlation {c:+.2f}): "
+                    f"only their combination is determined."
+                )
+    for name, s in zip(names, sigma, strict=True):
+        if name not in FULL:
+            continue
+        value = values[name]
+        if name in held:
+            sentences.append(f"{name} is zero within error (upper limit {2 * s:.1e} {unit(name)}).")
+        elif value < 2 * s:
+            sentences.append(
+                f"{name} is not determined: {value:.1e} +- {s:.1e} {unit(name)}; it may be zero."
+            )
+        elif value < 5 * s:
+            sentences.append(f"{name} is known to {100 * s / value:.0f} % only.")
+    for name, s in zip(names, sigma, strict=True):
+        if name in RATIOS and s > 0.02 * abs(values[name]):
+            sentences.append(f"The ratio {name}/psi is known to {100 * s / abs(values[name]):.1f} % only.")
+    if duration_s < 20:
+        sentences.insert(
+            0,
+            f"The motion fitted lasts {duration_s:.1f} s: too short to separate laws that differ by their "
+            "dependence on speed or load; trust the shares and the prediction, not single coefficients.",
+        )
+    sentences.append(
+        "The scale of the inertias is not observable in free motion: all coefficients are proportional to "
+        "psi, which is the model's, and its relative uncertainty is a common factor on all of them."
+    )
+    return Identifiability(condition, pairs, tuple(sentences))

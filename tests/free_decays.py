@@ -1,0 +1,40 @@
+"""Free decays of the paper's pendulum for the damping tests: simulated, then measured with noise."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from pydpend.angles import LinkAngles
+from pydpend.energy import Motion
+from pydpend.model import Damping, Model, derived
+from pydpend.simulate import simulate
+
+TRUTH = Damping(mu_v1=1.76e-5, mu_v2=5.08e-6, mu_q1=1.43e-5, mu_q2=3e-7, rmu1=4.5e-5, rmu2=3.7e-5)
+"""The truth of the issue's table (SI)."""
+
+ALL_TERMS = replace(TRUTH, tau_c1=1.2e-4, tau_c2=3e-5, strip_drag=1.2e-6)
+"""With every law of ``full``."""
+
+
+def released(
+    seed: int,
+    seconds: float = 60.0,
+    rate_hz: float = 1000.0,
+    damping: Damping = TRUTH,
+    model: Model | None = None,
+) -> Motion:
+    """A release near (180, 180) deg, from when it is under way; offsets of up to 5 deg from the seed."""
+    rng = np.random.default_rng([seed, 7])
+    offset = np.radians(rng.uniform(1, 5, 2) * rng.choice([-1, 1], 2))
+    t = np.arange(round(seconds * rate_hz) + 1) / rate_hz
+    s = simulate(model or derived("A"), damping, [np.pi + offset[0], np.pi + offset[1], 0.0, 0.0], t)
+    return Motion(s.t_s, s.phi_rad, s.w_rad_s, s.a_rad_s2)
+
+
+def measured(motion: Motion, seed: int, noise_deg: float, *, stated: bool = True) -> LinkAngles:
+    """The angles with white noise of this size."""
+    rng = np.random.default_rng([seed, 11])
+    sigma = np.radians(noise_deg)
+    phi = motion.phi_rad + rng.normal(0.0, sigma, motion.phi_rad.shape)
+    return LinkAngles(motion.t_s, phi, np.full_like(phi, sigma if stated else np.nan), name=f"seed {seed}")
