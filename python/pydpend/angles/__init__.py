@@ -1,8 +1,32 @@
-"""Angles of the links: the table every later stage starts from, and the ways from nodes to it."""
+"""Angles of the links: the table every later stage starts from, and the ways from nodes to it.
+
+``table``, ``files``: the result and its file forms. ``markers``: image to world. ``pose``, ``linkage``,
+``pairwise``: the estimators. ``unwrap``, ``zero``: turns and zero. ``estimate``: the one body that calls
+them.
+"""
 
 from __future__ import annotations
 
+from pydpend.angles.estimate import angles, find_linkage
 from pydpend.angles.files import read_angles, write_angles
+from pydpend.angles.linkage import Linkage, Shape
+from pydpend.angles.pairwise import PairAngles, pair_angles
+from pydpend.angles.pose import Pose, fit_pose
 from pydpend.angles.table import LinkAngles
+from pydpend.angles.zero import Rest, find_rest
 
-__all__ = ["LinkAngles", "read_angles", "write_angles"]
+__all__ = [
+    "LinkAngles",
+    "Linkage",
+    "PairAngles",
+    "Pose",
+    "Rest",
+    "Shape",
+    "angles",
+    "find_linkage",
+    "find_rest",
+    "fit_pose",
+    "pair_angles",
+    "read_angles",
+    "write_angles",
+]

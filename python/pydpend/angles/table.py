@@ -168,6 +168,8 @@ def check_table(
                     place=place(i, "frame"),
                 )
             )
+    # Over a gap a link may turn by more than half a turn; between neighbouring rows that is a wrap.
+    neighbours = np.diff(t) <= 1.5 * np.median(np.diff(t)) if t.size > 1 else np.zeros(0, dtype=bool)
     for k in range(phi.shape[1]):
         bad = np.flatnonzero(np.isinf(phi[:, k]))
         if bad.size:
@@ -191,7 +193,7 @@ def check_table(
                 )
             )
         step = np.abs(np.diff(phi[:, k]))
-        bad = np.flatnonzero(step > math.pi) + 1
+        bad = np.flatnonzero((step > math.pi) & neighbours) + 1
         if bad.size:
             i = int(bad[0])
             raise AnglesError(

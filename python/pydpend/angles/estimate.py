@@ -1,0 +1,227 @@
+"""From a node table to the angles of its links: :func:`angles`, the one body that calls the estimators."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from pydpend.angles.hanging import Raw, zero_for
+from pydpend.angles.linkage import Linkage, Shape, first_shape
+from pydpend.angles.linkage_frames import LinkageAngles, fit_linkage
+from pydpend.angles.markers import BodyMarkers, body_markers, to_image
+from pydpend.angles.pairwise import pair_angles
+from pydpend.angles.pose import Pose, fit_pose
+from pydpend.angles.table import Floats, LinkAngles
+from pydpend.angles.unwrap import unwrap
+from pydpend.errors import AnglesError, fault
+
+if TYPE_CHECKING:
+    from pydpend.nodes import Nodes
+
+Method = Literal["rigid", "linkage", "pairwise"]
+
+
+def angles(
+    nodes: Nodes,
+    method: Method = "rigid",
+    *,
+    zero: Literal["rest", "reference_frame"] | Sequence[float] | float | Nodes = "rest",
+    bodies: Sequence[str] | None = None,
+    mirrored: bool = False,
+    link_length_m: float | None = None,
+    link_length_sigma_m: float = 0.0,
+    gaps: Literal["error", "stop"] = "error",
+    name: str | None = None,
+) -> LinkAngles:
+    """Angles of one or two links, in rad: counter-clockwise positive, zero hanging down, unwrapped over
+    turns.
+
+    ``method``:
+
+    - ``"rigid"``: weighted least-squares pose of each body by itself, robust against a bad marker.
+    - ``"linkage"``: both links and the joints they share fitted together; needs a pivot that stays in place.
+    - ``"pairwise"``: the paper's Eqs. 30-32 with a circular mean.
+
+    ``zero``: ``"rest"`` finds the stretches in which all links hang still; the nodes of another recording
+    with the same rig and camera take the rest from there; one number per link says at what angles, in rad,
+    the links stand in the rig's reference frame; ``"reference_frame"`` says 0 for both. The turn is such
+    that the first angle lies within (-pi, pi].
+
+    ``bodies`` names the links from the pivot outwards (the rig's order by default). ``mirrored`` for a film
+    taken from behind. ``link_length_m`` (pivot to elbow) puts the scale into ``meta["linkage"]``. ``gaps``
+    says what to do where a link was hidden for so long that a turn may be lost (more than ``pi / |w|``):
+    refuse, or leave the link's angles out from there on and say so in ``meta["notes"]``.
+
+    ``sigma_rad`` holds each frame's own standard error; that of the zero, common to all frames, is in
+    ``meta["zero"]``.
+
+    Raises :class:`~pydpend.errors.AnglesError`: a body never seen, or in one marker only; no rest found; a
+    turn that may be lost; links that turn too little for a linkage.
+    """
+    markers = body_markers(nodes, bodies, mirrored)
+    label = name if name is not None else _label(nodes)
+    raw = _estimate(markers, method, mirrored, link_length_m, link_length_sigma_m)
+    notes: list[str] = list(raw.meta.pop("notes", ()))
+    phi = _unwrapped(nodes, raw.theta, markers, label, gaps, notes)
+    offset, zero_meta = zero_for(nodes, phi, raw, markers, zero, bodies, mirrored, label)
+    phi = phi - offset
+    for k in range(phi.shape[1]):
+        first = phi[np.flatnonzero(np.isfinite(phi[:, k]))[0], k]
+        phi[:, k] -= 2 * np.pi * np.ceil((first - np.pi) / (2 * np.pi))
+    meta = {"method": method, "mirrored": mirrored, **raw.meta, "zero": zero_meta, "notes": notes}
+    source = nodes.meta.get("source")
+    if source is not None:
+        meta["source"] = source
+    return LinkAngles(nodes.t_s, phi, raw.sigma, nodes.frame, meta, label)
+
+
+def find_linkage(nodes: Nodes, *, bodies: Sequence[str] | None = None, mirrored: bool = False) -> Linkage:
+    """Pivot, elbow, the places of the markers in their links and the link's length in px, with uncertainties.
+
+    Places are in the world's directions (y up); ``to_image`` turns them back. Raises
+    :class:`~pydpend.errors.AnglesError` if the links turn too little to find the joints.
+    """
+    poses = [fit_pose(m) for m in body_markers(nodes, bodies, mirrored)]
+    return fit_linkage(poses[0], poses[1] if len(poses) > 1 else None).linkage
+
+
+def _label(nodes: Nodes) -> str:
+    source = nodes.meta.get("source")
+    return str(source.get("name", "nodes")) if isinstance(source, dict) else "nodes"
+
+
+def _estimate(
+    markers: list[BodyMarkers], method: Method, mirrored: bool, length_m: float | None, length_sigma_m: float
+) -> Raw:
+    if method == "pairwise":
+        pairs = [pair_angles(m) for m in markers]
+        meta = {
+            "bodies": [
+                {
+                    "name": m.name,
+                    "nodes": list(m.nodes),
+                    "median_scatter_rad": float(np.nanmedian(p.scatter_rad)),
+                    "median_sigma_rad": float(np.nanmedian(p.sigma_rad)),
+                }
+                for m, p in zip(markers, pairs, strict=True)
+            ],
+            "notes": [
+                "the scatter of the pairs (Eq. 32) is not the error of their mean; sigma is the latter"
+            ],
+        }
+        theta = np.stack([p.mean_rad for p in pairs], axis=1)
+        sigma = np.stack([p.sigma_rad for p in pairs], axis=1)
+        return Raw(theta, sigma, [m.reference_px for m in markers], None, meta)
+    if method not in ("rigid", "linkage"):
+        raise AnglesError(fault("method", f"{method!r} is not known", "Use rigid, linkage or pairwise"))
+    poses = [fit_pose(m) for m in markers]
+    meta = {"bodies": [_body_meta(p) for p in poses]}
+    lower = poses[1] if len(poses) > 1 else None
+    if method == "rigid":
+        theta = np.stack([p.theta_rad for p in poses], axis=1)
+        sigma = np.stack([p.sigma_rad for p in poses], axis=1)
+        shape = None
+        if length_m is not None:
+            linked = fit_linkage(poses[0], lower)
+            shape = linked.linkage.shape
+            meta["linkage"] = _linkage_meta(linked.linkage, mirrored, length_m, length_sigma_m)
+        else:
+            shape = _shape_or_none(poses)
+        return Raw(theta, sigma, [p.template_px for p in poses], shape, meta)
+    linked = fit_linkage(poses[0], lower)
+    meta["linkage"] = _linkage_meta(linked.linkage, mirrored, length_m, length_sigma_m)
+    meta["notes"] = _linkage_notes(linked, poses)
+    shape = linked.linkage.shape
+    templates = [shape.upper_px] if lower is None else [shape.upper_px, shape.lower_px]
+    return Raw(linked.theta_rad, linked.sigma_rad, templates, shape, meta)
+
+
+def _shape_or_none(poses: list[Pose]) -> Shape | None:
+    """The joints from the motion; ``None`` if the links turn too little to show them."""
+    try:
+        return first_shape(poses[0], poses[1] if len(poses) > 1 else None)
+    except AnglesError:
+        return None
+
+
+def _body_meta(pose: Pose) -> dict[str, Any]:
+    dropped = (pose.markers.seen & ~pose.used).sum(axis=0)
+    return {
+        "name": pose.markers.name,
+        "nodes": list(pose.markers.nodes),
+        "sigma_scale": pose.sigma_scale,
+        "frames_without_angle": int(np.isnan(pose.theta_rad).sum()),
+        "doubtful_frames": int(pose.doubtful.sum()),
+        "markers_left_out": {
+            n: int(c) for n, c in zip(pose.markers.nodes, dropped.tolist(), strict=True) if c
+        },
+    }
+
+
+def _linkage_meta(
+    linkage: Linkage, mirrored: bool, length_m: float | None, length_sigma_m: float
+) -> dict[str, Any]:
+    meta: dict[str, Any] = {
+        "pivot_px": to_image(linkage.shape.pivot_px, mirrored).tolist(),
+        "pivot_sigma_px": linkage.pivot_sigma_px.tolist(),
+        "sigma_scale": linkage.sigma_scale,
+    }
+    if linkage.shape.links == 2:
+        elbow = linkage.shape.pivot_px + linkage.shape.elbow_px
+        meta["elbow_in_reference_frame_px"] = to_image(elbow, mirrored).tolist()
+        meta["link_length_px"] = linkage.length_px
+        meta["link_length_sigma_px"] = linkage.length_sigma_px
+        if length_m is not None:
+            scale, sigma = linkage.metres_per_px(length_m, length_sigma_m)
+            meta["scale_m_per_px"], meta["scale_sigma_m_per_px"] = scale, sigma
+    return meta
+
+
+def _linkage_notes(linked: LinkageAngles, poses: list[Pose]) -> list[str]:
+    alone = max(p.sigma_scale for p in poses)
+    together = linked.linkage.sigma_scale
+    if together > 1.15 * alone:
+        return [
+            f"the markers fit the linkage worse than the single links ({together:.2f} against {alone:.2f} "
+            "times their sigma): the camera moves, a joint has play or the lens distorts; compare 'rigid'"
+        ]
+    return []
+
+
+def _unwrapped(
+    nodes: Nodes,
+    theta: Floats,
+    markers: list[BodyMarkers],
+    label: str,
+    gaps: Literal["error", "stop"],
+    notes: list[str],
+) -> Floats:
+    phi = np.empty_like(theta)
+    for k, body in enumerate(markers):
+        if not np.isfinite(theta[:, k]).any():
+            raise AnglesError(
+                fault(
+                    label,
+                    f"the body {body.name} has no angle in any frame",
+                    "Look at `tracker check` of the table",
+                )
+            )
+        phi[:, k], lost = unwrap(nodes.t_s, theta[:, k])
+        if not lost:
+            continue
+        gap = lost[0]
+        hidden = f"frames {int(nodes.frame[gap.before]) + 1} to {int(nodes.frame[gap.after]) - 1}"
+        place = f"{hidden}, body {body.name}"
+        problem = (
+            f"not seen for {gap.length_s:.4g} s, more than the {gap.limit_s:.4g} s "
+            "after which a turn may be lost"
+        )
+        if gaps == "error":
+            raise AnglesError(
+                fault(label, problem, "Cut the recording there, or use gaps='stop'", place=place)
+            )
+        phi[gap.after :, k] = np.nan
+        notes.append(f"{place}: {problem}; its angles are left out from there on")
+    return phi

@@ -1,0 +1,180 @@
+"""The linkage's angles in every frame, given its shape; robust against bad markers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pydpend.angles.linkage import (
+    FIT_FRAMES,
+    Frames,
+    Linkage,
+    Shape,
+    first_shape,
+    fit_shape,
+    information,
+    predicted,
+    regular,
+)
+from pydpend.angles.markers import BodyMarkers
+from pydpend.angles.pose import REJECT_D2, Pose, inflation, rotate
+from pydpend.angles.table import Floats
+
+_STEPS = 6
+"""Gauss-Newton steps per frame; from the rigid pose two are enough, from one marker four."""
+
+_TIE = 0.8
+"""Two markers whose misfits are within this ratio are both left out: which is wrong cannot be told."""
+
+_CHUNK = 8192
+
+
+@dataclass(frozen=True, eq=False)
+class LinkageAngles:
+    """Angles of both links in T frames by the linkage; NaN where they cannot be had.
+
+    ``theta_rad``, ``sigma_rad`` (T, L); ``used`` (T, N): markers used, the upper link's first; ``chi2``,
+    ``dof`` (T,) of the residuals with the stated sigmas.
+    """
+
+    linkage: Linkage
+    theta_rad: Floats
+    sigma_rad: Floats
+    used: NDArray[np.bool_]
+    chi2: Floats
+    dof: NDArray[np.int64]
+
+
+def fit_linkage(upper: Pose, lower: Pose | None) -> LinkageAngles:
+    """Shape from the whole recording, then the angles of every frame.
+
+    Raises :class:`~pydpend.errors.AnglesError` if the links turn too little to find the joints.
+    """
+    poses = [upper] if lower is None else [upper, lower]
+    shape = first_shape(upper, lower)
+    theta = np.stack([p.theta_rad for p in poses], axis=1)
+    rows = np.flatnonzero(np.isfinite(theta).all(axis=1))
+    rows = rows[np.unique(np.linspace(0, rows.size - 1, min(rows.size, FIT_FRAMES)).astype(np.int64))]
+    clean = [p.markers.without(~p.used) for p in poses]
+    linkage, _ = fit_shape([_rows(m, rows) for m in clean], shape, theta[rows])
+    frames = Frames.of([p.markers for p in poses])
+    start = _start(linkage.shape, frames, theta)
+    return _all_frames(linkage, frames, start)
+
+
+def _rows(markers: BodyMarkers, rows: NDArray[np.int64]) -> BodyMarkers:
+    return BodyMarkers(
+        markers.name, markers.nodes, markers.xy_px[rows], markers.weight[rows], markers.reference_px
+    )
+
+
+def _start(shape: Shape, frames: Frames, theta: Floats) -> Floats:
+    """Fills angles that the rigid pose could not give: one marker and a joint have a direction too."""
+    theta = theta.copy()
+    k1 = shape.upper_px.shape[0]
+    if shape.links == 2:
+        # No upper marker: the elbow is where the lower link's pose puts it.
+        rows = np.flatnonzero(
+            np.isnan(theta[:, 0]) & ~np.isnan(theta[:, 1]) & ~(frames.w[:, :k1] > 0).any(axis=1)
+        )
+        if rows.size:
+            w = frames.w[rows, k1:]
+            back = frames.xy[rows, k1:] - rotate(theta[rows, 1][:, None], shape.lower_px[None])
+            elbow = np.einsum("tk,tkd->td", w, back) / w.sum(axis=1)[:, None] - shape.pivot_px
+            theta[rows, 0] = _turn(elbow, np.broadcast_to(shape.elbow_px, elbow.shape), np.ones(rows.size))
+    rows = np.flatnonzero(np.isnan(theta[:, 0]))
+    theta[rows, 0] = _about(frames.xy[rows, :k1] - shape.pivot_px, shape.upper_px, frames.w[rows, :k1])
+    if shape.links == 2:
+        rows = np.flatnonzero(np.isnan(theta[:, 1]) & ~np.isnan(theta[:, 0]))
+        elbow = shape.pivot_px + rotate(theta[rows, 0], shape.elbow_px[None])
+        theta[rows, 1] = _about(frames.xy[rows, k1:] - elbow[:, None, :], shape.lower_px, frames.w[rows, k1:])
+    return theta
+
+
+def _about(seen: Floats, template: Floats, w: Floats) -> Floats:
+    """The turn about a known point that brings the template onto the seen places; NaN without any."""
+    if not seen.shape[0]:
+        return np.zeros(0)
+    sine = (w * (template[None, :, 0] * seen[..., 1] - template[None, :, 1] * seen[..., 0])).sum(axis=1)
+    cosine = (w * (template[None] * seen).sum(axis=2)).sum(axis=1)
+    return np.where((w > 0).any(axis=1), np.arctan2(sine, cosine), np.nan)
+
+
+def _turn(seen: Floats, template: Floats, w: Floats) -> Floats:
+    return _about(seen[:, None, :], template[0][None, :], w[:, None]) if seen.shape[0] else np.zeros(0)
+
+
+def _all_frames(linkage: Linkage, frames: Frames, start: Floats) -> LinkageAngles:
+    total, links = start.shape
+    theta, sigma = np.full((total, links), np.nan), np.full((total, links), np.nan)
+    used = np.zeros(frames.w.shape, dtype=bool)
+    chi2, dof = np.zeros(total), np.zeros(total, dtype=np.int64)
+    limit = REJECT_D2 * linkage.sigma_scale**2
+    for first in range(0, total, _CHUNK):
+        rows = np.arange(first, min(first + _CHUNK, total))
+        part = Frames(frames.xy[rows], frames.w[rows].copy())
+        angle = start[rows]
+        active = np.arange(rows.size)
+        while active.size:
+            angle[active], d2, c, f, s = _solve(linkage.shape, part.at(active), angle[active])
+            sigma[rows[active]], chi2[rows[active]], dof[rows[active]] = s, c, f
+            worst = d2.max(axis=1)
+            bad = worst > limit
+            active, d2, worst = active[bad], d2[bad], worst[bad]
+            drop = d2 >= _TIE * worst[:, None]
+            part.w[active] = np.where(drop, 0.0, part.w[active])
+            angle[active] = np.where(np.isnan(angle[active]), start[rows[active]], angle[active])
+        theta[rows], used[rows] = angle, part.w > 0
+    scale = linkage.sigma_scale * inflation(chi2 / linkage.sigma_scale**2, dof)
+    sigma *= scale[:, None]
+    theta = np.where(np.isfinite(sigma), theta, np.nan)
+    return LinkageAngles(linkage, theta, sigma, used, chi2, dof)
+
+
+def _solve(
+    shape: Shape, frames: Frames, theta: Floats
+) -> tuple[Floats, Floats, Floats, NDArray[np.int64], Floats]:
+    """Angles (T, L), normalised misfits (T, N), chi2 and dof (T,), and standard errors (T, L) of some
+    frames.
+    """
+    links = theta.shape[1]
+    theta = np.where(np.isnan(theta), 0.0, theta)
+    k1 = shape.upper_px.shape[0]
+    for _ in range(_STEPS):
+        places, slopes = predicted(shape, theta)
+        residual = np.where((frames.w > 0)[..., None], frames.xy - places, 0.0)
+        v = regular(information(frames.w, slopes))
+        weighted = residual * frames.w[..., None]
+        pull = np.stack([np.einsum("tkd,tkd->t", weighted, slopes[..., a]) for a in range(links)], axis=1)
+        step = np.linalg.solve(v, pull[..., None])[..., 0]
+        theta = theta + np.clip(step, -0.5, 0.5)
+        if np.abs(step).max(initial=0.0) < 1e-10:
+            break
+    places, slopes = predicted(shape, theta)
+    residual = np.where((frames.w > 0)[..., None], frames.xy - places, 0.0)
+    v = regular(information(frames.w, slopes))
+    inverse = np.linalg.inv(v)
+    # Variance of a residual: that of the marker less what the fit takes up.
+    spread = np.matmul(slopes, inverse[:, None])
+    taken = np.matmul(spread, np.swapaxes(slopes, 2, 3)) * frames.w[..., None, None]
+    left = np.eye(2) - taken
+    determinant = left[..., 0, 0] * left[..., 1, 1] - left[..., 0, 1] * left[..., 1, 0]
+    trace = left[..., 0, 0] + left[..., 1, 1]
+    rx, ry = residual[..., 0], residual[..., 1]
+    exact = (left[..., 1, 1] * rx**2 - 2 * left[..., 0, 1] * rx * ry + left[..., 0, 0] * ry**2) / np.where(
+        determinant > 1e-6, determinant, 1.0
+    )
+    # With no freedom in one direction the residual lies in the other one.
+    d2 = frames.w * np.where(determinant > 1e-6, exact, (rx**2 + ry**2) / np.maximum(trace, 1e-6))
+    seen = frames.w > 0
+    chi2 = (frames.w * (residual**2).sum(axis=2)).sum(axis=1)
+    count = seen.sum(axis=1)
+    # The upper angle needs an upper marker or two lower ones; the lower angle a lower one and the upper.
+    upper = seen[:, :k1].any(axis=1) | (seen[:, k1:].sum(axis=1) >= 2)
+    known = np.stack([upper, upper & seen[:, k1:].any(axis=1)], axis=1)[:, :links]
+    dof = np.maximum(2 * count - known.sum(axis=1), 0)
+    variance = np.einsum("taa->ta", inverse)
+    sigma = np.where(known, np.sqrt(variance), np.nan)
+    return theta, d2, chi2, dof, sigma

@@ -1,0 +1,123 @@
+"""From a node table to what the estimators need: each body's markers in the world's directions.
+
+Owns: the **one place where image y (down) becomes world y (up)**, and which rows count as seen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pydpend.angles.table import Floats
+from pydpend.errors import AnglesError, fault
+
+if TYPE_CHECKING:
+    from pydpend.nodes import Nodes
+
+SEEN_STATUS = (1, 2)
+"""Row states whose centre is trusted: ``seen`` and ``reacquired``. ``ambiguous`` is not."""
+
+
+@dataclass(frozen=True, eq=False)
+class BodyMarkers:
+    """The K markers of one body over T frames.
+
+    ``xy_px`` (T, K, 2): world directions, x right and y **up**, px, 0 where not seen. ``weight`` (T, K): 1 /
+    sigma^2 in px^-2, 0 where not seen. ``reference_px`` (K, 2): the rig's own places of the markers.
+    """
+
+    name: str
+    nodes: tuple[str, ...]
+    xy_px: Floats
+    weight: Floats
+    reference_px: Floats
+
+    @property
+    def seen(self) -> NDArray[np.bool_]:
+        """(T, K): where a marker has a trusted centre."""
+        return self.weight > 0
+
+    def without(self, drop: NDArray[np.bool_]) -> BodyMarkers:
+        """The same with the marked (T, K) centres left out."""
+        return BodyMarkers(
+            self.name, self.nodes, self.xy_px, np.where(drop, 0.0, self.weight), self.reference_px
+        )
+
+
+def to_world(xy_px: Floats, mirrored: bool = False) -> Floats:
+    """Image places (..., 2), y down, to world directions, y up; ``mirrored`` turns x round as well.
+
+    With ``mirrored`` a film taken from behind, or flipped by the camera, gives the angles seen from the
+    front.
+    """
+    return np.asarray(xy_px * np.array([-1.0 if mirrored else 1.0, -1.0]))
+
+
+def to_image(xy_px: Floats, mirrored: bool = False) -> Floats:
+    """The way back; the flip is its own inverse."""
+    return to_world(xy_px, mirrored)
+
+
+def body_markers(
+    nodes: Nodes, bodies: Sequence[str] | None = None, mirrored: bool = False
+) -> list[BodyMarkers]:
+    """The markers of one or two bodies, from the pivot outwards (the rig's order unless ``bodies`` is given).
+
+    Raises :class:`AnglesError` for more than two bodies, an unknown one, one that is never seen, or a seen
+    centre without a standard uncertainty.
+    """
+    rig = nodes.rig
+    names = list(rig.bodies)
+    wanted = list(bodies) if bodies is not None else names
+    for name in wanted:
+        if name not in names:
+            raise AnglesError(fault("nodes", f"there is no body {name!r}", f"The rig has {', '.join(names)}"))
+    if not 1 <= len(wanted) <= 2 or len(set(wanted)) != len(wanted):
+        raise AnglesError(
+            fault(
+                "nodes",
+                f"{len(wanted)} bodies ({', '.join(wanted)}), but angles are of one or two links",
+                "Name the upper and the lower link with `bodies`",
+            )
+        )
+    trusted = np.isin(nodes.status, SEEN_STATUS) & np.isfinite(nodes.xy_px).all(axis=2)
+    bad = np.argwhere(trusted & ~(np.isfinite(nodes.sigma_px) & (nodes.sigma_px > 0)))
+    if bad.size:
+        t, n = (int(v) for v in bad[0])
+        raise AnglesError(
+            fault(
+                "nodes",
+                f"the centre is seen but its sigma_px is {nodes.sigma_px[t, n]}",
+                "Give every seen centre a standard uncertainty above zero",
+                place=f"frame {int(nodes.frame[t])}, node {rig.nodes[n].name}",
+            )
+        )
+    out = []
+    for name in wanted:
+        index = [i for i, n in enumerate(rig.nodes) if n.body == name]
+        seen = trusted[:, index]
+        if not seen.any():
+            raise AnglesError(
+                fault(
+                    "nodes",
+                    f"no node of the body {name} is ever seen",
+                    "Look at `tracker check` of the table",
+                )
+            )
+        xy = to_world(np.where(seen[..., None], nodes.xy_px[:, index], 0.0), mirrored)
+        sigma = np.where(seen, nodes.sigma_px[:, index], 1.0).astype(np.float64)
+        reference = np.array([[rig.nodes[i].x_px, rig.nodes[i].y_px] for i in index], dtype=np.float64)
+        out.append(
+            BodyMarkers(
+                name,
+                tuple(rig.nodes[i].name for i in index),
+                xy,
+                np.where(seen, sigma**-2.0, 0.0),
+                to_world(reference, mirrored),
+            )
+        )
+    return out

@@ -1,0 +1,268 @@
+"""Rigid pose of one body in every frame, by weighted least squares, robust against bad markers.
+
+With the template ``p_k`` of a body and its centres ``x_k`` of standard uncertainty ``sigma_k``, the pose is
+the angle ``theta`` and centre ``c`` that minimise ``sum_k |x_k - c - R(theta) p_k|^2 / sigma_k^2``. For
+isotropic uncertainties that has a closed form (the planar case of Umeyama, IEEE PAMI 13 (1991) 376), and
+
+    var(theta) = 1 / sum_k |p_k - p_mean|^2 / sigma_k^2
+
+is the Cramer-Rao bound, with ``p_mean`` the weighted mean of the markers seen in that frame.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from pydpend.angles.markers import BodyMarkers
+from pydpend.angles.table import Floats
+from pydpend.errors import AnglesError, fault
+
+REJECT_D2 = float(stats.chi2.isf(1e-6, 2))
+"""A marker is left out if its squared normalised residual is above this: one in a million by chance."""
+
+INFLATE_P = 1e-4
+"""Below this probability of a frame's chi-square its standard error is scaled up by sqrt(chi2 / dof)."""
+
+PRIOR_DOF = 20.0
+"""The stated sigmas count as much as this many degrees of freedom when the residuals rescale them."""
+
+_TEMPLATE_FRAMES = 4000
+"""The first, robust template is a median over at most this many frames, spread over the recording."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pose:
+    """Pose of one body in T frames; NaN where it cannot be had.
+
+    ``theta_rad`` (T,): turn from the rig's reference frame, counter-clockwise positive, within (-pi, pi].
+    ``centre_px`` (T, 2): the template's origin, world directions. ``sigma_rad`` (T,): standard uncertainty.
+    ``template_px`` (K, 2): the body's shape, turned as in the rig's reference frame, its mean at the origin.
+    ``used`` (T, K): markers used. ``chi2``, ``dof`` (T,): of the residuals with the stated sigmas.
+    ``sigma_scale``: factor by which the residuals make the stated sigmas larger; it is in ``sigma_rad``.
+    ``doubtful`` (T,): frames where a marker is wrong and it cannot be told which; they have no angle.
+    """
+
+    markers: BodyMarkers
+    theta_rad: Floats
+    centre_px: Floats
+    sigma_rad: Floats
+    template_px: Floats
+    used: NDArray[np.bool_]
+    chi2: Floats
+    dof: NDArray[np.int64]
+    sigma_scale: float
+    doubtful: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """One closed-form solution for all frames: angle, centre, information on the angle, residuals, d2 (T,
+    K).
+    """
+
+    theta: Floats
+    centre: Floats
+    information: Floats
+    chi2: Floats
+    count: NDArray[np.int64]
+    d2: Floats
+
+
+def rotate(theta: Floats, vectors: Floats) -> Floats:
+    """Vectors (..., 2) turned counter-clockwise by ``theta`` (...)."""
+    c, s = np.cos(theta), np.sin(theta)
+    x, y = vectors[..., 0], vectors[..., 1]
+    return np.stack([c * x - s * y, s * x + c * y], axis=-1)
+
+
+def solve(xy: Floats, w: Floats, template: Floats) -> Fitted:
+    """Closed-form poses. ``xy`` (T, K, 2), ``w`` (T, K) with 0 for "not there", ``template`` (K, 2)."""
+    count = np.count_nonzero(w > 0, axis=1)
+    total = np.where(count > 0, w.sum(axis=1), 1.0)
+    mean = np.einsum("tk,tkd->td", w, xy) / total[:, None]
+    origin = (w @ template) / total[:, None]
+    dx = xy - mean[:, None, :]
+    dp = template[None, :, :] - origin[:, None, :]
+    cosine = np.einsum("tk,tkd,tkd->t", w, dp, dx)
+    sine = np.einsum("tk,tk->t", w, dp[..., 0] * dx[..., 1] - dp[..., 1] * dx[..., 0])
+    arm2 = (dp**2).sum(axis=2)
+    information = (w * arm2).sum(axis=1)
+    theta = np.arctan2(sine, cosine)
+    turned = rotate(theta[:, None], dp)
+    residual = dx - turned
+    chi2 = (w * (residual**2).sum(axis=2)).sum(axis=1)
+    # Along the direction in which the marker moves when the body turns, a residual has lost one more part of
+    # its variance to the fit than across it: w/W + w arm^2/I against w/W.
+    arm = np.sqrt(np.where(arm2 > 0, arm2, 1.0))
+    radial = (residual * turned).sum(axis=2) / arm
+    tangential = (residual[..., 1] * turned[..., 0] - residual[..., 0] * turned[..., 1]) / arm
+    left_radial = 1.0 - w / total[:, None]
+    left_tangential = left_radial - w * arm2 / np.where(information > 0, information, 1.0)[:, None]
+    d2 = _part(w, radial, left_radial) + _part(w, tangential, left_tangential)
+    good = (count >= 2) & (information > 0)
+    theta = np.where(good, theta, np.nan)
+    centre = np.where(good[:, None], mean - rotate(theta, origin), np.nan)
+    return Fitted(theta, centre, np.where(good, information, np.nan), chi2, count, d2)
+
+
+def _part(w: Floats, residual: Floats, left: Floats) -> Floats:
+    """Squared residual over its own variance; 0 where the fit leaves it no freedom."""
+    free = left > 1e-6
+    return np.where(free, w * residual**2 / np.where(free, left, 1.0), 0.0)
+
+
+def fit_pose(markers: BodyMarkers) -> Pose:
+    """The pose of one body in every frame, its template learned from the whole recording.
+
+    The template starts as the rig's, is refined by medians (which a few bad markers do not move) and then by
+    means, so its own noise falls with the square root of the recording's length instead of staying in every
+    angle as a constant. Markers that do not fit are left out; frames where two markers are left that disagree
+    have no angle.
+
+    Raises :class:`AnglesError` if the body never shows two markers in one frame.
+    """
+    w = markers.weight
+    if not (np.count_nonzero(w > 0, axis=1) >= 2).any():
+        raise AnglesError(
+            fault(
+                "nodes",
+                f"the body {markers.name} never shows two of its nodes in one frame",
+                "One marker has no angle of its own: use method='linkage', or give the body two nodes",
+            )
+        )
+    template = _first_template(markers)
+    used = w > 0
+    doubtful = np.zeros(w.shape[0], dtype=bool)
+    scale2 = 1.0
+    for _ in range(2):
+        scale2 = _robust_scale2(solve(markers.xy_px, w, template))
+        used, doubtful, fitted = _reject(markers, template, scale2)
+        template = _mean_template(markers, np.where(used, w, 0.0), template, fitted)
+    used, doubtful, fitted = _reject(markers, template, scale2)
+    fitted = solve(markers.xy_px, np.where(used, w, 0.0), template)
+    dof = np.maximum(2 * fitted.count - 3, 0)
+    good = np.isfinite(fitted.theta) & ~doubtful
+    free = float(dof[good].sum()) - (2 * template.shape[0] - 3)
+    chi2 = float(fitted.chi2[good & (dof > 0)].sum())
+    scale2 = (chi2 + PRIOR_DOF) / (max(free, 0.0) + PRIOR_DOF)
+    sigma = np.sqrt(scale2 / fitted.information) * inflation(fitted.chi2 / scale2, dof)
+    theta = np.where(good, fitted.theta, np.nan)
+    centre = np.where(good[:, None], fitted.centre, np.nan)
+    sigma = np.where(good, sigma, np.nan)
+    return Pose(
+        markers, theta, centre, sigma, template, used, fitted.chi2, dof, float(np.sqrt(scale2)), doubtful
+    )
+
+
+def inflation(chi2: Floats, dof: NDArray[np.int64]) -> Floats:
+    """Factor on a frame's standard error: 1, or sqrt(chi2 / dof) where chance cannot explain chi2."""
+    limit = np.asarray(stats.chi2.isf(INFLATE_P, np.arange(1, max(int(dof.max(initial=1)), 1) + 1)))
+    some = np.maximum(dof, 1)
+    return np.where((dof > 0) & (chi2 > limit[some - 1]), np.sqrt(chi2 / some), 1.0)
+
+
+def _first_template(markers: BodyMarkers) -> Floats:
+    template = markers.reference_px - markers.reference_px.mean(axis=0)
+    frames = np.flatnonzero(np.count_nonzero(markers.seen, axis=1) >= 2)
+    pick = frames[
+        np.unique(np.linspace(0, frames.size - 1, min(frames.size, _TEMPLATE_FRAMES)).astype(np.int64))
+    ]
+    xy, w = markers.xy_px[pick], markers.weight[pick]
+    for _ in range(3):
+        fitted = solve(xy, w, template)
+        back: Floats = rotate(-fitted.theta[:, None], xy - fitted.centre[:, None, :])
+        back = np.where((w > 0)[..., None], back, np.nan)
+        known = (w > 0).any(axis=0)
+        better = template.copy()
+        better[known] = np.asarray(np.nanmedian(back[:, known], axis=0))
+        template = _aligned(better, markers.reference_px)
+    return template
+
+
+def _mean_template(markers: BodyMarkers, w: Floats, template: Floats, fitted: Fitted) -> Floats:
+    good = np.isfinite(fitted.theta)
+    back = rotate(-fitted.theta[good][:, None], markers.xy_px[good] - fitted.centre[good][:, None, :])
+    weight = w[good]
+    total = weight.sum(axis=0)
+    mean = np.einsum("tk,tkd->kd", weight, back) / np.where(total > 0, total, 1.0)[:, None]
+    return _aligned(np.where((total > 0)[:, None], mean, template), markers.reference_px)
+
+
+def _aligned(template: Floats, reference: Floats) -> Floats:
+    """The template with its mean at the origin and turned as the reference is: this fixes what 0 means."""
+    p = template - template.mean(axis=0)
+    q = reference - reference.mean(axis=0)
+    turn = np.arctan2((p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]).sum(), (p * q).sum())
+    return rotate(np.full(p.shape[0], turn), p)
+
+
+def _robust_scale2(fitted: Fitted) -> float:
+    """Median of chi2 over its median by chance: outliers and short recordings do not move it much."""
+    dof = 2 * fitted.count - 3
+    frames = dof > 0
+    if np.count_nonzero(frames) < 30:
+        return 1.0
+    middle = np.asarray(stats.chi2.median(np.arange(1, int(dof.max()) + 1)))
+    return max(float(np.median(fitted.chi2[frames] / middle[dof[frames] - 1])), 1e-12)
+
+
+def _reject(
+    markers: BodyMarkers, template: Floats, scale2: float
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_], Fitted]:
+    """Leaves out, one by one, the marker that fits worst, as long as it fits too badly."""
+    used = markers.seen.copy()
+    limit = REJECT_D2 * max(scale2, 1e-12)
+    full = solve(markers.xy_px, markers.weight, template)
+    doubtful = np.zeros(used.shape[0], dtype=bool)
+    frames = np.flatnonzero((full.d2 > limit).any(axis=1))
+    d2 = full.d2[frames]
+    while frames.size:
+        count = np.count_nonzero(used[frames], axis=1)
+        # Two markers that do not agree on their distance: one is wrong, and nothing says which.
+        doubtful[frames[count <= 2]] = True
+        frames, d2 = frames[count > 2], d2[count > 2]
+        if not frames.size:
+            break
+        three = count[count > 2] == 3
+        if three.any():
+            drop, open_question = _one_of_three(markers, template, used, frames[three], scale2)
+            used[frames[three], drop] = False
+            doubtful[frames[three][open_question]] = True
+        rest = frames[~three]
+        used[rest, np.argmax(d2[~three], axis=1)] = False
+        frames = rest
+        again = solve(markers.xy_px[frames], np.where(used[frames], markers.weight[frames], 0.0), template)
+        bad = (again.d2 > limit).any(axis=1)
+        frames, d2 = frames[bad], again.d2[bad]
+    fitted = solve(markers.xy_px, np.where(used, markers.weight, 0.0), template)
+    return used, doubtful, fitted
+
+
+def _one_of_three(
+    markers: BodyMarkers, template: Floats, used: NDArray[np.bool_], frames: NDArray[np.int64], scale2: float
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Which of three markers to leave out (its index), and where that stays an open question.
+
+    With three markers two different ones can explain the same disagreement. So all answers are tried: if two
+    fit and their angles differ by more than five standard errors, nothing tells which is right.
+    """
+    xy = markers.xy_px[frames]
+    w = np.where(used[frames], markers.weight[frames], 0.0)
+    index = np.argsort(~used[frames], axis=1, kind="stable")[:, :3]
+    rows = np.arange(frames.size)
+    theta, variance, worst = (np.empty((frames.size, 3)) for _ in range(3))
+    for j in range(3):
+        pair = w.copy()
+        pair[rows, index[:, j]] = 0.0
+        fitted = solve(xy, pair, template)
+        theta[:, j], worst[:, j] = fitted.theta, fitted.d2.max(axis=1)
+        variance[:, j] = scale2 / fitted.information
+    best = np.argmin(worst, axis=1)
+    fits = worst <= REJECT_D2 * scale2
+    apart = np.abs(np.angle(np.exp(1j * (theta - theta[rows, best][:, None]))))
+    differs = apart > 5.0 * np.sqrt(variance + variance[rows, best][:, None])
+    return index[rows, best], ~fits.any(axis=1) | (fits & differs).any(axis=1)

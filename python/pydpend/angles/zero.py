@@ -1,0 +1,137 @@
+"""Where zero is: rest segments found in a recording.
+
+A link hangs at rest at zero. The rest may be before the release, at the end, or in a recording of its own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pydpend.angles.table import Floats, LinkAngles
+from pydpend.errors import AnglesError, fault
+
+REST_WITHIN_RAD = np.radians(0.1)
+"""At rest, means over :data:`BLOCK_S` stay within this range (or six of their standard errors)."""
+
+REST_AT_LEAST_S = 0.5
+"""A rest lasts at least this long: more than half a swing of a hand-sized pendulum's slow mode."""
+
+BLOCK_S = 0.05
+"""Rest is looked for in means over this long, s."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rest:
+    """A stretch in which no link moves.
+
+    Rows ``first`` to ``last`` (both inside), from ``start_s`` to ``stop_s``; ``phi_rad`` (L,) the mean angles
+    and ``sigma_rad`` (L,) their standard errors: scatter over sqrt(rows), or the spread of the block means
+    where that is more.
+    """
+
+    first: int
+    last: int
+    start_s: float
+    stop_s: float
+    phi_rad: Floats
+    sigma_rad: Floats
+
+
+def find_rest(angles: LinkAngles, at_least_s: float = REST_AT_LEAST_S) -> list[Rest]:
+    """The stretches in which every link keeps still for ``at_least_s``, in the order of time.
+
+    Upside down counts as well: which rest hangs, these angles cannot say. An empty list if there is none.
+    """
+    t, phi = angles.t_s, angles.phi_rad
+    step = angles.step_s
+    if not np.isfinite(step):
+        return []
+    rows = max(3, round(BLOCK_S / step))
+    blocks = t.size // rows
+    if blocks < 2:
+        return []
+    shaped = phi[: blocks * rows].reshape(blocks, rows, -1)
+    known = np.isfinite(shaped)
+    count = known.sum(axis=1)
+    full = (count >= max(2, rows // 2)).all(axis=1)
+    # A block with a hole in time is no block of BLOCK_S.
+    full &= np.ptp(t[: blocks * rows].reshape(blocks, rows), axis=1) <= 1.5 * rows * step
+    safe = np.maximum(count, 1)
+    mean = np.where(known, shaped, 0.0).sum(axis=1) / safe
+    scatter = np.sqrt(
+        (np.where(known, shaped - mean[:, None, :], 0.0) ** 2).sum(axis=1) / np.maximum(count - 1, 1)
+    )
+    if not full.any():
+        return []
+    quiet = np.median(scatter[full], axis=0) if full.sum() < 8 else np.quantile(scatter[full], 0.1, axis=0)
+    within = np.maximum(REST_WITHIN_RAD, 6.0 * quiet / np.sqrt(rows))
+    out: list[Rest] = []
+    i = 0
+    while i < blocks:
+        j = i
+        low, high = mean[i].copy(), mean[i].copy()
+        while j < blocks and full[j]:
+            low, high = np.minimum(low, mean[j]), np.maximum(high, mean[j])
+            if (high - low > within).any() or (scatter[j] > 3.0 * quiet + within).any():
+                break
+            j += 1
+        if j > i and t[j * rows - 1] - t[i * rows] + 1.5 * step >= at_least_s:
+            out.append(_rest(angles, i * rows, j * rows - 1, mean[i:j]))
+            i = j
+        else:
+            i += 1
+    return out
+
+
+def _rest(angles: LinkAngles, first: int, last: int, means: Floats) -> Rest:
+    part = angles.phi_rad[first : last + 1]
+    count = np.isfinite(part).sum(axis=0)
+    white = np.nanstd(part, axis=0, ddof=1) / np.sqrt(count)
+    slow = np.std(means, axis=0, ddof=1) / np.sqrt(means.shape[0])
+    return Rest(
+        first,
+        last,
+        float(angles.t_s[first]),
+        float(angles.t_s[last]),
+        np.nanmean(part, axis=0),
+        np.maximum(white, slow),
+    )
+
+
+def zero_of(rests: list[Rest], name: str) -> tuple[Floats, Floats]:
+    """The zero (L,) and its standard error (L,) from the rests at which the links hang.
+
+    Their mean, each taken back by whole turns to the first. Where they differ by more than their errors (dry
+    friction lets a joint stop a little off), half the difference is the error.
+
+    Raises :class:`AnglesError` if there is no rest, or two that differ by more than 5 degrees.
+    """
+    if not rests:
+        raise AnglesError(
+            fault(
+                name,
+                "no stretch of 0.5 s was found in which all links hang at rest, so there is no zero",
+                "Give zero=(phi1, phi2), the links' angles in the rig's reference frame in rad, or the nodes "
+                "of a recording at rest",
+            )
+        )
+    base = rests[0].phi_rad
+    values = np.array([r.phi_rad - 2 * np.pi * np.rint((r.phi_rad - base) / (2 * np.pi)) for r in rests])
+    spread = np.ptp(values, axis=0)
+    if (spread > np.radians(5.0)).any():
+        times = ", ".join(f"{r.start_s:.3g}-{r.stop_s:.3g} s" for r in rests)
+        raise AnglesError(
+            fault(
+                name,
+                f"the links rest at angles that differ by {np.degrees(spread.max()):.1f} deg ({times})",
+                "Say which hangs: give zero=(phi1, phi2), the angles in the rig's reference frame in rad",
+            )
+        )
+    weight = np.array([r.last - r.first + 1 for r in rests], dtype=np.float64)
+    zero = (values * weight[:, None]).sum(axis=0) / weight.sum()
+    error = (
+        np.sqrt(((weight[:, None] * np.array([r.sigma_rad for r in rests])) ** 2).sum(axis=0)) / weight.sum()
+    )
+    return zero, np.maximum(error, spread / 2)
