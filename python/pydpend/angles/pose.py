@@ -166,7 +166,7 @@ def inflation(chi2: Floats, dof: NDArray[np.int64]) -> Floats:
 
 
 def _first_template(markers: BodyMarkers) -> Floats:
-    template = markers.reference_px - markers.reference_px.mean(axis=0)
+    template: Floats = markers.reference_px - markers.reference_px.mean(axis=0)
     frames = np.flatnonzero(np.count_nonzero(markers.seen, axis=1) >= 2)
     pick = frames[
         np.unique(np.linspace(0, frames.size - 1, min(frames.size, _TEMPLATE_FRAMES)).astype(np.int64))

@@ -1,0 +1,273 @@
+"""From holds at known angles to a straight line between volts and angle (Section 5.1, Fig. 10).
+
+The angles of the holds count as exact, their mean voltages as measured: ``V = offset + slope phi``. How
+well the line is known is taken from the scatter of the holds about it (Student's t with n - 2 degrees of
+freedom), which also holds what the noise within a hold does not show: hands that do not hang the link at
+exactly the same place.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from pydpend.encoder.holds import Hold
+from pydpend.errors import EncoderError, fault
+
+Floats = NDArray[np.float64]
+
+SPEC_V = 2.5e-3
+"""The encoder maker's uncertainty of a reading, V (Section 5.1)."""
+
+RANGE_V = (0.0, 10.0)
+"""What the encoder can put out, V (Section 5)."""
+
+LEAST_DOF = 3
+"""With fewer degrees of freedom the holds' own noise says how well the line is known, not their scatter."""
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """``V = offset_v + slope_v_per_rad * phi``.
+
+    ``covariance`` (2, 2): of (offset, slope), with ``dof`` degrees of freedom. ``residual_v`` (n,): hold
+    minus line. ``linearity``: largest residual over the calibrated span. ``noise_v``: standard deviation of
+    a reading, pooled over the holds. ``noisy_holds``: those whose standard deviation is above ``spec_v``.
+    ``range_v``: the output's rails; ``wraps``: whether it jumps from one to the other (a single-turn
+    encoder) or stays there.
+    """
+
+    offset_v: float
+    slope_v_per_rad: float
+    covariance: Floats
+    dof: int
+    holds: tuple[Hold, ...]
+    residual_v: Floats
+    linearity: float
+    noise_v: float
+    spec_v: float = SPEC_V
+    noisy_holds: tuple[str, ...] = ()
+    range_v: tuple[float, float] = RANGE_V
+    wraps: bool = False
+    notes: tuple[str, ...] = ()
+
+    @property
+    def sigma(self) -> tuple[float, float]:
+        """Standard uncertainties of offset (V) and slope (V per rad)."""
+        a, b = np.sqrt(np.diag(self.covariance))
+        return float(a), float(b)
+
+    @property
+    def interval_95(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """95 % intervals of offset (V) and slope (V per rad)."""
+        factor = float(stats.t.ppf(0.975, self.dof)) if self.dof >= LEAST_DOF else 1.959964
+        a, b = self.sigma
+        return (
+            (self.offset_v - factor * a, self.offset_v + factor * a),
+            (self.slope_v_per_rad - factor * b, self.slope_v_per_rad + factor * b),
+        )
+
+    def angle_rad(self, volts: Floats) -> Floats:
+        """Angle of a reading, rad; no wrap is undone."""
+        return np.asarray((np.asarray(volts) - self.offset_v) / self.slope_v_per_rad)
+
+    def systematic_rad(self, volts: Floats) -> Floats:
+        """Standard uncertainty of that angle from the line alone, rad: common to all readings, not noise."""
+        phi = self.angle_rad(volts)
+        c = self.covariance
+        variance = c[0, 0] + 2 * phi * c[0, 1] + phi**2 * c[1, 1]
+        return np.asarray(np.sqrt(variance) / abs(self.slope_v_per_rad))
+
+    @property
+    def noise_rad(self) -> float:
+        """Standard uncertainty of one reading's angle from its noise, rad."""
+        return self.noise_v / abs(self.slope_v_per_rad)
+
+    def to_json(self) -> str:
+        """All of it, as ``pydpend calibrate`` writes it."""
+        low, high = self.interval_95
+        value: dict[str, Any] = {
+            "schema": 1,
+            "offset_v": self.offset_v,
+            "slope_v_per_rad": self.slope_v_per_rad,
+            "offset_sigma_v": self.sigma[0],
+            "slope_sigma_v_per_rad": self.sigma[1],
+            "offset_interval_95_v": list(low),
+            "slope_interval_95_v_per_rad": list(high),
+            "volts_per_turn": self.slope_v_per_rad * 2 * np.pi,
+            "covariance": self.covariance.tolist(),
+            "dof": self.dof,
+            "holds": [
+                {**asdict(h), "residual_v": float(r), "within_spec": h.std_v <= self.spec_v}
+                for h, r in zip(self.holds, self.residual_v, strict=True)
+            ],
+            "linearity": self.linearity,
+            "noise_v": self.noise_v,
+            "noise_rad": self.noise_rad,
+            "spec_v": self.spec_v,
+            "noisy_holds": list(self.noisy_holds),
+            "range_v": list(self.range_v),
+            "wraps": self.wraps,
+            "notes": list(self.notes),
+        }
+        return json.dumps(value, indent=2) + "\n"
+
+    def write(self, path: str | Path) -> None:
+        """Writes the JSON. Raises :class:`EncoderError` if the file cannot be written."""
+        try:
+            Path(path).write_text(self.to_json(), encoding="utf-8")
+        except OSError as problem:
+            raise EncoderError(
+                fault(str(path), f"the file cannot be written ({problem.strerror})", "Check the folder")
+            ) from problem
+
+
+def read_calibration(path: str | Path) -> Calibration:
+    """Reads what :meth:`Calibration.write` wrote. Raises :class:`EncoderError` if it is not that."""
+    try:
+        value = json.loads(Path(path).read_text(encoding="utf-8"))
+        holds = tuple(
+            Hold(**{k: h[k] for k in ("angle_rad", "mean_v", "std_v", "n", "sigma_v", "name")})
+            for h in value["holds"]
+        )
+        low, high = (float(v) for v in value["range_v"])
+        return Calibration(
+            float(value["offset_v"]),
+            float(value["slope_v_per_rad"]),
+            np.array(value["covariance"], dtype=np.float64).reshape(2, 2),
+            int(value["dof"]),
+            holds,
+            np.array([h["residual_v"] for h in value["holds"]], dtype=np.float64),
+            float(value["linearity"]),
+            float(value["noise_v"]),
+            float(value["spec_v"]),
+            tuple(value["noisy_holds"]),
+            (low, high),
+            bool(value["wraps"]),
+            tuple(value["notes"]),
+        )
+    except OSError as problem:
+        raise EncoderError(
+            fault(str(path), f"the file cannot be read ({problem.strerror})", "Check the path")
+        ) from problem
+    except (ValueError, KeyError, TypeError) as problem:
+        raise EncoderError(
+            fault(str(path), f"it is not a calibration ({problem})", "Make one with `pydpend calibrate`")
+        ) from problem
+
+
+def calibrate(
+    holds: Sequence[Hold],
+    *,
+    range_v: tuple[float, float] = RANGE_V,
+    wraps: bool = False,
+    spec_v: float = SPEC_V,
+) -> Calibration:
+    """Weighted straight line through the holds.
+
+    Raises :class:`EncoderError` for fewer than two holds, holds all at one angle, a voltage that does not
+    change with the angle, and holds outside the range or at its rails.
+    """
+    if len(holds) < 2:
+        raise EncoderError(
+            fault(
+                "calibration",
+                f"{len(holds)} hold is not enough for a line",
+                "Give at least two, at two angles",
+            )
+        )
+    phi = np.array([h.angle_rad for h in holds])
+    volts = np.array([h.mean_v for h in holds])
+    if not (np.isfinite(phi).all() and np.isfinite(volts).all()):
+        raise EncoderError(fault("calibration", "an angle or a voltage of a hold is not a number"))
+    if np.ptp(phi) < 1e-6:
+        raise EncoderError(
+            fault(
+                "calibration",
+                f"all {len(holds)} holds are at one angle, {np.degrees(phi[0]):.6g} deg",
+                "Give two",
+            )
+        )
+    margin = 4 * spec_v
+    for hold in holds:
+        low, high = range_v[0] + (0 if wraps else margin), range_v[1] - (0 if wraps else margin)
+        if not low <= hold.mean_v <= high:
+            raise EncoderError(
+                fault(
+                    hold.name,
+                    f"its mean, {hold.mean_v:.4f} V, is at a rail ({range_v[0]:g}, {range_v[1]:g} V)",
+                    "Turn the encoder's zero towards the middle, or give the right range",
+                )
+            )
+    std = np.array([h.std_v for h in holds])
+    n = np.array([h.n for h in holds])
+    sigma = np.array([h.sigma_v for h in holds])
+    # A hold that reads one converter step all the time has no scatter; it is not exact for that.
+    usual = float(np.median(sigma[sigma > 0])) if (sigma > 0).any() else 1.0
+    sigma = np.maximum(sigma, 0.1 * usual)
+    if wraps:
+        volts = _unwrapped_holds(phi, volts, sigma, range_v[1] - range_v[0])
+    weight = 1 / sigma**2
+    design = np.stack([np.ones_like(phi), phi], axis=1)
+    normal = design.T @ (design * weight[:, None])
+    covariance = np.linalg.inv(normal)
+    offset, slope = covariance @ (design.T @ (weight * volts))
+    residual = volts - offset - slope * phi
+    dof = len(holds) - 2
+    notes: list[str] = []
+    chi2 = float((weight * residual**2).sum())
+    if dof >= LEAST_DOF:
+        covariance = covariance * (chi2 / dof)
+        if stats.chi2.sf(chi2, dof) < 1e-3:
+            notes.append(
+                f"the holds scatter about the line {np.sqrt(chi2 / dof):.1f} times more than their noise: "
+                "the angles of the holds are not exact, or the encoder is not linear"
+            )
+    else:
+        notes.append(
+            f"{len(holds)} holds: the uncertainties are from the noise within them, not their scatter"
+        )
+    if abs(slope) * np.ptp(phi) < 10 * float(np.sqrt((sigma**2).mean())):
+        raise EncoderError(
+            fault(
+                "calibration", "the voltage does not change with the angle", "Check the wiring and the angles"
+            )
+        )
+    weights = np.maximum(n - 1, 0)
+    noise = float(np.sqrt((weights * std**2).sum() / weights.sum())) if weights.sum() else spec_v
+    return Calibration(
+        float(offset),
+        float(slope),
+        covariance,
+        dof,
+        tuple(holds),
+        residual,
+        float(np.abs(residual).max() / (abs(slope) * np.ptp(phi))),
+        noise if noise > 0 else spec_v,
+        spec_v,
+        tuple(h.name for h in holds if h.std_v > spec_v),
+        range_v,
+        wraps,
+        tuple(notes),
+    )
+
+
+def _unwrapped_holds(phi: Floats, volts: Floats, sigma: Floats, span: float) -> Floats:
+    """Voltages of a single-turn encoder put on one line: whole spans are added, for either sense of
+    turning.
+    """
+    best, least = volts, np.inf
+    for sense in (1.0, -1.0):
+        line = volts[0] + sense * span / (2 * np.pi) * (phi - phi[0])
+        there = volts + span * np.rint((line - volts) / span)
+        chi2 = float((((there - line - (there - line).mean()) / sigma) ** 2).sum())
+        if chi2 < least:
+            best, least = there, chi2
+    return best

@@ -1,0 +1,243 @@
+"""Video against encoder: gain, offset, delay, residuals, and whose noise explains them (Section 6, Fig.
+15).
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pydpend.angles.table import LinkAngles
+from pydpend.encoder.statistics import correlation_time, highpass_noise
+from pydpend.encoder.sync import Course, Synchronisation, synchronise
+
+Floats = NDArray[np.float64]
+
+BLOCK_S = 1.0
+"""Agreement below the encoder's noise is judged from means of the residual over this long."""
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """The encoder's readings on the video's clock, and how far the video is from them.
+
+    ``t_s`` (n,): video time. ``video_rad``, ``encoder_rad`` (n,): angles; the encoder's with its whole
+    turns taken off, its gain and zero as they are. ``residual_rad`` (n,): the video's angle less what the
+    regression makes of the encoder's. ``gain``, ``offset_rad``: of that regression, video = offset + gain *
+    encoder; ``delay_s``: what of the clocks' offset is left to estimate (0 where it was estimated, the
+    found delay where the recorder gave the clocks as one). Each with its standard uncertainty, from
+    residuals whose neighbours hang together for ``correlation_samples``. ``mean_interval_rad``: 95 %
+    interval of the mean residual. ``share_encoder``, ``share_video``: parts of the residual's variance that
+    the stated noises explain; ``share_unexplained`` the rest (below 0 if the stated noises are too large).
+    """
+
+    name: str
+    encoder_name: str
+    link: int
+    sync: Synchronisation
+    t_s: Floats
+    video_rad: Floats
+    encoder_rad: Floats
+    video_sigma_rad: Floats
+    encoder_sigma_rad: float
+    residual_rad: Floats
+    gain: float
+    gain_sigma: float
+    offset_rad: float
+    offset_sigma_rad: float
+    delay_s: float
+    delay_sigma_s: float
+    rms_rad: float
+    largest_rad: float
+    mean_rad: float
+    mean_interval_rad: tuple[float, float]
+    correlation_samples: float
+    block_rms_rad: float
+    block_expected_rad: float
+    share_encoder: float
+    share_video: float
+    share_unexplained: float
+    video_noise_rad: float
+    encoder_noise_rad: float
+    notes: tuple[str, ...]
+
+    def to_json(self) -> str:
+        """All numbers, angles in degrees too where people read them."""
+        s = self.sync
+        value: dict[str, Any] = {
+            "video": self.name,
+            "encoder": self.encoder_name,
+            "link": self.link + 1,
+            "n": int(self.residual_rad.size),
+            "clocks": {
+                "given": s.given,
+                "offset_s": s.offset_s,
+                "offset_sigma_s": s.offset_sigma_s,
+                "drift": s.drift,
+                "drift_sigma": s.drift_sigma,
+                "reference_s": s.reference_s,
+                "turns": s.turns,
+                "left_out": s.left_out,
+            },
+            "gain": self.gain,
+            "gain_sigma": self.gain_sigma,
+            "offset_rad": self.offset_rad,
+            "offset_sigma_rad": self.offset_sigma_rad,
+            "delay_s": self.delay_s,
+            "delay_sigma_s": self.delay_sigma_s,
+            "rms_rad": self.rms_rad,
+            "rms_deg": float(np.degrees(self.rms_rad)),
+            "largest_rad": self.largest_rad,
+            "largest_deg": float(np.degrees(self.largest_rad)),
+            "mean_rad": self.mean_rad,
+            "mean_interval_95_rad": list(self.mean_interval_rad),
+            "correlation_samples": self.correlation_samples,
+            "block_s": BLOCK_S,
+            "block_rms_rad": self.block_rms_rad,
+            "block_expected_rad": self.block_expected_rad,
+            "shares": {
+                "encoder": self.share_encoder,
+                "video": self.share_video,
+                "unexplained": self.share_unexplained,
+            },
+            "stated_sigma_rad": {
+                "encoder": self.encoder_sigma_rad,
+                "video": float(np.sqrt(np.nanmean(self.video_sigma_rad**2)))
+                if self.video_sigma_rad.size
+                else None,
+            },
+            "own_noise_rad": {"encoder": self.encoder_noise_rad, "video": self.video_noise_rad},
+            "notes": list(self.notes),
+        }
+        return json.dumps(_plain(value), indent=2) + "\n"
+
+    def to_columns(self) -> dict[str, Floats]:
+        """The residual series as columns of a table."""
+        return {
+            "time_s": self.t_s,
+            "video_rad": self.video_rad,
+            "encoder_rad": self.encoder_rad,
+            "residual_rad": self.residual_rad,
+        }
+
+
+def _plain(value: Any) -> Any:
+    """NaN has no JSON: ``null``."""
+    if isinstance(value, dict):
+        return {k: _plain(v) for k, v in value.items()}
+    if isinstance(value, list):
+        return [_plain(v) for v in value]
+    return None if isinstance(value, float) and not np.isfinite(value) else value
+
+
+def compare(
+    video: LinkAngles,
+    encoder: LinkAngles,
+    link: int = 0,
+    *,
+    clocks: str = "estimate",
+) -> Comparison:
+    """Compares a link's video angle with an encoder's (:func:`pydpend.encoder.encoder_angles`).
+
+    The noise of the encoder, most often the larger by far, is on its own side of the regression, so the
+    gain is not pulled towards zero by it. ``clocks`` as in :func:`pydpend.encoder.synchronise`.
+
+    Raises :class:`~pydpend.errors.EncoderError` if the recordings share no motion.
+    """
+    sync = synchronise(video, encoder, link, clocks=clocks)
+    course = Course.of(video, link)
+    seen = encoder.seen[:, 0]
+    there = sync.video_time(encoder.t_s[seen])
+    angle = course.at(there)
+    inside = np.isfinite(angle)
+    t = there[inside]
+    video_rad = angle[inside]
+    encoder_rad = encoder.phi_rad[seen, 0][inside] - 2 * np.pi * sync.turns
+    gain = 1.0 / sync.gain
+    offset = -sync.zero_rad / sync.gain
+    residual = video_rad - offset - gain * encoder_rad
+    together = correlation_time(residual - residual.mean())
+    mean = float(residual.mean())
+    half = 1.96 * float(residual.std(ddof=1)) * float(np.sqrt(together / residual.size))
+    notes = [*map(str, video.meta.get("notes", ())), *map(str, encoder.meta.get("notes", ()))]
+    if sync.left_out:
+        notes.append(f"{sync.left_out} encoder readings are outliers and were left out of the regression")
+    # The regression's noise is that of one encoder reading and one interpolated video angle.
+    seen_video = video.seen[:, link]
+    sigma_video = np.interp(t, video.t_s[seen_video], video.sigma_rad[seen_video, link])
+    stated = encoder.sigma_rad[seen, 0][inside]
+    encoder_sigma = float(np.sqrt(np.nanmean(stated**2))) if np.isfinite(stated).any() else float("nan")
+    variance = float((residual**2).mean())
+    part_encoder = (gain * encoder_sigma) ** 2 / variance
+    part_video = (
+        float(np.nanmean(sigma_video**2)) / variance if np.isfinite(sigma_video).any() else float("nan")
+    )
+    if not np.isfinite(part_video):
+        notes.append("the video's angles state no uncertainty, so its share of the residual is not known")
+    blocks, expected = _blocks(
+        t, residual, float(np.sqrt((gain * encoder_sigma) ** 2 + np.nan_to_num(part_video) * variance))
+    )
+    delay, delay_sigma = 0.0, sync.offset_sigma_s
+    if sync.given:
+        delay, delay_sigma = _delay(course, t, encoder_rad, offset, gain)
+    c = sync.covariance
+    slope = np.array([-1.0 / sync.gain, sync.zero_rad / sync.gain**2])
+    return Comparison(
+        video.name,
+        encoder.name,
+        link,
+        sync,
+        t,
+        video_rad,
+        encoder_rad,
+        sigma_video,
+        encoder_sigma,
+        residual,
+        gain,
+        sync.gain_sigma / sync.gain**2,
+        offset,
+        float(np.sqrt(slope @ c[:2, :2] @ slope)),
+        delay,
+        delay_sigma,
+        float(np.sqrt(variance)),
+        float(np.abs(residual).max()),
+        mean,
+        (mean - half, mean + half),
+        together,
+        blocks,
+        expected,
+        part_encoder,
+        part_video,
+        1.0 - part_encoder - (part_video if np.isfinite(part_video) else 0.0),
+        highpass_noise(video.phi_rad[:, link]),
+        highpass_noise(encoder.phi_rad[:, 0]),
+        tuple(notes),
+    )
+
+
+def _blocks(t: Floats, residual: Floats, sigma: float) -> tuple[float, float]:
+    """RMS of the residual's means over BLOCK_S, and what white noise of ``sigma`` would leave of itself."""
+    index = np.floor((t - t[0]) / BLOCK_S).astype(np.int64)
+    number = np.bincount(index)
+    total = np.bincount(index, weights=residual)
+    full = number >= 0.5 * np.median(number[number > 0])
+    mean = total[full] / number[full]
+    return float(np.sqrt((mean**2).mean())), float(sigma * np.sqrt((1.0 / number[full]).mean()))
+
+
+def _delay(course: Course, t: Floats, encoder_rad: Floats, offset: float, gain: float) -> tuple[float, float]:
+    """How much later the encoder's readings are than their stamps say, s, with clocks given as one."""
+    angle, rate = course.at(t), course.rate_at(t)
+    residual = offset + gain * encoder_rad - angle
+    rate = rate - rate.mean()
+    power = float(rate @ rate)
+    if power <= 0:
+        return float("nan"), float("nan")
+    delay = float(rate @ residual) / power
+    rest = residual - delay * rate
+    together = correlation_time(rest - rest.mean())
+    return delay, float(np.sqrt((rest @ rest) / rest.size * together / power))

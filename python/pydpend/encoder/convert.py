@@ -1,0 +1,101 @@
+"""From an encoder's volts to angles: rails, wraps and uncertainty."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pydpend.angles.table import LinkAngles
+from pydpend.encoder.calibration import Calibration
+from pydpend.encoder.signal import EncoderSignal
+from pydpend.errors import EncoderError, fault
+
+Floats = NDArray[np.float64]
+
+RAIL_SIGMAS = 4.0
+"""A reading within this many standard deviations of a rail may be cut off by it."""
+
+MOST_LEFT_OUT = 0.5
+"""With more than this part of the readings unusable there is no signal to speak of."""
+
+
+def encoder_angles(signal: EncoderSignal, calibration: Calibration | None = None) -> LinkAngles:
+    """The encoder's angle over time, one link, rad, unwrapped; ``sigma_rad`` is the noise of a reading.
+
+    Readings at or beyond the rails have no angle (NaN) and are counted in ``meta``; so are those taken
+    while a single-turn encoder jumps from one rail to the other. ``meta["systematic_rad"]`` is the largest
+    uncertainty that the calibration line adds, common to all readings.
+
+    A signal already in rad needs no calibration; its noise is taken from itself (residual of a local cubic).
+
+    Raises :class:`~pydpend.errors.EncoderError`: volts without a calibration, or more than half of the
+    readings unusable.
+    """
+    if signal.unit == "rad":
+        from pydpend.encoder.statistics import highpass_noise
+
+        noise = highpass_noise(signal.value)
+        sigma = np.full((signal.value.size, 1), noise if noise > 0 else np.nan)
+        phi = np.unwrap(signal.value)
+        meta = {"source": "encoder, in angle", "notes": list(signal.notes), "sigma_rad": float(sigma[0, 0])}
+        return LinkAngles(signal.t_s, phi[:, None], sigma, None, meta, signal.name)
+    if calibration is None:
+        raise EncoderError(
+            fault(
+                signal.name, "it is in volts and there is no calibration", "Make one with `pydpend calibrate`"
+            )
+        )
+    volts = signal.value
+    low, high = calibration.range_v
+    margin = RAIL_SIGMAS * calibration.noise_v
+    beyond = (volts < low - margin) | (volts > high + margin)
+    notes = list(signal.notes)
+    at_rail = np.zeros(volts.size, dtype=bool)
+    jumping = np.zeros(volts.size, dtype=bool)
+    if calibration.wraps:
+        jumping = _jumping(volts, high - low)
+    else:
+        at_rail = ~beyond & ((volts <= low + margin) | (volts >= high - margin))
+    for what, mask in (
+        (f"beyond the range of {low:g} to {high:g} V", beyond),
+        (f"at a rail of {low:g} to {high:g} V, the angle is cut off there", at_rail),
+        ("taken while the encoder jumped from one rail to the other", jumping),
+    ):
+        if mask.any():
+            first = float(signal.t_s[np.argmax(mask)])
+            notes.append(
+                f"{int(mask.sum())} readings {what} (the first at {first:.6g} s); they have no angle"
+            )
+    bad = beyond | at_rail | jumping
+    if bad.mean() > MOST_LEFT_OUT:
+        raise EncoderError(
+            fault(
+                signal.name,
+                f"{100 * bad.mean():.0f} % of the readings cannot be used ({notes[-1]})",
+                "Check the range",
+            )
+        )
+    good = ~bad
+    counted = volts.copy()
+    if calibration.wraps:
+        counted[good] = np.unwrap(volts[good], period=high - low)
+    phi = np.where(good, calibration.angle_rad(counted), np.nan)
+    sigma = np.where(good, calibration.noise_rad, np.nan)
+    meta = {
+        "source": "encoder",
+        "readings_at_rails": int(at_rail.sum()),
+        "readings_beyond_range": int(beyond.sum()),
+        "readings_while_jumping": int(jumping.sum()),
+        "systematic_rad": float(np.nanmax(np.where(good, calibration.systematic_rad(counted), np.nan))),
+        "notes": notes,
+    }
+    return LinkAngles(signal.t_s, phi[:, None], sigma[:, None], None, meta, signal.name)
+
+
+def _jumping(volts: Floats, span: float) -> NDArray[np.bool_]:
+    """Readings in the middle of a jump: far from both neighbours, which are nearly a span apart."""
+    out = np.zeros(volts.size, dtype=bool)
+    before, after = np.abs(np.diff(volts))[:-1], np.abs(np.diff(volts))[1:]
+    whole = np.abs(volts[2:] - volts[:-2])
+    out[1:-1] = (whole > 0.6 * span) & (before > 0.1 * span) & (after > 0.1 * span)
+    return out

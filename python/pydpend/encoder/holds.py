@@ -1,0 +1,166 @@
+"""Recordings of the encoder held at known angles, from which it is calibrated (Section 5.1)."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from pydpend.columns import read_columns
+from pydpend.encoder.signal import EncoderSignal, Unit, read_encoder
+from pydpend.encoder.statistics import correlation_time
+from pydpend.errors import EncoderError, fault
+
+ENDINGS = (".csv", ".tdms", ".npy", ".parquet", ".txt")
+"""What counts as a recording in a folder of holds."""
+
+
+@dataclass(frozen=True)
+class Hold:
+    """One hold: ``mean_v`` and ``std_v`` of ``n`` readings at ``angle_rad``.
+
+    ``sigma_v`` is the standard error of the mean; readings that hang together count as fewer.
+    """
+
+    angle_rad: float
+    mean_v: float
+    std_v: float
+    n: int
+    sigma_v: float
+    name: str = "hold"
+
+
+def hold_of(signal: EncoderSignal, angle_rad: float) -> Hold:
+    """The hold of a recording made at one known angle. Raises :class:`EncoderError` unless it is in volts."""
+    if signal.unit != "v":
+        raise EncoderError(fault(signal.name, "a hold must be in volts", "Name the voltage's column"))
+    n = signal.value.size
+    std = float(np.std(signal.value, ddof=1)) if n > 1 else 0.0
+    together = correlation_time(signal.value - signal.value.mean())
+    return Hold(
+        angle_rad, float(signal.value.mean()), std, n, std * float(np.sqrt(together / n)), signal.name
+    )
+
+
+_ANGLE = re.compile(r"([+\-−mp]?)(\d+(?:[.,]\d+)?)\s*(deg|turns|turn|)$", re.IGNORECASE)
+
+
+def angles_from_names(names: Sequence[str]) -> list[float] | None:
+    """Angles in rad from file names that end in one (``hold_-360deg``, ``m720deg``, ``rest_0``, ``-2turns``).
+
+    ``None`` unless every name has one and at least one has a sign, ``deg`` or ``turns``: ``hold_1`` to
+    ``hold_7`` are numbers of files, not angles.
+    """
+    found = [_ANGLE.search(n) for n in names]
+    if not all(found):
+        return None
+    out, sure = [], False
+    for match in found:
+        assert match is not None
+        sign, digits, unit = match.groups()
+        value = float(digits.replace(",", "."))
+        sure |= bool(sign) or bool(unit)
+        value *= -1.0 if sign in ("-", "−", "m", "M") else 1.0
+        out.append(2 * np.pi * value if unit.lower().startswith("turn") else float(np.radians(value)))
+    return out if sure else None
+
+
+def read_holds(
+    paths: Sequence[str | Path],
+    angles_deg: Sequence[float] | None = None,
+    *,
+    column: str | None = None,
+    time_column: str | None = None,
+    rate_hz: float | None = None,
+    unit: Unit | None = None,
+) -> list[Hold]:
+    """Holds from one recording each, from all recordings in a folder, or from one table.
+
+    The angles are ``angles_deg`` in the order of ``paths``, or else in the files' names (see
+    :func:`angles_from_names`). One table has ``angle_deg`` (or ``angle_rad``) beside ``voltage_v``: all
+    readings, or one row per hold with ``std_v`` and ``n``.
+
+    Raises :class:`EncoderError` if angles are missing or their number is not the files'.
+    """
+    files: list[Path] = []
+    for path in map(Path, paths):
+        if path.is_dir():
+            inside = [p for p in sorted(path.iterdir()) if p.suffix.lower() in ENDINGS]
+            if not inside:
+                raise EncoderError(
+                    fault(str(path), "the folder has no hold recordings", "Give CSV, TDMS or NumPy files")
+                )
+            files += inside
+        else:
+            files.append(path)
+    if not files:
+        raise EncoderError(
+            fault("calibration", "no hold recordings were given", "Name the files or their folder")
+        )
+    if len(files) == 1 and angles_deg is None:
+        return _holds_of_table(files[0], column or "voltage_v")
+    if angles_deg is None:
+        angles = angles_from_names([f.stem for f in files])
+        if angles is None:
+            raise EncoderError(
+                fault(
+                    "calibration",
+                    f"the angles of the {len(files)} holds are neither given nor in the files' names",
+                    "Give them in the files' order, or name the files like hold_-360deg.csv",
+                )
+            )
+    else:
+        angles = [float(np.radians(a)) for a in angles_deg]
+    if len(angles) != len(files):
+        raise EncoderError(
+            fault("calibration", f"{len(angles)} angles for {len(files)} holds", "Give one for each")
+        )
+    return [
+        hold_of(read_encoder(f, column=column, time_column=time_column, rate_hz=rate_hz, unit=unit), a)
+        for f, a in zip(files, angles, strict=True)
+    ]
+
+
+def _holds_of_table(path: Path, column: str) -> list[Hold]:
+    table = read_columns(path, [column], ["angle_deg", "angle_rad", "std_v", "n"], error=EncoderError)
+    if ("angle_deg" in table.values) == ("angle_rad" in table.values):
+        raise EncoderError(
+            fault(
+                str(path),
+                "one file is a calibration only if it has a column angle_deg or angle_rad",
+                f"The columns are {', '.join(table.header)}; or give one recording per hold",
+            )
+        )
+    angle = (
+        table.values["angle_rad"] if "angle_rad" in table.values else np.radians(table.values["angle_deg"])
+    )
+    volts = table.values[column]
+    bad = np.flatnonzero(~(np.isfinite(angle) & np.isfinite(volts)))
+    if bad.size:
+        raise EncoderError(
+            fault(
+                str(path),
+                "an angle or a voltage is missing",
+                "Remove the line",
+                place=table.place(int(bad[0])),
+            )
+        )
+    out = []
+    for value in np.unique(angle):
+        rows = np.flatnonzero(angle == value)
+        name = f"{np.degrees(value):g} deg"
+        if rows.size == 1 and "std_v" in table.values:
+            std = float(table.values["std_v"][rows[0]])
+            n = int(table.values["n"][rows[0]]) if "n" in table.values else 1
+            out.append(Hold(float(value), float(volts[rows[0]]), std, n, std / float(np.sqrt(n)), name))
+        else:
+            out.append(
+                hold_of(
+                    EncoderSignal(np.arange(rows.size, dtype=np.float64), volts[rows], "v", name),
+                    float(value),
+                )
+            )
+    return out

@@ -1,0 +1,214 @@
+"""What an encoder recorded: :class:`EncoderSignal`, and reading it from CSV, Parquet, NI TDMS or NumPy."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pydpend.columns import Columns, read_columns
+from pydpend.errors import EncoderError, fault
+
+Floats = NDArray[np.float64]
+Unit = Literal["v", "rad", "deg"]
+
+TIME_COLUMN = "time_s"
+KNOWN_COLUMNS = ("voltage_v", "phi1_rad", "phi1_deg")
+
+
+@dataclass(frozen=True, eq=False)
+class EncoderSignal:
+    """``t_s`` (T,): s on the encoder's clock, increasing. ``value`` (T,): V, or rad if ``unit`` is ``"rad"``.
+
+    Samples without a value are not in it; ``notes`` says how many were left out, and of gaps and uneven
+    steps.
+    """
+
+    t_s: Floats
+    value: Floats
+    unit: Literal["v", "rad"] = "v"
+    name: str = "encoder"
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        t = np.ascontiguousarray(self.t_s, dtype=np.float64)
+        value = np.ascontiguousarray(self.value, dtype=np.float64)
+        if t.ndim != 1 or t.shape != value.shape or t.size == 0:
+            raise EncoderError(
+                fault(
+                    self.name,
+                    f"times of shape {t.shape} and values of shape {value.shape}",
+                    "Both must be (T,)",
+                )
+            )
+        if not np.isfinite(t).all() or (np.diff(t) <= 0).any():
+            raise EncoderError(fault(self.name, "its times do not increase", "Sort the samples by time"))
+        if np.isnan(value).any() or np.isinf(value).any():
+            raise EncoderError(fault(self.name, "a value is not a number", "Leave such samples out"))
+        object.__setattr__(self, "t_s", t)
+        object.__setattr__(self, "value", value)
+
+    @property
+    def step_s(self) -> float:
+        """Median time between samples, s; NaN for a single one."""
+        return float(np.median(np.diff(self.t_s))) if self.t_s.size > 1 else float("nan")
+
+
+def read_encoder(
+    path: str | Path,
+    *,
+    column: str | None = None,
+    time_column: str | None = None,
+    rate_hz: float | None = None,
+    unit: Unit | None = None,
+) -> EncoderSignal:
+    """Reads an encoder's recording; the kind of file is found from its content.
+
+    CSV and Parquet: ``time_column`` (``time_s``) and ``column`` (``voltage_v``, ``phi1_rad`` or
+    ``phi1_deg``) by name; notes above the header do no harm. TDMS: ``column`` is a channel, ``channel`` or
+    ``group/channel``; the time is ``time_column``'s channel or else the waveform's own increment. NumPy:
+    (T,), or (T, 2) or (2, T) with the time first. ``rate_hz`` gives the time where the file has none.
+    ``unit`` is taken from the ending of the column's name (``_v``, ``_rad``, ``_deg``), else volts.
+
+    A sample without a value is left out and noted, as are gaps and uneven steps. Raises
+    :class:`~pydpend.errors.EncoderError` naming file, line and column for text that is no number, times that
+    are missing, repeated or falling, and columns that are not there.
+    """
+    path = Path(path)
+    if rate_hz is not None and not (np.isfinite(rate_hz) and rate_hz > 0):
+        raise EncoderError(
+            fault(str(path), f"a rate of {rate_hz} Hz cannot be", "Give the samples per second")
+        )
+    try:
+        with path.open("rb") as file:
+            magic = file.read(6)
+    except OSError as problem:
+        raise EncoderError(
+            fault(str(path), f"the file cannot be read ({problem.strerror})", "Check the path")
+        ) from problem
+    table: Columns | None = None
+    notes: list[str] = []
+    if magic[:4] == b"TDSm":
+        from pydpend.encoder.tdms import read_tdms
+
+        t, value, label, notes = read_tdms(path, column, time_column, rate_hz)
+    elif magic == b"\x93NUMPY":
+        t, value, label = _read_numpy(path, rate_hz)
+    else:
+        t, value, label, table = _read_table(path, column, time_column, rate_hz)
+    return _checked(path, t, value, label, unit, table, notes)
+
+
+def _read_table(
+    path: Path, column: str | None, time_column: str | None, rate_hz: float | None
+) -> tuple[Floats, Floats, str, Columns]:
+    when = [] if rate_hz is not None and time_column is None else [time_column or TIME_COLUMN]
+    required = [*when, *([column] if column else [])]
+    optional = () if column else KNOWN_COLUMNS
+    if not required:
+        raise EncoderError(fault(str(path), "with rate_hz the column must be named", "Give column=..."))
+    table = read_columns(path, required, optional, error=EncoderError)
+    found = [column] if column else [c for c in KNOWN_COLUMNS if c in table.values]
+    if len(found) != 1:
+        raise EncoderError(
+            fault(
+                str(path),
+                f"which column is the encoder's? ({', '.join(found) or 'none that is known'})",
+                f"Name one of {', '.join(table.header)}",
+            )
+        )
+    value = table.values[found[0]]
+    t = table.values[when[0]] if when else np.arange(value.size) / float(rate_hz or 1.0)
+    return t, value, found[0], table
+
+
+def _read_numpy(path: Path, rate_hz: float | None) -> tuple[Floats, Floats, str]:
+    try:
+        array = np.load(path, allow_pickle=False)
+    except (OSError, ValueError, EOFError) as problem:
+        raise EncoderError(
+            fault(str(path), f"the NumPy file is damaged ({problem})", "Copy it again")
+        ) from problem
+    if array.dtype.kind not in "fiu":
+        raise EncoderError(
+            fault(str(path), f"an array of {array.dtype}, not of numbers", "Save plain numbers")
+        )
+    array = np.asarray(array, dtype=np.float64)
+    if array.ndim == 1 and rate_hz is not None:
+        return np.arange(array.size) / rate_hz, array, "value"
+    if array.ndim == 2 and array.shape[0] == 2 and array.shape[1] != 2:
+        array = array.T
+    if array.ndim != 2 or array.shape[1] != 2:
+        raise EncoderError(
+            fault(
+                str(path),
+                f"an array of shape {array.shape}",
+                "Save (T, 2) with the time in s first, or (T,) and give rate_hz",
+            )
+        )
+    return array[:, 0].copy(), array[:, 1].copy(), "value"
+
+
+def _checked(
+    path: Path,
+    t: Floats,
+    value: Floats,
+    label: str,
+    unit: Unit | None,
+    table: Columns | None,
+    notes: list[str],
+) -> EncoderSignal:
+    def place(row: int, column: str) -> str:
+        return table.place(row, column) if table is not None else f"sample {row}"
+
+    if t.size == 0:
+        raise EncoderError(fault(str(path), "there are no samples", "Give a recording with samples"))
+    bad = np.flatnonzero(~np.isfinite(t))
+    if bad.size:
+        raise EncoderError(
+            fault(str(path), "there is no time", "Give every sample a time", place=place(int(bad[0]), "time"))
+        )
+    bad = np.flatnonzero(np.diff(t) <= 0) + 1
+    if bad.size:
+        i = int(bad[0])
+        raise EncoderError(
+            fault(
+                str(path),
+                f"the time {t[i]:.9g} s does not come after {t[i - 1]:.9g} s ({bad.size} such)",
+                "Sort by time and remove repeats, or give the rate (rate_hz) if the stamps are coarse",
+                place=place(i, "time"),
+            )
+        )
+    if unit is None:
+        ending = label.rsplit("_", 1)[-1].lower()
+        unit = "rad" if ending == "rad" else "deg" if ending == "deg" else "v"
+    keep = np.isfinite(value)
+    if not keep.any():
+        raise EncoderError(
+            fault(str(path), "no sample has a value", "Check the column", place=f"column {label}")
+        )
+    if not keep.all():
+        first = int(np.flatnonzero(~keep)[0])
+        notes.append(
+            f"{int((~keep).sum())} of {keep.size} samples have no value and were left out "
+            f"(the first: {place(first, label)})"
+        )
+    t, value = t[keep], value[keep]
+    if t.size > 2:
+        steps = np.diff(t)
+        step = float(np.median(steps))
+        holes = steps > 1.5 * step
+        if holes.any():
+            notes.append(
+                f"{int(holes.sum())} gaps, the longest {steps.max():.4g} s, after {t[np.argmax(steps)]:.6g} s"
+            )
+        even = steps[~holes]
+        if even.size and np.ptp(even) > 0.01 * step:
+            notes.append(
+                f"uneven steps, {even.min():.4g} to {even.max():.4g} s; the times are used as they are"
+            )
+    value = np.radians(value) if unit == "deg" else value
+    return EncoderSignal(t, value, "v" if unit == "v" else "rad", path.stem, tuple(notes))
