@@ -9,7 +9,7 @@ import numpy as np
 
 from pydpend.angles.hanging import Raw, zero_for
 from pydpend.angles.linkage import Linkage, Shape, first_shape
-from pydpend.angles.linkage_frames import LinkageAngles, fit_linkage
+from pydpend.angles.linkage_frames import checked_sigma, fit_linkage
 from pydpend.angles.markers import BodyMarkers, body_markers, to_image
 from pydpend.angles.pairwise import pair_angles
 from pydpend.angles.pose import Pose, fit_pose
@@ -132,10 +132,10 @@ def _estimate(
         return Raw(theta, sigma, [p.template_px for p in poses], shape, meta)
     linked = fit_linkage(poses[0], lower)
     meta["linkage"] = _linkage_meta(linked.linkage, mirrored, length_m, length_sigma_m)
-    meta["notes"] = _linkage_notes(linked, poses)
+    sigma, meta["notes"] = checked_sigma(linked, poses)
     shape = linked.linkage.shape
     templates = [shape.upper_px] if lower is None else [shape.upper_px, shape.lower_px]
-    return Raw(linked.theta_rad, linked.sigma_rad, templates, shape, meta)
+    return Raw(linked.theta_rad, sigma, templates, shape, meta)
 
 
 def _shape_or_none(poses: list[Pose]) -> Shape | None:
@@ -177,17 +177,6 @@ def _linkage_meta(
             scale, sigma = linkage.metres_per_px(length_m, length_sigma_m)
             meta["scale_m_per_px"], meta["scale_sigma_m_per_px"] = scale, sigma
     return meta
-
-
-def _linkage_notes(linked: LinkageAngles, poses: list[Pose]) -> list[str]:
-    alone = max(p.sigma_scale for p in poses)
-    together = linked.linkage.sigma_scale
-    if together > 1.15 * alone:
-        return [
-            f"the markers fit the linkage worse than the single links ({together:.2f} against {alone:.2f} "
-            "times their sigma): the camera moves, a joint has play or the lens distorts; compare 'rigid'"
-        ]
-    return []
 
 
 def _unwrapped(

@@ -64,6 +64,39 @@ def fit_linkage(upper: Pose, lower: Pose | None) -> LinkageAngles:
     return _all_frames(linkage, frames, start)
 
 
+def checked_sigma(linked: LinkageAngles, poses: list[Pose]) -> tuple[Floats, list[str]]:
+    """The linkage's standard errors held against the rigid poses, and a note where they had to grow.
+
+    A camera that shakes, play in a joint or a lens moves the linkage's angles but hardly the rigid ones. If
+    the linkage is right, the two differ with variance ``sigma_rigid^2 - sigma_linkage^2`` (Hausman,
+    Econometrica 46 (1978) 1251). What they differ by beyond that is the linkage's error and goes into its
+    sigma.
+    """
+    alone = float(np.sqrt(np.mean([p.sigma_scale**2 for p in poses])))
+    sigma = linked.sigma_rad.copy()
+    notes = []
+    for k, pose in enumerate(poses):
+        apart = np.angle(np.exp(1j * (linked.theta_rad[:, k] - pose.theta_rad)))
+        known = np.isfinite(apart) & np.isfinite(sigma[:, k])
+        if np.count_nonzero(known) < 30:
+            continue
+        difference = apart[known] - np.median(apart[known])
+        rigid2 = pose.sigma_rad[known] ** 2
+        own2 = (sigma[known, k] / linked.linkage.sigma_scale * alone) ** 2
+        usual = np.abs(difference) < 10 * np.sqrt(rigid2)
+        variance = float((difference[usual] ** 2).mean())
+        bias2 = variance - float((rigid2 - own2)[usual].mean())
+        if bias2 > 4 * variance * np.sqrt(2 / np.count_nonzero(usual)):
+            before = float(np.sqrt(np.median(sigma[known, k] ** 2)))
+            sigma[:, k] = np.sqrt((sigma[:, k] / linked.linkage.sigma_scale * alone) ** 2 + bias2)
+            notes.append(
+                f"phi{k + 1} by the linkage is off by {np.degrees(np.sqrt(bias2)):.2g} deg beyond its noise of "
+                f"{np.degrees(before):.2g} deg (the camera moves, a joint has play or the lens distorts); its sigma "
+                "includes that, method='rigid' is free of it"
+            )
+    return sigma, notes
+
+
 def _rows(markers: BodyMarkers, rows: NDArray[np.int64]) -> BodyMarkers:
     return BodyMarkers(
         markers.name, markers.nodes, markers.xy_px[rows], markers.weight[rows], markers.reference_px

@@ -15,7 +15,7 @@ from importlib.metadata import version
 
 from pydpend.errors import PydpendError
 
-COMMANDS: tuple[str, ...] = ("fit", "predict")
+COMMANDS: tuple[str, ...] = ("angles", "calibrate", "compare", "fit", "predict")
 
 
 def parser() -> argparse.ArgumentParser:

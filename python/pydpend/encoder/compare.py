@@ -237,7 +237,8 @@ def _delay(course: Course, t: Floats, encoder_rad: Floats, offset: float, gain: 
     power = float(rate @ rate)
     if power <= 0:
         return float("nan"), float("nan")
-    delay = float(rate @ residual) / power
-    rest = residual - delay * rate
+    # A reading of ``delay`` ago differs from the angle of now by -rate * delay.
+    delay = -float(rate @ residual) / power
+    rest = residual + delay * rate
     together = correlation_time(rest - rest.mean())
     return delay, float(np.sqrt((rest @ rest) / rest.size * together / power))

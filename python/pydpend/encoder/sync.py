@@ -166,7 +166,7 @@ def synchronise(
                 "They must show the same motion, and enough of it; check the link and the column",
             )
         )
-    return min(fits, key=lambda f: (f.sigma_rad**2) * 1.0 if f.n else np.inf)
+    return min(fits, key=lambda f: f.sigma_rad)
 
 
 def _bins(course_t: Floats, phi: Floats, start: float, count: int) -> tuple[Floats, Floats]:
