@@ -6,8 +6,21 @@ hanging down, unwrapped over turns.
 
 from __future__ import annotations
 
-from pydpend.angles import LinkAngles, read_angles, write_angles
+from pydpend.angles import Linkage, LinkAngles, angles, find_linkage, find_rest, read_angles, write_angles
 from pydpend.damping import DampingFit, Prediction, fit_damping
+from pydpend.encoder import (
+    Calibration,
+    Comparison,
+    EncoderSignal,
+    Synchronisation,
+    calibrate,
+    compare,
+    encoder_angles,
+    read_calibration,
+    read_encoder,
+    read_holds,
+    synchronise,
+)
 from pydpend.errors import (
     AnglesError,
     ArgumentError,
@@ -28,12 +41,16 @@ from pydpend.nodes import Nodes, Rig, read_nodes
 __all__ = [
     "AnglesError",
     "ArgumentError",
+    "Calibration",
+    "Comparison",
     "DampingFit",
     "DetectError",
     "EncoderError",
+    "EncoderSignal",
     "FilmError",
     "FitError",
     "LinkAngles",
+    "Linkage",
     "ModelError",
     "Nodes",
     "Prediction",
@@ -42,10 +59,21 @@ __all__ = [
     "RigError",
     "SimulationError",
     "SourceError",
+    "Synchronisation",
     "TableError",
     "TrackerError",
+    "angles",
+    "calibrate",
+    "compare",
+    "encoder_angles",
+    "find_linkage",
+    "find_rest",
     "fit_damping",
     "read_angles",
+    "read_calibration",
+    "read_encoder",
+    "read_holds",
     "read_nodes",
+    "synchronise",
     "write_angles",
 ]
