@@ -64,6 +64,9 @@ def angles(
     label = name if name is not None else _label(nodes)
     raw = _estimate(markers, method, mirrored, link_length_m, link_length_sigma_m)
     notes: list[str] = list(raw.meta.pop("notes", ()))
+    ending = nodes.meta.get("ending")
+    if isinstance(ending, dict) and ending.get("kind") != "complete":
+        notes.append(f"the node table is not of the whole recording ({ending.get('kind')})")
     phi = _unwrapped(nodes, raw.theta, markers, label, gaps, notes)
     offset, zero_meta = zero_for(nodes, phi, raw, markers, zero, bodies, mirrored, label)
     phi = phi - offset
