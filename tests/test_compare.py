@@ -100,14 +100,14 @@ def errors(seed: int) -> tuple[Floats, Floats, Floats, bool]:
 
 
 def test_clocks_and_gain_are_at_the_bound() -> None:
-    runs = [errors(seed) for seed in range(24)]
+    runs = [errors(seed) for seed in range(12)]
     assert all(turns for *_, turns in runs)
     ratio = np.sqrt(np.mean([(e / b) ** 2 for e, _, b, _ in runs], axis=0))
-    # 24 seeds: RMS over bound scatters by 1 / sqrt(48) = 14 %, so 1.1 is known to 1.1 + 3 x 0.14; the hundred seeds
+    # 12 seeds: RMS over bound scatters by 1 / sqrt(24) = 20 %, so 1.1 is known to 1.1 + 3 x 0.2; the hundred seeds
     # of the issue run in tests/validate_angles.py.
-    assert (ratio < 1.1 + 3 * 0.144).all(), ratio
+    assert (ratio < 1.1 + 3 * 0.204).all(), ratio
     pull = np.sqrt(np.mean([(e / s) ** 2 for e, s, _, _ in runs], axis=0))
-    np.testing.assert_allclose(pull, 1.0, atol=3 * 0.144)
+    np.testing.assert_allclose(pull, 1.0, atol=3 * 0.204)
 
 
 def test_gaps_other_starts_and_a_reversed_encoder() -> None:

@@ -95,7 +95,7 @@ def drop(seconds: float, fps: float, seed: int, *, rest_s: float = 0.0) -> tuple
     lift = 1.5 if rest_s else 0.0
     t = np.arange(round((rest_s + lift + seconds) * fps)) / fps
     falling = t >= rest_s + lift
-    damping = Damping(mu_v1=1e-4, mu_v2=1e-5, tau_c1=2e-3, tau_c2=1e-4, strip_drag=4e-3)
+    damping = Damping(mu_v1=2e-5, mu_v2=1e-5, mu_q2=1e-6, tau_c1=1e-3, tau_c2=5e-5)
     found = simulate(derived("A"), damping, [*release, 0.0, 0.0], t[falling], tolerance=1e-9)
     phi = np.zeros((t.size, 2))
     phi[falling] = found.phi_rad

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
-from scipy.signal import savgol_filter
+from scipy.signal import savgol_coeffs, savgol_filter
 
 from pydpend.angles.table import LinkAngles
-from pydpend.encoder.statistics import correlation_time
+from pydpend.encoder.statistics import correlation_time, highpass_noise
 from pydpend.errors import EncoderError, fault
 
 Floats = NDArray[np.float64]
@@ -26,6 +26,9 @@ COARSE_S = 0.01
 
 RATE_S = 0.04
 """The video's rate is the slope of a cubic through this long, s."""
+
+RATE_SIGMAS = 4.0
+"""A rate below this many of its own standard errors counts as rest."""
 
 LEAST_OVERLAP_S = 1.0
 """Video and encoder must share at least this long, s."""
@@ -87,8 +90,8 @@ class Synchronisation:
 class Course:
     """One link's angle as a smooth function of time, NaN where it was not seen.
 
-    Its rate is smoothed over RATE_S: where the link rests, the slope of the bare spline is the frames' noise,
-    which would pass for information on the clocks.
+    Its rate is smoothed over RATE_S, and 0 where that is not RATE_SIGMAS of its own errors: where the link
+    rests, the slope of the bare spline is the frames' noise, which would pass for information on the clocks.
     """
 
     spline: CubicSpline
@@ -110,7 +113,11 @@ class Course:
         step = angles.step_s
         grid = np.arange(t[0], t[-1] + step / 2, step)
         window = min(max(5, 2 * round(RATE_S / step / 2) + 1), grid.size - 1 + grid.size % 2)
-        rate = savgol_filter(spline(grid), window, min(3, window - 1), deriv=1, delta=step)
+        order = min(3, window - 1)
+        rate = savgol_filter(spline(grid), window, order, deriv=1, delta=step)
+        noise = highpass_noise(angles.phi_rad[:, link])
+        error = noise * float(np.linalg.norm(savgol_coeffs(window, order, deriv=1, delta=step)))
+        rate = np.where(np.abs(rate) > RATE_SIGMAS * error, rate, 0.0) if error > 0 else rate
         return Course(spline, t, step, grid, np.asarray(rate))
 
     def at(self, t: Floats) -> Floats:
