@@ -4,8 +4,13 @@
 
 mod dynamics;
 mod errors;
+mod images;
+mod live;
+mod settings;
 mod simulation;
 mod tables;
+mod track;
+mod watch;
 
 use pyo3::prelude::*;
 
@@ -13,9 +18,13 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _tracker {
     #[pymodule_export]
+    use super::live::{LiveTracker, detect};
+    #[pymodule_export]
     use super::simulation::{poincare_section, simulate_ensemble, simulate_motion, tangent_growth};
     #[pymodule_export]
     use super::tables::{arrow_reader, check_table, read_meta, read_rig, read_table, rig_toml, write_table};
+    #[pymodule_export]
+    use super::track::{info, setup, track};
 
     #[pymodule_export]
     const VERSION: &str = env!("CARGO_PKG_VERSION");

@@ -130,7 +130,8 @@ pub fn arrow_reader(py: Python<'_>, held: Held<'_>, rig: &str) -> PyResult<PyRec
     Ok(PyRecordBatchReader::new(Box::new(RecordBatchIterator::new(batches, table::schema()))))
 }
 
-fn rig_of_json(text: &str) -> tracker::error::Result<Rig> {
+/// A rig from its JSON, checked.
+pub fn rig_of_json(text: &str) -> tracker::error::Result<Rig> {
     let rig: Rig = serde_json::from_str(text).map_err(|e| Error::Rig(Fault::new("rig", e.to_string())))?;
     rig.check("rig")?;
     Ok(rig)

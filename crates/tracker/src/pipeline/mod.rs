@@ -18,7 +18,7 @@ pub use observer::{Observer, Silent, Stage};
 pub use state::partial_path;
 
 use crate::detect::{DetectSettings, Levels};
-use crate::discover::discover;
+use crate::discover::{Discovery, discover};
 use crate::error::{Error, Fault, Result};
 use crate::frame::{Ending, FrameSource};
 use crate::rig::Rig;
@@ -110,6 +110,28 @@ pub fn run(settings: &RunSettings, observer: &mut dyn Observer) -> Result<RunSum
     let mut run = Run::begin(settings, source.as_mut(), observer)?;
     let ending = run.detect(source, observer)?;
     run.finish(ending, observer)
+}
+
+/// Finds the rig of a recording, which is read through for it; the output and the rig of `settings` are not used.
+///
+/// # Errors
+/// The error of the part that failed; [`Error::Interrupted`] if the run was stopped.
+pub fn find_rig(settings: &RunSettings, observer: &mut dyn Observer) -> Result<Discovery> {
+    let settings = RunSettings { output: None, rig: None, ..settings.clone() };
+    check(&settings)?;
+    observer.stage(Stage::Open, None);
+    let mut source = source::open(&settings.input, &settings.open)?;
+    let mut run = Run::begin(&settings, source.as_mut(), observer)?;
+    let ending = run.detect(source, observer)?;
+    if ending.is_none() {
+        return Err(Error::Interrupted);
+    }
+    if run.store.is_empty() {
+        return Err(run.no_frames(ending));
+    }
+    let mut found = run.find(observer)?;
+    found.warnings.splice(0..0, run.warnings);
+    Ok(found)
 }
 
 /// What can be refused before anything is read.
@@ -271,20 +293,25 @@ impl<'a> Run<'a> {
         followed
     }
 
+    /// Finds the rig in what was detected.
+    fn find(&self, observer: &mut dyn Observer) -> Result<Discovery> {
+        observer.stage(Stage::Rig, None);
+        let mut found = discover(&self.store, [self.facts.width, self.facts.height])?;
+        self.store.check()?;
+        found.rig.region = found.rig.region.or_else(|| self.detect.region.clone());
+        found.rig.lens = found.rig.lens.or_else(|| self.detect.lens.clone());
+        Ok(found)
+    }
+
     fn follow(&mut self, ending: Option<Ending>, observer: &mut dyn Observer) -> Result<RunSummary> {
         if self.store.is_empty() {
             return Err(self.no_frames(ending));
         }
-        let image_px = [self.facts.width, self.facts.height];
         let rig = match &self.settings.rig {
             Some(rig) => rig.clone(),
             None => {
-                observer.stage(Stage::Rig, None);
-                let mut found = discover(&self.store, image_px)?;
-                self.store.check()?;
+                let mut found = self.find(observer)?;
                 self.warnings.append(&mut found.warnings);
-                found.rig.region = found.rig.region.or_else(|| self.detect.region.clone());
-                found.rig.lens = found.rig.lens.or_else(|| self.detect.lens.clone());
                 found.rig
             }
         };

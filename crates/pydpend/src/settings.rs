@@ -1,0 +1,69 @@
+//! Settings of a run as keyword arguments.
+//!
+//! Owns: their words. Words are those of the command line.
+
+use pyo3::prelude::*;
+use tracker::detect::{Centroid, DetectSettings, Polarity, Threshold};
+use tracker::rig::Rig;
+use tracker::source::{Decoder, OpenOptions};
+
+use crate::errors::{argument, raise};
+
+/// One of `words`, by its place; an error that names them all.
+fn word<T: Copy>(py: Python<'_>, name: &str, given: &str, words: &[(&str, T)]) -> PyResult<T> {
+    words.iter().find(|(w, _)| *w == given).map(|(_, value)| *value).ok_or_else(|| {
+        let known: Vec<&str> = words.iter().map(|(w, _)| *w).collect();
+        argument(py, name, format!("{given:?} is not known"), &format!("Give one of {}", known.join(", ")))
+    })
+}
+
+/// How markers are detected: threshold in the recording's units or `None`, polarity, centroid.
+pub type DetectArguments = (Option<f64>, String, String);
+
+/// Detection settings of keyword arguments.
+pub fn detect_settings(py: Python<'_>, given: &DetectArguments) -> PyResult<DetectSettings> {
+    let (threshold, polarity, centroid) = given;
+    if threshold.is_some_and(|t| !t.is_finite()) {
+        return Err(argument(py, "threshold", "it is not finite", "Give a number in the recording's units"));
+    }
+    Ok(DetectSettings {
+        threshold: threshold.map_or(Threshold::Auto, Threshold::Raw),
+        polarity: word(
+            py,
+            "polarity",
+            polarity,
+            &[("auto", Polarity::Auto), ("bright", Polarity::Bright), ("dark", Polarity::Dark)],
+        )?,
+        centroid: word(
+            py,
+            "centroid",
+            centroid,
+            &[("weighted", Centroid::Weighted), ("contour", Centroid::Contour)],
+        )?,
+        ..DetectSettings::default()
+    })
+}
+
+/// How a recording is read: rate or `None`, decoder, whether addresses may be opened, threads.
+pub type OpenArguments = (Option<f64>, String, bool, usize);
+
+/// Reading options of keyword arguments.
+pub fn open_options(py: Python<'_>, given: &OpenArguments) -> PyResult<OpenOptions> {
+    let (fps, decoder, allow_protocol, threads) = given;
+    Ok(OpenOptions {
+        fps: *fps,
+        decoder: word(
+            py,
+            "decoder",
+            decoder,
+            &[("auto", Decoder::Auto), ("ffmpeg", Decoder::Ffmpeg), ("opencv", Decoder::Opencv)],
+        )?,
+        allow_protocol: *allow_protocol,
+        threads: *threads,
+    })
+}
+
+/// A rig of its JSON, checked.
+pub fn rig(py: Python<'_>, text: Option<&str>) -> PyResult<Option<Rig>> {
+    text.map(crate::tables::rig_of_json).transpose().map_err(|e| raise(py, e))
+}
