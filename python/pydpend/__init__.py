@@ -36,7 +36,9 @@ from pydpend.errors import (
     TableError,
     TrackerError,
 )
+from pydpend.export import export
 from pydpend.nodes import Nodes, Rig, read_nodes
+from pydpend.tracking import NodeRow, Tracker, detect, info, setup, track
 
 __all__ = [
     "AnglesError",
@@ -52,6 +54,7 @@ __all__ = [
     "LinkAngles",
     "Linkage",
     "ModelError",
+    "NodeRow",
     "Nodes",
     "Prediction",
     "PydpendError",
@@ -61,19 +64,25 @@ __all__ = [
     "SourceError",
     "Synchronisation",
     "TableError",
+    "Tracker",
     "TrackerError",
     "angles",
     "calibrate",
     "compare",
+    "detect",
     "encoder_angles",
+    "export",
     "find_linkage",
     "find_rest",
     "fit_damping",
+    "info",
     "read_angles",
     "read_calibration",
     "read_encoder",
     "read_holds",
     "read_nodes",
+    "setup",
     "synchronise",
+    "track",
     "write_angles",
 ]

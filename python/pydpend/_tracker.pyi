@@ -4,7 +4,7 @@ Shapes: T frames, N nodes. Images are (H, W), uint8 or uint16. What is not seen 
 """
 
 from collections.abc import Callable, Sequence
-from typing import Any, TypeAlias
+from typing import Any, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,54 @@ Columns: TypeAlias = tuple[
     NDArray[np.uint8],
     str,
 ]
+
+Found: TypeAlias = tuple[NDArray[np.float64], NDArray[np.float32], NDArray[np.uint8]]
+Row: TypeAlias = tuple[NDArray[np.float64], NDArray[np.float32], NDArray[np.float32], NDArray[np.uint8]]
+DetectArguments: TypeAlias = tuple[float | None, str, str]
+OpenArguments: TypeAlias = tuple[float | None, str, bool, int]
+Frames: TypeAlias = tuple[int, int | None] | None
+Callback: TypeAlias = Callable[[str, int, int | None], object] | None
+
+def track(
+    input: str,
+    rig: str | None,
+    frames: Frames,
+    detect: DetectArguments,
+    open: OpenArguments,
+    output: str | None,
+    existing: str,
+    progress: Callback,
+) -> tuple[Columns, list[str], BaseException | None]:
+    """Columns, warnings, and the exception that stopped the run, if one did. `rig` is JSON."""
+
+def setup(
+    input: str, frames: Frames, detect: DetectArguments, open: OpenArguments, progress: Callback
+) -> tuple[str, list[str]]:
+    """The rig as JSON, and warnings."""
+
+def info(input: str, open: OpenArguments) -> str:
+    """What is known of a recording before it is read through, as JSON."""
+
+def detect(
+    image: NDArray[Any],
+    settings: DetectArguments,
+    area_px: tuple[float | None, float | None],
+    depth_bits: int | None,
+) -> Found:
+    """Centres (D, 2) in px; sigma in px, area in px, peak, elongation (D, 4); flags (D,)."""
+
+class LiveTracker:
+    """Follows the markers of a rig, image by image."""
+
+    def __new__(cls, rig_text: str, settings: DetectArguments, depth_bits: int | None) -> Self: ...
+    def learn(self, images: list[NDArray[Any]]) -> None:
+        """Learns thresholds and noise from images of the scene."""
+
+    def step(self, image: NDArray[Any], index: int) -> Row:
+        """Places (N, 2) in px, sigma in px, area in px and status (N,) in the next image."""
+
+    def detections(self) -> Found:
+        """What was detected in the last image."""
 
 def read_table(path: str) -> Columns:
     """frame (T,), time in s (T,), centres in px (T, N, 2), sigma in px, area in px and status (T, N), JSON."""

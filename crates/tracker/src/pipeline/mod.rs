@@ -108,8 +108,15 @@ pub fn run(settings: &RunSettings, observer: &mut dyn Observer) -> Result<RunSum
     observer.stage(Stage::Open, None);
     let mut source = source::open(&settings.input, &settings.open)?;
     let mut run = Run::begin(settings, source.as_mut(), observer)?;
-    let ending = run.detect(source, observer)?;
-    run.finish(ending, observer)
+    let fresh = run.resumed == 0;
+    let outcome = run.detect(source, observer).and_then(|ending| run.finish(ending, observer));
+    // Only a run that was stopped or ran out of disk can go on; any other would fail again.
+    if let (Err(error), Some(output), true) = (&outcome, &settings.output, fresh)
+        && !matches!(error, Error::Table(_) | Error::Interrupted)
+    {
+        let _ = state::remove(output);
+    }
+    outcome
 }
 
 /// Finds the rig of a recording, which is read through for it; the output and the rig of `settings` are not used.
@@ -280,7 +287,7 @@ impl<'a> Run<'a> {
     }
 
     /// Finds the rig if it is not given, follows the markers, writes the table.
-    fn finish(mut self, ending: Option<Ending>, observer: &mut dyn Observer) -> Result<RunSummary> {
+    fn finish(&mut self, ending: Option<Ending>, observer: &mut dyn Observer) -> Result<RunSummary> {
         if self.store.is_empty() && ending.is_none() {
             return Err(Error::Interrupted);
         }

@@ -1,0 +1,37 @@
+"""Write a node table in the form of another program.
+
+By the ending of the output: .c3d and .trc (biomechanics), .csv (DLTdv's xypts), .mat (MATLAB).
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+
+from pydpend.errors import ArgumentError, fault
+
+HELP = "write a node table as C3D, TRC, DLTdv CSV or MAT"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds the arguments."""
+    parser.add_argument("nodes", help="a node table, Parquet or CSV")
+    parser.add_argument("-o", "--output", required=True, help="the file: .c3d, .trc, .csv or .mat")
+    parser.add_argument("--px-per-m", type=float, help="scale of the image; C3D and TRC are then in mm")
+    parser.add_argument("--force", action="store_true", help="replace the file if it is there already")
+    parser.add_argument("--json", action="store_true", help="print what was written as JSON")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Writes it."""
+    from pydpend.export import export
+    from pydpend.nodes import read_nodes
+
+    if Path(args.output).exists() and not args.force:
+        raise ArgumentError(fault(args.output, "it is there already", "Choose another name, or add --force"))
+    nodes = read_nodes(args.nodes)
+    export(nodes, args.output, px_per_m=args.px_per_m)
+    if args.json:
+        print(json.dumps({"output": args.output, "frames": len(nodes), "nodes": list(nodes.rig.names)}))
+    return 0

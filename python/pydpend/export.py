@@ -1,0 +1,165 @@
+"""Node tables in the forms that other people's programs ask for: C3D, TRC, DLTdv's xypts CSV, MAT.
+
+C3D and TRC are three-dimensional and in a length: x right, y up from the lowest row of pixels, z zero, in mm if a
+scale is given and else in px, which the file then says. What is not seen is what each form has for it.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pydpend.errors import ArgumentError, TableError, fault
+from pydpend.nodes import STATUS_WORDS, Nodes
+
+LEAST_EVEN = 1e-6
+"""A rate is one number, so steps of time may differ by so much of a step; time stamps in whole ticks do not."""
+
+
+def export(nodes: Nodes, path: str | os.PathLike[str], *, px_per_m: float | None = None) -> None:
+    """Writes nodes for another program, by the ending: `.c3d`, `.trc`, `.csv` (DLTdv xypts) or `.mat`.
+
+    Args:
+        nodes: the nodes.
+        path: the file; one that is there is replaced when the new one is whole.
+        px_per_m: scale of the image; C3D and TRC are then in mm. Not used for the others, which are in px.
+
+    Raises:
+        ArgumentError: if the ending is not known or the scale makes no sense.
+        TableError: if the form cannot hold the table (C3D and TRC need one rate), or the file cannot be written.
+    """
+    target = Path(path)
+    writer = WRITERS.get(target.suffix.lower())
+    if writer is None:
+        raise ArgumentError(
+            fault(str(target), f"the ending is none of {', '.join(WRITERS)}", "Choose one of them")
+        )
+    if px_per_m is not None and not (np.isfinite(px_per_m) and px_per_m > 0):
+        raise ArgumentError(fault("px_per_m", f"{px_per_m} is no scale", "Give pixels per metre, above 0"))
+    nodes.check()
+    # The libraries look at the ending, so the temporary name keeps it.
+    temporary = target.with_name(f".{target.stem}.writing{target.suffix}")
+    try:
+        writer(nodes, temporary, px_per_m)
+        temporary.replace(target)
+    except OSError as error:
+        raise TableError(
+            fault(str(target), f"it cannot be written ({error})", "Choose another folder")
+        ) from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def rate_hz(nodes: Nodes, name: str) -> float:
+    """The one rate of a table whose times are evenly spaced."""
+    if len(nodes) < 2:
+        raise TableError(fault(name, "one frame has no rate", "Write it as .mat"))
+    steps = np.diff(nodes.t_s)
+    step = float(np.median(steps))
+    uneven = np.flatnonzero(np.abs(steps - step) > LEAST_EVEN * step)
+    if uneven.size:
+        row = int(uneven[0])
+        raise TableError(
+            fault(name, f"after frame {nodes.frame[row]} the step is {steps[row]} s, else {step} s; this form has "
+                  "one rate", "Write it as .mat, which holds the times")
+        )  # fmt: skip
+    return 1 / step
+
+
+def _upright(nodes: Nodes, px_per_m: float | None) -> tuple[NDArray[np.float64], str]:
+    """(T, N, 3): x right, y up, z 0, and the unit."""
+    out = np.zeros((*nodes.status.shape, 3))
+    out[..., 0] = nodes.xy_px[..., 0]
+    out[..., 1] = nodes.rig.image_px[1] - 1 - nodes.xy_px[..., 1]
+    out[..., 2] = np.where(nodes.seen, 0.0, np.nan)
+    return (out, "px") if px_per_m is None else (out * (1000 / px_per_m), "mm")
+
+
+def _c3d(nodes: Nodes, path: Path, px_per_m: float | None) -> None:
+    try:
+        import ezc3d
+    except ImportError:
+        raise TableError(
+            fault(
+                str(path), "C3D is written by ezc3d, which is not installed", "pip install 'pydpend[export]'"
+            )
+        ) from None
+    places, unit = _upright(nodes, px_per_m)
+    scale = 1.0 if px_per_m is None else 1000 / px_per_m
+    points = np.ones((4, places.shape[1], places.shape[0]))
+    points[:3] = places.transpose(2, 1, 0)
+    file = ezc3d.c3d()
+    parameters = file["parameters"]["POINT"]
+    parameters["RATE"]["value"] = [rate_hz(nodes, str(path))]
+    parameters["LABELS"]["value"] = list(nodes.rig.names)
+    parameters["UNITS"]["value"] = [unit]
+    file["data"]["points"] = points
+    # The residual is the length of the uncertainty; -1 is C3D's word for a point that is not there.
+    residuals = np.where(nodes.seen, nodes.sigma_px * scale, -1.0)
+    file["data"]["meta_points"]["residuals"] = residuals.T[None]
+    file["header"]["points"]["first_frame"] = int(nodes.frame[0])
+    file.write(str(path))
+
+
+def _trc(nodes: Nodes, path: Path, px_per_m: float | None) -> None:
+    places, unit = _upright(nodes, px_per_m)
+    rate = f"{rate_hz(nodes, str(path)):.9g}"
+    names = nodes.rig.names
+    count, first = len(nodes), int(nodes.frame[0]) + 1
+    head = [
+        f"PathFileType\t4\t(X/Y/Z)\t{path.name.removeprefix('.').replace('.writing', '')}",
+        "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames",
+        f"{rate}\t{rate}\t{count}\t{len(names)}\t{unit}\t{rate}\t{first}\t{count}",
+        "Frame#\tTime\t" + "\t\t\t".join(names),
+        "\t\t" + "\t".join(f"X{i}\tY{i}\tZ{i}" for i in range(1, len(names) + 1)),
+        "",
+    ]
+    with path.open("w", encoding="utf-8", newline="") as file:
+        file.write("\n".join(head) + "\n")
+        for t in range(count):
+            # Frames count from 1 here; what is not seen is left empty.
+            cells = ("" if np.isnan(v) else f"{v:.6f}" for v in places[t].ravel())
+            file.write(f"{nodes.frame[t] + 1}\t{nodes.t_s[t]!r}\t" + "\t".join(cells) + "\n")
+
+
+def _dltdv(nodes: Nodes, path: Path, px_per_m: float | None) -> None:
+    """Pixels as MATLAB has them: the first is 1, and DLTdv counts rows from the lowest. A row per video frame."""
+    names = [f"pt{i}_cam1_{axis}" for i in range(1, len(nodes.rig.nodes) + 1) for axis in "XY"]
+    rows = np.full((int(nodes.frame[-1]) + 1 if len(nodes) else 0, len(names)), np.nan)
+    rows[nodes.frame, 0::2] = nodes.xy_px[..., 0] + 1
+    rows[nodes.frame, 1::2] = nodes.rig.image_px[1] - nodes.xy_px[..., 1]
+    np.savetxt(path, rows, fmt="%.6f", delimiter=",", header=",".join(names), comments="")
+
+
+def _mat(nodes: Nodes, path: Path, px_per_m: float | None) -> None:
+    from scipy.io import savemat
+
+    text = np.array(nodes.rig.names, dtype=object)
+    bodies = np.array([n.body for n in nodes.rig.nodes], dtype=object)
+    content = {
+        "frame": nodes.frame[:, None],
+        "time_s": nodes.t_s[:, None],
+        "x_px": nodes.xy_px[..., 0],
+        "y_px": nodes.xy_px[..., 1],
+        "sigma_px": nodes.sigma_px,
+        "area_px": nodes.area_px,
+        "status": nodes.status,
+        "status_words": np.array(STATUS_WORDS, dtype=object),
+        "node": text,
+        "body": bodies,
+        "image_px": np.array(nodes.rig.image_px, dtype=float),
+        "rig_json": nodes.rig.to_json(),
+    }
+    savemat(path, content, do_compression=True)
+
+
+WRITERS: dict[str, Callable[[Nodes, Path, float | None], None]] = {
+    ".c3d": _c3d,
+    ".trc": _trc,
+    ".csv": _dltdv,
+    ".mat": _mat,
+}

@@ -1,0 +1,365 @@
+"""Recordings to nodes: whole files, single images, a camera's live images.
+
+The work is done in Rust with the GIL released; here arguments get their words and results their names.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pydpend import _tracker
+from pydpend.errors import ArgumentError, fault
+from pydpend.nodes import Nodes, Rig, nodes_of
+
+Path: TypeAlias = str | os.PathLike[str]
+Progress: TypeAlias = Callable[[str, int, int | None], object] | bool | None
+"""A callback ``(stage, done, total)``; None is a bar on a terminal or in a notebook, False is nothing."""
+
+Polarity: TypeAlias = Literal["auto", "bright", "dark"]
+Centroid: TypeAlias = Literal["weighted", "contour"]
+Decoder: TypeAlias = Literal["auto", "ffmpeg", "opencv"]
+
+DETECTION = np.dtype(
+    [
+        ("x_px", np.float64),
+        ("y_px", np.float64),
+        ("sigma_px", np.float32),
+        ("area_px", np.float32),
+        ("peak", np.float32),
+        ("elongation", np.float32),
+        ("flags", np.uint8),
+    ]
+)
+"""One detection: centre (x right, y down), standard uncertainty of each coordinate, area, height above the
+background in the image's units, longer over shorter axis, and flags: 1 saturated, 2 at the border, 4 merged, 8 partial.
+"""
+
+
+def _frames(frames: tuple[int, int | None] | range | None) -> tuple[int, int | None] | None:
+    if frames is None:
+        return None
+    if isinstance(frames, range):
+        if frames.step != 1:
+            raise ArgumentError(fault("frames", f"{frames} has a step", "Give a range without one"))
+        frames = (frames.start, frames.stop)
+    try:
+        start, stop = frames
+        start, stop = int(start), None if stop is None else int(stop)
+    except (TypeError, ValueError):
+        raise ArgumentError(
+            fault("frames", f"{frames!r} is no range", "Give (first, one past the last)")
+        ) from None
+    if start < 0 or (stop is not None and stop <= start):
+        raise ArgumentError(fault("frames", f"{frames!r} holds no frame", "Give (first, one past the last)"))
+    return start, stop
+
+
+def _threads(threads: int | None) -> int:
+    if threads is None:
+        return 0
+    if not 0 < threads < 1024:
+        raise ArgumentError(
+            fault("threads", f"{threads} is out of range", "Give 1 or more, or None for one a core")
+        )
+    return int(threads)
+
+
+def _rig(rig: Rig | Path | None) -> str | None:
+    if rig is None:
+        return None
+    return rig.to_json() if isinstance(rig, Rig) else _tracker.read_rig(os.fspath(rig))
+
+
+class _Bar:
+    """A bar on a terminal's standard error or in a notebook."""
+
+    def __init__(self) -> None:
+        self._stage = ""
+        self._bar: Any = None
+
+    def __call__(self, stage: str, done: int, total: int | None) -> None:
+        from tqdm.auto import tqdm
+
+        if stage != self._stage:
+            self.close()
+            self._stage = stage
+            self._bar = tqdm(total=total, desc=stage, unit=" frames", leave=False)
+        self._bar.update(done - self._bar.n)
+
+    def close(self) -> None:
+        if self._bar is not None:
+            self._bar.close()
+            self._bar = None
+
+
+def _callback(
+    progress: Progress,
+) -> tuple[Callable[[str, int, int | None], object] | None, Callable[[], None]]:
+    """The callback to use, and what to call at the end."""
+    if callable(progress):
+        return progress, lambda: None
+    notebook = "ipykernel" in sys.modules
+    if progress is True or (progress is None and (notebook or sys.stderr.isatty())):
+        bar = _Bar()
+        return bar, bar.close
+    return None, lambda: None
+
+
+def track(
+    path: Path,
+    rig: Rig | Path | None = None,
+    *,
+    fps: float | None = None,
+    frames: tuple[int, int | None] | range | None = None,
+    threads: int | None = None,
+    progress: Progress = None,
+    output: Path | None = None,
+    force: bool = False,
+    resume: bool = False,
+    threshold: float | None = None,
+    polarity: Polarity = "auto",
+    centroid: Centroid = "weighted",
+    decoder: Decoder = "auto",
+    allow_protocol: bool = False,
+) -> Nodes:
+    """Follows the markers of a recording.
+
+    Args:
+        path: the recording.
+        rig: nodes, bodies and joints, or a file of them; found in the recording if None.
+        fps: frames a second of recorded time, instead of what the recording claims.
+        frames: first frame and one past the last.
+        threads: None is one a core. The result is the same for any number.
+        progress: a callback ``(stage, done, total)``; None is a bar on a terminal or in a notebook, False nothing.
+            An exception from it stops the run.
+        output: a table to write too, Parquet or CSV by the ending.
+        force: replace `output` if it is there already.
+        resume: go on where an earlier run for `output` stopped.
+        threshold: in the recording's units; None is learned from it.
+        polarity: whether markers are brighter or darker than what is around them.
+        centroid: by intensity, or by OpenCV's contours as in the paper.
+        decoder: what reads compressed film.
+        allow_protocol: open network addresses and devices too.
+
+    Returns:
+        The nodes. If the recording was damaged, `Nodes.complete` is False and `Nodes.meta` says how it ended; what
+        the run warned of is in ``meta["warnings"]``.
+
+    Raises:
+        SourceError: if the recording cannot be opened or read.
+        DetectError: if there are no markers, or the threshold is out of range.
+        RigError: if the rig is wrong, does not fit the recording, or none can be found.
+        TableError: if `output` is there already or cannot be written.
+        ArgumentError: if an argument makes no sense.
+        KeyboardInterrupt: on Ctrl-C, within a second. What was done until then is the exception's `nodes`, and with
+            `output` it is kept there, to go on with `resume=True`.
+    """
+    existing = "resume" if resume else "replace" if force else "refuse"
+    callback, close = _callback(progress)
+    try:
+        columns, warnings, stopped = _tracker.track(
+            os.fspath(path),
+            _rig(rig),
+            _frames(frames),
+            (threshold, polarity, centroid),
+            (fps, decoder, allow_protocol, _threads(threads)),
+            None if output is None else os.fspath(output),
+            existing,
+            callback,
+        )
+    finally:
+        close()
+    nodes = nodes_of(columns)
+    nodes.meta["warnings"] = warnings
+    if stopped is not None:
+        stopped.nodes = nodes  # type: ignore[attr-defined]
+        raise stopped
+    return nodes
+
+
+def setup(
+    path: Path,
+    output: Path | None = None,
+    *,
+    fps: float | None = None,
+    frames: tuple[int, int | None] | range | None = None,
+    threads: int | None = None,
+    progress: Progress = None,
+    threshold: float | None = None,
+    polarity: Polarity = "auto",
+    decoder: Decoder = "auto",
+) -> tuple[Rig, list[str]]:
+    """Finds markers, bodies and joints of a recording.
+
+    Args:
+        path: the recording; it is read through.
+        output: a rig file to write, to be looked at and edited.
+        fps, frames, threads, progress, threshold, polarity, decoder: as in `track`.
+
+    Returns:
+        The rig, and what to know about it, a sentence each.
+
+    Raises:
+        SourceError, DetectError, RigError, ArgumentError: as `track`.
+    """
+    callback, close = _callback(progress)
+    try:
+        text, warnings = _tracker.setup(
+            os.fspath(path),
+            _frames(frames),
+            (threshold, polarity, "weighted"),
+            (fps, decoder, False, _threads(threads)),
+            callback,
+        )
+    finally:
+        close()
+    rig = Rig.from_json(text)
+    if output is not None:
+        rig.write(output)
+    return rig, warnings
+
+
+def info(path: Path, *, fps: float | None = None, decoder: Decoder = "auto") -> dict[str, Any]:
+    """What is known of a recording before it is read through.
+
+    Returns:
+        `name`, `container`, `codec`, `width`, `height` (px), `depth_bits`, `declared_frames`, `rate_hz`,
+        `rate_origin`, `time_base` (numerator and denominator of s per tick), `size_bytes`, `sha256_first_mib`,
+        `converted_from`, `warnings` and `details`; None where unknown.
+
+    Raises:
+        SourceError: if it cannot be opened.
+    """
+    known: dict[str, Any] = json.loads(_tracker.info(os.fspath(path), (fps, decoder, False, 0)))
+    return known
+
+
+def _detections(found: _tracker.Found) -> NDArray[np.void]:
+    xy_px, rest, flags = found
+    out = np.empty(len(flags), dtype=DETECTION)
+    out["x_px"], out["y_px"] = xy_px.T
+    for i, name in enumerate(("sigma_px", "area_px", "peak", "elongation")):
+        out[name] = rest[:, i]
+    out["flags"] = flags
+    return out
+
+
+def detect(
+    image: NDArray[Any],
+    *,
+    threshold: float | None = None,
+    polarity: Polarity = "auto",
+    centroid: Centroid = "weighted",
+    min_area_px: float | None = None,
+    max_area_px: float | None = None,
+    depth_bits: int | None = None,
+) -> NDArray[np.void]:
+    """Detects the markers of one image.
+
+    Args:
+        image: (H, W), uint8 or uint16, of any strides.
+        threshold: in the image's units; None is learned from the image.
+        polarity, centroid: as in `track`.
+        min_area_px, max_area_px: limits of a marker's area; None is learned.
+        depth_bits: significant bits of a sample, for example 12 in a uint16; None is all.
+
+    Returns:
+        One entry per detection, of dtype `DETECTION`, ordered by y, then x.
+
+    Raises:
+        ArgumentError: if the image has the wrong type or shape.
+        DetectError: if no threshold can be learned.
+    """
+    area = (min_area_px, max_area_px)
+    return _detections(_tracker.detect(image, (threshold, polarity, centroid), area, depth_bits))
+
+
+@dataclass(frozen=True, eq=False)
+class NodeRow:
+    """N nodes in one image; what is not seen is NaN.
+
+    Attributes:
+        frame: number of the image.
+        xy_px: centres in px, (N, 2); x right, y down.
+        sigma_px: standard uncertainty of each coordinate in px, (N,).
+        area_px: blob area in px, (N,).
+        status: as `Nodes.status`, (N,).
+    """
+
+    frame: int
+    xy_px: NDArray[np.float64]
+    sigma_px: NDArray[np.float32]
+    area_px: NDArray[np.float32]
+    status: NDArray[np.uint8]
+
+
+class Tracker:
+    """Follows the markers of a known rig image by image, for a camera's live loop.
+
+    It does not look ahead: what a whole recording would settle later stays ambiguous.
+
+    Args:
+        rig: nodes, bodies and joints, or a file of them.
+        threshold, polarity, centroid: as in `track`.
+        depth_bits: significant bits of a sample; None is all.
+
+    Raises:
+        RigError: if the rig is wrong.
+        ArgumentError: if an argument makes no sense.
+    """
+
+    def __init__(
+        self,
+        rig: Rig | Path,
+        *,
+        threshold: float | None = None,
+        polarity: Polarity = "auto",
+        centroid: Centroid = "weighted",
+        depth_bits: int | None = None,
+    ) -> None:
+        self.rig = rig if isinstance(rig, Rig) else Rig.read(rig)
+        self._next = 0
+        self._live = _tracker.LiveTracker(self.rig.to_json(), (threshold, polarity, centroid), depth_bits)
+
+    def learn(self, images: Iterable[NDArray[Any]]) -> None:
+        """Learns thresholds and noise from some images of the scene; else the first image tracked is all there is.
+
+        Args:
+            images: each (H, W), uint8 or uint16.
+
+        Raises:
+            ArgumentError: if an image has the wrong type, shape or size, or there is none.
+            DetectError: if no threshold can be learned.
+        """
+        self._live.learn(list(images))
+
+    def step(self, image: NDArray[Any], frame: int | None = None) -> NodeRow:
+        """The nodes in the next image.
+
+        Args:
+            image: (H, W), uint8 or uint16, of any strides, of the rig's size.
+            frame: its number, larger than that of the one before it; None is the next. Leave numbers out where the
+                camera lost images.
+
+        Raises:
+            ArgumentError: if the image has the wrong type, shape or size, or `frame` does not grow.
+        """
+        number = self._next if frame is None else int(frame)
+        if number < 0:
+            raise ArgumentError(fault("frame", f"{number} is below 0", "Count frames from 0"))
+        xy_px, sigma_px, area_px, status = self._live.step(image, number)
+        self._next = number + 1
+        return NodeRow(number, xy_px, sigma_px, area_px, status)
+
+    @property
+    def detections(self) -> NDArray[np.void]:
+        """What was detected in the last image, of dtype `DETECTION`."""
+        return _detections(self._live.detections())

@@ -1,0 +1,99 @@
+"""Other programs' forms, read back by those programs' libraries or by their own rules."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pydpend as dp
+import pytest
+from pydpend.cli import main
+from pydpend.export import export
+from test_nodes import some_nodes
+
+
+def test_c3d_has_the_points_and_knows_which_are_missing(tmp_path: Path) -> None:
+    import ezc3d
+
+    nodes = some_nodes()
+    export(nodes, tmp_path / "t.c3d", px_per_m=2000)
+    file = ezc3d.c3d(str(tmp_path / "t.c3d"))
+    points = file["data"]["points"]
+    assert file["parameters"]["POINT"]["LABELS"]["value"] == ["n0", "n1", "n2"]
+    assert file["parameters"]["POINT"]["UNITS"]["value"] == ["mm"]
+    assert file["parameters"]["POINT"]["RATE"]["value"][0] == pytest.approx(500)
+    # C3D holds 32-bit numbers: 240 mm to within 2e-5.
+    np.testing.assert_allclose(points[0].T, nodes.xy_px[..., 0] / 2, atol=2e-5)
+    np.testing.assert_allclose(points[1].T, (479 - nodes.xy_px[..., 1]) / 2, atol=2e-5)
+    residuals = file["data"]["meta_points"]["residuals"][0].T
+    assert np.array_equal(residuals < 0, ~nodes.seen)
+
+
+def test_trc_has_a_header_and_leaves_empty_what_is_not_seen(tmp_path: Path) -> None:
+    nodes = some_nodes()
+    export(nodes, tmp_path / "t.trc")
+    lines = (tmp_path / "t.trc").read_text().split("\n")
+    assert lines[0] == "PathFileType\t4\t(X/Y/Z)\tt.trc"
+    assert lines[2].split("\t") == ["500", "500", "50", "3", "px", "500", "11", "50"]
+    assert lines[3] == "Frame#\tTime\tn0\t\t\tn1\t\t\tn2"
+    assert lines[5] == ""
+    for t in range(50):
+        cells = lines[6 + t].split("\t")
+        assert int(cells[0]) == nodes.frame[t] + 1
+        assert float(cells[1]) == nodes.t_s[t]
+        places = np.array([float(c) if c else np.nan for c in cells[2:]]).reshape(3, 3)
+        np.testing.assert_allclose(places[:, 0], nodes.xy_px[t, :, 0], atol=1e-6)
+        np.testing.assert_allclose(places[:, 1], 479 - nodes.xy_px[t, :, 1], atol=1e-6)
+
+
+def test_dltdv_counts_from_one_and_from_below(tmp_path: Path) -> None:
+    nodes = some_nodes()
+    export(nodes, tmp_path / "t.csv")
+    header, *rows = (tmp_path / "t.csv").read_text().splitlines()
+    assert header == "pt1_cam1_X,pt1_cam1_Y,pt2_cam1_X,pt2_cam1_Y,pt3_cam1_X,pt3_cam1_Y"
+    values = np.array([[float(c) for c in row.split(",")] for row in rows])
+    assert values.shape == (60, 6), "one row per video frame, from the first on"
+    assert np.isnan(values[:10]).all()
+    np.testing.assert_allclose(values[10:, 0::2], nodes.xy_px[..., 0] + 1, atol=1e-6)
+    np.testing.assert_allclose(values[10:, 1::2], 480 - nodes.xy_px[..., 1], atol=1e-6)
+
+
+def test_mat_holds_everything(tmp_path: Path) -> None:
+    from scipy.io import loadmat
+
+    nodes = some_nodes()
+    export(nodes, tmp_path / "t.mat")
+    content = loadmat(tmp_path / "t.mat", squeeze_me=True)
+    np.testing.assert_array_equal(content["x_px"], nodes.xy_px[..., 0])
+    np.testing.assert_array_equal(content["time_s"], nodes.t_s)
+    np.testing.assert_array_equal(content["status"], nodes.status)
+    assert list(content["node"]) == ["n0", "n1", "n2"]
+
+
+def test_what_a_form_cannot_hold_is_refused(tmp_path: Path) -> None:
+    nodes = some_nodes()
+    uneven = nodes.t_s.copy()
+    uneven[30:] += 0.01
+    for name in ("t.c3d", "t.trc"):
+        with pytest.raises(dp.TableError, match="after frame 39 the step is"):
+            export(replace(nodes, t_s=uneven), tmp_path / name)
+    with pytest.raises(dp.ArgumentError, match="the ending is none of"):
+        export(nodes, tmp_path / "t.xlsx")
+    with pytest.raises(dp.ArgumentError, match="no scale"):
+        export(nodes, tmp_path / "t.trc", px_per_m=-1)
+    with pytest.raises(dp.TableError, match="cannot be written"):
+        export(nodes, tmp_path / "nowhere" / "t.trc")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_command_line_writes_and_does_not_overwrite(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    some_nodes().write(tmp_path / "t.parquet")
+    arguments = ["export", str(tmp_path / "t.parquet"), "-o", str(tmp_path / "t.trc")]
+    assert main([*arguments, "--json"]) == 0
+    assert '"frames": 50' in capsys.readouterr().out
+    assert main(arguments) == 2
+    assert "it is there already" in capsys.readouterr().err
+    assert main([*arguments, "--force"]) == 0
