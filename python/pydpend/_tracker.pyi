@@ -175,3 +175,21 @@ def follow_motion(
 ) -> _Floats: ...
 def term_names() -> list[tuple[str, str]]: ...
 def unit_powers(model: dict[str, float], state: _Floats, accelerations: _Floats) -> _Floats: ...
+def learn_noise(
+    t_s: NDArray[np.float64],
+    phi_rad: NDArray[np.float64],
+    sigma_rad: NDArray[np.float64],
+    order: int,
+    scale: bool,
+    stretch_s: float,
+) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]: ...
+def smooth_angles(
+    t_s: NDArray[np.float64],
+    phi_rad: NDArray[np.float64],
+    sigma_rad: NDArray[np.float64],
+    order: int,
+    factor: float,
+    knots_s: NDArray[np.float64],
+    log_q: NDArray[np.float64],
+    white: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float, list[float]]: ...

@@ -26,6 +26,7 @@ pub mod scalar;
 pub mod section;
 pub mod shooting;
 pub mod simulate;
+pub mod smoother;
 mod tableau;
 pub mod terms;
 

@@ -8,6 +8,7 @@ mod images;
 mod live;
 mod settings;
 mod simulation;
+mod smoothing;
 mod tables;
 mod track;
 mod watch;
@@ -21,6 +22,8 @@ mod _tracker {
     use super::live::{LiveTracker, detect};
     #[pymodule_export]
     use super::simulation::{poincare_section, simulate_ensemble, simulate_motion, tangent_growth};
+    #[pymodule_export]
+    use super::smoothing::{learn_noise, smooth_angles};
     #[pymodule_export]
     use super::tables::{arrow_reader, check_table, read_meta, read_rig, read_table, rig_toml, write_table};
     #[pymodule_export]
