@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pydpend.angles.markers import BodyMarkers
-from pydpend.angles.pose import PRIOR_DOF, Pose, rotate
+from pydpend.angles.pose import PRIOR_DOF, Pose, evenly, rotate
 from pydpend.angles.table import Floats
 from pydpend.errors import AnglesError, fault
 
@@ -92,7 +92,7 @@ def first_shape(upper: Pose, lower: Pose | None) -> Shape:
     """
     theta, centre = upper.theta_rad, upper.centre_px
     rows = np.flatnonzero(np.isfinite(theta))
-    rows = rows[np.unique(np.linspace(0, rows.size - 1, min(rows.size, FIT_FRAMES)).astype(np.int64))]
+    rows = rows[evenly(rows.size, FIT_FRAMES)]
     turning = _matrix(theta[rows])
     ones = np.broadcast_to(-np.eye(2), turning.shape)
     found = _least_squares(np.concatenate([turning, ones], axis=2), -centre[rows], "pivot")
@@ -105,7 +105,7 @@ def first_shape(upper: Pose, lower: Pose | None) -> Shape:
         raise AnglesError(
             fault("nodes", "the two links are never seen in the same frame, so no elbow is found")
         )
-    both = both[np.unique(np.linspace(0, both.size - 1, min(both.size, FIT_FRAMES)).astype(np.int64))]
+    both = both[evenly(both.size, FIT_FRAMES)]
     apart = np.concatenate([_matrix(theta[both]), -_matrix(lower.theta_rad[both])], axis=2)
     found = _least_squares(apart, lower.centre_px[both] - centre[both], "elbow")
     return Shape(pivot, template, found[:2] - q, lower.template_px - found[2:])

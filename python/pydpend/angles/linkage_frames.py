@@ -18,8 +18,7 @@ from pydpend.angles.linkage import (
     predicted,
     regular,
 )
-from pydpend.angles.markers import BodyMarkers
-from pydpend.angles.pose import REJECT_D2, Pose, inflation, rotate
+from pydpend.angles.pose import REJECT_D2, Pose, evenly, inflation, rotate
 from pydpend.angles.table import Floats
 
 _STEPS = 6
@@ -56,9 +55,9 @@ def fit_linkage(upper: Pose, lower: Pose | None) -> LinkageAngles:
     shape = first_shape(upper, lower)
     theta = np.stack([p.theta_rad for p in poses], axis=1)
     rows = np.flatnonzero(np.isfinite(theta).all(axis=1))
-    rows = rows[np.unique(np.linspace(0, rows.size - 1, min(rows.size, FIT_FRAMES)).astype(np.int64))]
+    rows = rows[evenly(rows.size, FIT_FRAMES)]
     clean = [p.markers.without(~p.used) for p in poses]
-    linkage, _ = fit_shape([_rows(m, rows) for m in clean], shape, theta[rows])
+    linkage, _ = fit_shape([m.at(rows) for m in clean], shape, theta[rows])
     frames = Frames.of([p.markers for p in poses])
     start = _start(linkage.shape, frames, theta)
     return _all_frames(linkage, frames, start)
@@ -95,12 +94,6 @@ def checked_sigma(linked: LinkageAngles, poses: list[Pose]) -> tuple[Floats, lis
                 "includes that, method='rigid' is free of it"
             )
     return sigma, notes
-
-
-def _rows(markers: BodyMarkers, rows: NDArray[np.int64]) -> BodyMarkers:
-    return BodyMarkers(
-        markers.name, markers.nodes, markers.xy_px[rows], markers.weight[rows], markers.reference_px
-    )
 
 
 def _start(shape: Shape, frames: Frames, theta: Floats) -> Floats:

@@ -47,6 +47,10 @@ class BodyMarkers:
             self.name, self.nodes, self.xy_px, np.where(drop, 0.0, self.weight), self.reference_px
         )
 
+    def at(self, rows: NDArray[np.int64]) -> BodyMarkers:
+        """Some of the frames."""
+        return BodyMarkers(self.name, self.nodes, self.xy_px[rows], self.weight[rows], self.reference_px)
+
 
 def to_world(xy_px: Floats, mirrored: bool = False) -> Floats:
     """Image places (..., 2), y down, to world directions, y up; ``mirrored`` turns x round as well.
