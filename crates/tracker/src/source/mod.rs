@@ -2,8 +2,13 @@
 //!
 //! Owns: [`open`], [`OpenOptions`], [`Decoder`]. Must not: look at what is in a picture.
 
+pub mod cine;
 pub mod clock;
 pub mod ffmpeg;
+pub mod images;
+pub mod mraw;
+pub mod opencv;
+mod options;
 pub mod synthetic;
 
 use std::fs::{self, File};
@@ -11,33 +16,9 @@ use std::io::Read;
 use std::path::Path;
 
 use crate::error::{Error, Fault, Result};
+pub use options::{Decoder, OpenOptions};
+
 pub use crate::frame::{Ending, FrameSource, SourceInfo};
-
-/// Which decoder reads compressed film.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Decoder {
-    /// The one that fits the file.
-    #[default]
-    Auto,
-    /// FFmpeg's libraries.
-    Ffmpeg,
-    /// OpenCV's `VideoCapture`, a second and independent one.
-    Opencv,
-}
-
-/// What a user may say about reading a recording. The default says nothing.
-#[derive(Debug, Clone, Default)]
-pub struct OpenOptions {
-    /// Frames per second of recorded time; replaces all time stamps of the recording.
-    pub fps: Option<f64>,
-    /// Decoder.
-    pub decoder: Decoder,
-    /// Whether network addresses and devices may be opened.
-    pub allow_protocol: bool,
-    /// Decoding threads; 0 is one for each core.
-    pub threads: usize,
-}
 
 /// What a name stands for.
 pub(crate) enum Input {
@@ -100,11 +81,43 @@ impl Input {
 /// [`Error::Source`] if there is no such file or nothing here reads it; [`Error::Argument`] for options that
 /// make no sense.
 pub fn open(name: &str, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
+    if Path::new(name).is_dir() || images::names::is_pattern(name) && !Path::new(name).exists() {
+        return Ok(Box::new(images::SequenceSource::open(name, options)?));
+    }
     let input = Input::of(name, options)?;
     if let Input::File(_) = &input {
-        refuse_lists(name)?;
+        let first = first_bytes(name)?;
+        let by_camera: Option<Box<dyn FrameSource>> = match &first[..] {
+            b if mraw::is_photron(name, b) => Some(Box::new(mraw::MrawSource::open(name, options)?)),
+            [b'C', b'I', ..] if first.get(2..4) == Some(&[44, 0]) => {
+                Some(Box::new(cine::CineSource::open(name, &input, options)?))
+            }
+            [b'I', b'I', 42 | 43, 0, ..] | [b'M', b'M', 0, 42 | 43, ..] => {
+                Some(Box::new(images::StackSource::open(name, options)?))
+            }
+            _ => None,
+        };
+        if let Some(source) = by_camera {
+            return match options.decoder {
+                Decoder::Opencv => Err(Error::Source(
+                    Fault::new(name, format!("OpenCV does not read {}", source.info().container))
+                        .advice("Leave out `--decoder opencv`"),
+                )),
+                _ => Ok(source),
+            };
+        }
+        refuse_lists(name, &first)?;
     }
-    Ok(Box::new(ffmpeg::FfmpegSource::open(name, &input, options)?))
+    let source = ffmpeg::FfmpegSource::open(name, &input, options)?;
+    if options.decoder != Decoder::Opencv {
+        return Ok(Box::new(source));
+    }
+    match input {
+        Input::File(_) => Ok(Box::new(opencv::OpencvSource::open(name, &input, source.info(), options)?)),
+        _ => Err(Error::Source(
+            Fault::new(name, "OpenCV's decoder reads files only").advice("Leave out `--decoder opencv`"),
+        )),
+    }
 }
 
 /// The first bytes of a file, up to 4096.
@@ -129,13 +142,12 @@ fn first_bytes(name: &str) -> Result<Vec<u8>> {
 }
 
 /// Refuses text files that make a demuxer open other files or addresses.
-fn refuse_lists(name: &str) -> Result<()> {
-    let bytes = first_bytes(name)?;
+fn refuse_lists(name: &str, bytes: &[u8]) -> Result<()> {
     let text = String::from_utf8_lossy(&bytes[..bytes.len().min(256)]);
     let text = text.trim_start_matches(['\u{feff}', ' ', '\r', '\n', '\t']);
     let is_list = text.starts_with("#EXTM3U")
         || text.starts_with("ffconcat")
-        || text.starts_with("<?xml") && String::from_utf8_lossy(&bytes).contains("<MPD");
+        || text.starts_with("<?xml") && String::from_utf8_lossy(bytes).contains("<MPD");
     if is_list {
         return Err(Error::Source(
             Fault::new(name, "a list of other files, not a recording").advice("Give the recording itself"),

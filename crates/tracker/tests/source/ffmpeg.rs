@@ -1,18 +1,10 @@
 //! Compressed film: every codec a lab uses, order, times, ends and damage.
 
 use tracker::error::Error;
-use tracker::frame::{Ending, Frame, FrameSource, PixelFormat, RateOrigin};
+use tracker::frame::{Ending, PixelFormat, RateOrigin};
 use tracker::source::{OpenOptions, open};
 
-use crate::film::{HEIGHT, WIDTH, encode, have_ffmpeg, index_of, picture, real, samples};
-
-fn read_all(source: &mut dyn FrameSource) -> Vec<Frame> {
-    let mut frames = Vec::new();
-    while let Some(frame) = source.next_frame().unwrap() {
-        frames.push(frame);
-    }
-    frames
-}
+use crate::film::{HEIGHT, WIDTH, encode, have_ffmpeg, index_of, picture, read_all, real, samples};
 
 /// What a codec's file must give.
 struct Case {

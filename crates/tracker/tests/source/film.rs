@@ -115,3 +115,12 @@ pub fn real(name: &str) -> Option<PathBuf> {
     }
     Some(path)
 }
+
+/// Reads a recording to its end.
+pub fn read_all(source: &mut dyn tracker::frame::FrameSource) -> Vec<Frame> {
+    let mut frames = Vec::new();
+    while let Some(frame) = source.next_frame().unwrap() {
+        frames.push(frame);
+    }
+    frames
+}

@@ -3,4 +3,9 @@
 
 mod film;
 
+mod cine;
+mod damage;
 mod ffmpeg;
+mod images;
+mod mraw;
+mod opencv;

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-use crate::{completions, film, track};
+use crate::{completions, film, info, track};
 
 /// A film of markers on rigid links in; where each marker is in each frame out.
 #[derive(Debug, Parser)]
@@ -18,6 +18,7 @@ pub struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Info(info::Args),
     Track(track::Args),
     Film(film::Args),
     Completions(completions::Args),
@@ -27,6 +28,7 @@ impl Cli {
     /// Runs the subcommand.
     pub fn run(self) -> anyhow::Result<ExitCode> {
         match self.command {
+            Command::Info(args) => info::run(args),
             Command::Track(args) => track::run(args),
             Command::Film(args) => film::run(args),
             Command::Completions(args) => completions::run(args),

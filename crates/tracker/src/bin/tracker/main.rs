@@ -5,6 +5,7 @@
 mod args;
 mod completions;
 mod film;
+mod info;
 mod track;
 mod watch;
 

@@ -10,6 +10,10 @@ use super::demux::{Demuxer, Packet};
 use super::{codec_name, message};
 use crate::error::{Error, Fault, Result};
 
+/// Codecs whose decoders keep silent about damage.
+const STRICT: [ffi::AVCodecID; 3] =
+    [ffi::AVCodecID::AV_CODEC_ID_HEVC, ffi::AVCodecID::AV_CODEC_ID_FFV1, ffi::AVCodecID::AV_CODEC_ID_PNG];
+
 /// An open decoder of one stream.
 pub(super) struct Decoder {
     context: *mut ffi::AVCodecContext,
@@ -54,6 +58,11 @@ impl Decoder {
             (*context).pkt_timebase = demuxer.stream().time_base;
             (*context).thread_count = i32::try_from(threads).unwrap_or(0);
             (*context).thread_type = ffi::FF_THREAD_FRAME | ffi::FF_THREAD_SLICE;
+            // Some decoders pass over damage in silence unless they are told to stop at it; others say of a
+            // picture that it is damaged, and stop at trifles if they are told so.
+            if STRICT.contains(&parameters.codec_id) {
+                (*context).err_recognition |= ffi::AV_EF_EXPLODE | ffi::AV_EF_CRCCHECK;
+            }
             // Cropping is exact to the pixel only with unaligned planes; we read bytes, so any place will do.
             (*context).flags |= ffi::AV_CODEC_FLAG_UNALIGNED as i32;
             if code < 0 { code } else { ffi::avcodec_open2(context, codec, ptr::null_mut()) }

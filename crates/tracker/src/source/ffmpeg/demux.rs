@@ -133,6 +133,23 @@ impl Demuxer {
         })
     }
 
+    /// Where the stream ends by what the container itself declares, in ticks; `None` if it does not say, or says
+    /// it of several streams together.
+    pub(super) fn declared_end(&self) -> Option<i64> {
+        let stream = self.stream();
+        // SAFETY: the context is open.
+        let (whole, method, streams) = unsafe {
+            let c = &*self.context;
+            (c.duration, c.duration_estimation_method, c.nb_streams)
+        };
+        let from_header = method == ffi::AVDurationEstimationMethod::AVFMT_DURATION_FROM_STREAM;
+        if whole <= 0 || !from_header || streams != 1 {
+            return None;
+        }
+        let start = if stream.start_time == ffi::AV_NOPTS_VALUE { 0 } else { stream.start_time };
+        start.checked_add(self.duration()?)
+    }
+
     /// Byte offset that the reader has reached.
     pub(super) fn position(&self) -> Option<u64> {
         // SAFETY: the context is open; `pb` may be null for formats without a file.

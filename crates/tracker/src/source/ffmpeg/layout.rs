@@ -128,10 +128,10 @@ impl Layout {
             }
         } else if first.step == first.sample_bytes()
             && first.offset == 0
+            && first.shift == 0
             && !(first.big_endian && first.step == 2)
         {
-            // Samples kept in the upper bits (P010 and its like) are handed out as they lie, as 16-bit values.
-            (Kind::Lend, first.depth + first.shift)
+            (Kind::Lend, first.depth)
         } else {
             (Kind::Gather(first), first.depth)
         };

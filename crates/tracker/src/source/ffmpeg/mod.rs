@@ -68,6 +68,8 @@ pub struct FfmpegSource {
     /// Packets of the stream seen, with those that an edit list hides.
     packets: u64,
     last_byte: Option<u64>,
+    /// The demuxer found less of the last packet than there should be.
+    last_is_cut: bool,
     stop_reason: Option<String>,
     /// Frames without a plane whose fate depends on whether a good one follows.
     held: VecDeque<Ready>,
@@ -75,6 +77,8 @@ pub struct FfmpegSource {
     /// Frames given as samples of a pipe, to be handed out in their turn.
     replay: VecDeque<Frame>,
     next_index: u64,
+    /// Time of the last picture and the longest step between two.
+    last_ticks: Option<(i64, i64)>,
     user_clock: bool,
     ending: Ending,
 }
@@ -206,14 +210,21 @@ impl FfmpegSource {
             failures: 0,
             packets: 0,
             last_byte: None,
+            last_is_cut: false,
             stop_reason,
             held: VecDeque::new(),
             ready: VecDeque::new(),
             replay: VecDeque::new(),
             next_index: 0,
+            last_ticks: None,
             user_clock: options.fps.is_some(),
             ending: Ending::Complete,
         })
+    }
+
+    /// Whether the end was reached.
+    pub(crate) fn is_finished(&self) -> bool {
+        self.finished
     }
 
     /// Reads one packet and gives it to the decoder, or starts draining.
@@ -257,7 +268,8 @@ impl FfmpegSource {
             self.last_byte = byte.map(|b| b + u64::try_from(fields.size).unwrap_or(0)).or(self.last_byte);
         }
         // A packet that the demuxer knows to be cut would give a picture with made-up pixels.
-        if !self.packet.has(ffi::AV_PKT_FLAG_CORRUPT) {
+        self.last_is_cut = self.packet.has(ffi::AV_PKT_FLAG_CORRUPT);
+        if !self.last_is_cut {
             self.decoder.send(Some(&self.packet));
         }
     }
@@ -328,10 +340,23 @@ impl FfmpegSource {
     }
 
     fn next_ticks(&mut self, key: i64) -> i64 {
-        match &mut self.stamps {
+        let ticks = match &mut self.stamps {
             Stamps::Packets { .. } => key,
             Stamps::Decoding { times, next, .. } => times.pop_front().unwrap_or(*next),
-        }
+        };
+        let longest = self.last_ticks.map_or(1, |(last, longest)| longest.max(ticks.saturating_sub(last)));
+        self.last_ticks = Some((ticks, longest));
+        ticks
+    }
+
+    /// How much of the length that the container declares is not there, s; `None` if it is all there, but for
+    /// two of the longest steps between frames.
+    fn missing_s(&self) -> Option<f64> {
+        let (last, longest) = self.last_ticks?;
+        let missing = self.demuxer.declared_end()?.saturating_sub(last);
+        let base = self.demuxer.stream().time_base;
+        (missing > longest.saturating_mul(3))
+            .then(|| missing as f64 * f64::from(base.num) / f64::from(base.den))
     }
 
     /// The decoder gives no more: says how the recording ended.
@@ -347,8 +372,19 @@ impl FfmpegSource {
             (None, Some(n)) if short => {
                 format!("the file ends after {} of {n} frames that its header declares", self.packets)
             }
-            _ if !self.held.is_empty() => "the last frames cannot be decoded".to_owned(),
-            _ => return,
+            _ => match self.missing_s() {
+                Some(s) => format!("the file ends {s:.3} s before the length that its header declares"),
+                None if self.held.is_empty() => return,
+                // All packets are there by the container's own account: frames that cannot be decoded keep
+                // their places to the end.
+                None if !self.last_is_cut
+                    && self.next_index + self.ready.len() as u64 > 0
+                    && (declared.is_some() || self.demuxer.declared_end().is_some()) =>
+                {
+                    return self.ready.append(&mut self.held);
+                }
+                None => "the last frames cannot be decoded".to_owned(),
+            },
         };
         let frames = self.next_index + self.ready.len() as u64;
         let byte = self.held.front().map_or(self.last_byte, |h| h.byte).or_else(|| self.demuxer.position());
@@ -396,6 +432,30 @@ impl FfmpegSource {
             self.advance()?;
         }
     }
+}
+
+/// Display times of all frames of a file in ticks, rising, without decoding; for a decoder that does not tell them.
+///
+/// # Errors
+/// [`Error::Source`] if the file cannot be read.
+pub(crate) fn display_times(name: &str, input: &Input) -> Result<Vec<i64>> {
+    let (Input::File(url) | Input::Pipe(url) | Input::Address(url)) = input;
+    let mut demuxer = Demuxer::open(url, name, Some("file"))?;
+    let mut packet = Packet::new(name)?;
+    let mut times = Vec::new();
+    let mut unstamped = false;
+    while let Read::Packet = demuxer.read(&mut packet) {
+        if packet.has(ffi::AV_PKT_FLAG_DISCARD) {
+            continue;
+        }
+        let fields = packet.get();
+        unstamped |= fields.pts == ffi::AV_NOPTS_VALUE;
+        times.push((fields.pts, fields.dts));
+    }
+    // Decoding times rise as display times do, if there are no others.
+    let mut times: Vec<i64> = times.into_iter().map(|(p, d)| if unstamped { d } else { p }).collect();
+    times.sort_unstable();
+    Ok(times)
 }
 
 impl FrameSource for FfmpegSource {

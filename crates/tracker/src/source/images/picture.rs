@@ -1,0 +1,159 @@
+//! One picture file: 8 or 16 bit brightness, whatever it was stored as.
+//!
+//! Owns: [`Picture`], [`read`], [`page`]. Must not: scale values; 16 bit stay 16 bit.
+
+use std::fs::File;
+use std::io::{BufReader, Read, Seek, SeekFrom};
+use std::path::Path;
+
+use opencv::core::{CV_8U, CV_16U};
+use opencv::imgcodecs;
+use opencv::prelude::{MatTraitConst, MatTraitConstManual};
+use tiff::ColorType;
+use tiff::decoder::{Decoder, DecodingResult};
+
+/// A decoded picture.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Picture {
+    /// Width, px.
+    pub width: u32,
+    /// Height, px.
+    pub height: u32,
+    /// 8, or 16 for little-endian pairs.
+    pub depth_bits: u32,
+    /// Samples, row by row without gaps.
+    pub samples: Vec<u8>,
+    /// What the samples were before they were made brightness, if they were anything else.
+    pub converted_from: Option<String>,
+}
+
+/// Reads a picture file; an error is a clause without a full stop.
+pub fn read(path: &Path) -> Result<Picture, String> {
+    let mut file = File::open(path).map_err(|e| format!("it cannot be read ({e})"))?;
+    let mut head = [0u8; 32];
+    let got = file.read(&mut head).map_err(|e| format!("it cannot be read ({e})"))?;
+    let head = &head[..got];
+    if head.is_empty() {
+        return Err("it is empty".to_owned());
+    }
+    if head.starts_with(b"II") || head.starts_with(b"MM") {
+        file.seek(SeekFrom::Start(0)).map_err(|e| e.to_string())?;
+        let mut decoder = Decoder::new(BufReader::new(file)).map_err(|e| e.to_string())?;
+        return page(&mut decoder);
+    }
+    believable(head, &mut file)?;
+    let name = path.to_str().ok_or("its name is not UTF-8")?;
+    let color = imgcodecs::imread(name, imgcodecs::IMREAD_UNCHANGED).map_err(|e| short(&e.message))?;
+    if color.empty() {
+        return Err("it is not a picture that can be read, or it is cut".to_owned());
+    }
+    let channels = color.channels();
+    let (gray, converted_from) = if channels == 1 {
+        (color, None)
+    } else {
+        let code = match channels {
+            3 => opencv::imgproc::COLOR_BGR2GRAY,
+            4 => opencv::imgproc::COLOR_BGRA2GRAY,
+            n => return Err(format!("it has {n} channels")),
+        };
+        let mut gray = opencv::core::Mat::default();
+        opencv::imgproc::cvt_color_def(&color, &mut gray, code).map_err(|e| short(&e.message))?;
+        (gray, Some(format!("{channels} channels")))
+    };
+    let depth_bits = match gray.depth() {
+        CV_8U => 8,
+        CV_16U => 16,
+        other => return Err(format!("its samples are of OpenCV's kind {other}, not 8 or 16 bit")),
+    };
+    let size = |n: i32| u32::try_from(n).map_err(|e| e.to_string());
+    // OpenCV's 16-bit samples are in this machine's order; all machines that we are built for are little-endian.
+    let samples = gray.data_bytes().map_err(|e| short(&e.message))?.to_vec();
+    Ok(Picture { width: size(gray.cols())?, height: size(gray.rows())?, depth_bits, samples, converted_from })
+}
+
+/// Reads the page at which a TIFF decoder stands; an error is a clause without a full stop.
+pub fn page<R: Read + Seek>(decoder: &mut Decoder<R>) -> Result<Picture, String> {
+    let (width, height) = decoder.dimensions().map_err(|e| e.to_string())?;
+    let color = decoder.colortype().map_err(|e| e.to_string())?;
+    let channels = match color {
+        ColorType::Gray(8 | 16) => 1usize,
+        ColorType::RGB(8 | 16) => 3,
+        ColorType::RGBA(8 | 16) => 4,
+        other => return Err(format!("its samples are {other:?}; gray and RGB of 8 or 16 bit are read")),
+    };
+    let count = (width as usize)
+        .checked_mul(height as usize)
+        .and_then(|n| n.checked_mul(channels))
+        .ok_or_else(|| format!("{width} x {height} px is too large"))?;
+    let converted_from = (channels > 1).then(|| format!("{color:?}"));
+    let (depth_bits, samples) = match decoder.read_image().map_err(|e| e.to_string())? {
+        DecodingResult::U8(v) if v.len() >= count => (
+            8,
+            if channels == 1 { v } else { v.chunks_exact(channels).map(|c| brightness(c) as u8).collect() },
+        ),
+        DecodingResult::U16(v) if v.len() >= count => (
+            16,
+            v.chunks_exact(channels)
+                .map(|c| if channels == 1 { c[0] } else { brightness(c) as u16 })
+                .flat_map(u16::to_le_bytes)
+                .collect(),
+        ),
+        _ => return Err("it is cut, or its samples are not 8 or 16 bit".to_owned()),
+    };
+    Ok(Picture { width, height, depth_bits, samples, converted_from })
+}
+
+/// Red, green and blue weighted as by OpenCV (ITU-R BT.601, over 2^14).
+fn brightness<T: Copy + Into<u32>>(pixel: &[T]) -> u32 {
+    (4899 * pixel[0].into() + 9617 * pixel[1].into() + 1868 * pixel[2].into() + (1 << 13)) >> 14
+}
+
+/// Refuses a header that promises more pixels than the file can hold, before anything is allocated.
+fn believable(head: &[u8], file: &mut File) -> Result<(), String> {
+    let number = |at: usize, big: bool| {
+        let four: Option<[u8; 4]> = head.get(at..at + 4).and_then(|b| b.try_into().ok());
+        four.map(|b| u64::from(if big { u32::from_be_bytes(b) } else { u32::from_le_bytes(b) }))
+    };
+    // Deflate's best is 1032 to 1, and a PNG pixel takes a bit or more; BMP's run lengths do 127 to 1.
+    let (size, pixels_per_byte) = if head.starts_with(b"\x89PNG\r\n\x1a\n") {
+        (number(16, true).zip(number(20, true)), 8 * 1032)
+    } else if head.starts_with(b"BM") {
+        (number(18, false).zip(number(22, false).map(|h| u64::from((h as u32 as i32).unsigned_abs()))), 128)
+    } else {
+        return match head.starts_with(b"\xff\xd8") {
+            true => whole_jpeg(file),
+            false => Ok(()),
+        };
+    };
+    let length = file.metadata().map_err(|e| e.to_string())?.len();
+    match size {
+        Some((w, h)) if u128::from(w) * u128::from(h) <= u128::from(length) * pixels_per_byte => {
+            // libpng would complain on standard error.
+            match head.starts_with(b"\x89PNG") && !tail(file, 64)?.windows(4).any(|w| w == b"IEND") {
+                true => Err("it is cut".to_owned()),
+                false => Ok(()),
+            }
+        }
+        Some((w, h)) => Err(format!("{w} x {h} px do not fit into its {length} bytes")),
+        None => Err("it is cut".to_owned()),
+    }
+}
+
+/// A JPEG that is cut would be filled up with gray.
+fn whole_jpeg(file: &mut File) -> Result<(), String> {
+    if tail(file, 1024)?.windows(2).any(|w| w == [0xff, 0xd9]) { Ok(()) } else { Err("it is cut".to_owned()) }
+}
+
+/// The last `count` bytes of a file.
+fn tail(file: &mut File, count: u64) -> Result<Vec<u8>, String> {
+    let mut bytes = Vec::new();
+    let length = file.metadata().map_err(|e| e.to_string())?.len();
+    file.seek(SeekFrom::Start(length.saturating_sub(count)))
+        .and_then(|_| file.read_to_end(&mut bytes))
+        .map_err(|e| e.to_string())?;
+    Ok(bytes)
+}
+
+fn short(message: &str) -> String {
+    message.lines().next().unwrap_or("it cannot be decoded").trim().to_owned()
+}

@@ -1,0 +1,211 @@
+//! What a Photron header says, whichever of its two forms it is in.
+//!
+//! Owns: [`Header`], [`Packing`]. Must not: open files.
+
+use super::super::clock;
+use super::{cih, cihx};
+use crate::error::{Error, Fault, Place, Result};
+use crate::frame::{PixelFormat, TimeBase};
+
+/// Where the significant bits of a sample lie in its 16 bits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Side {
+    /// At the bottom: values as they are.
+    #[default]
+    Lower,
+    /// At the top: values are multiples.
+    Higher,
+}
+
+/// Facts of a recording, as written by Photron's viewer. `None` is unknown.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Header {
+    /// Width, px.
+    pub width: u32,
+    /// Height, px.
+    pub height: u32,
+    /// Bits that a pixel takes in the file.
+    pub color_bit: u32,
+    /// Bits that the sensor gave.
+    pub effective_depth: Option<u32>,
+    /// Where they lie.
+    pub side: Side,
+    /// `Mono`, `Raw`, `Bayer`, `Color`...
+    pub color_type: Option<String>,
+    /// `MRaw`, or another format that the viewer exports.
+    pub file_format: Option<String>,
+    /// Frames in the file.
+    pub total_frames: Option<u64>,
+    /// Frames per second at which the camera ran.
+    pub record_rate_hz: Option<f64>,
+    /// Every how many frames one was saved; at least 1.
+    pub save_step: u64,
+    /// Number of the first saved frame in the recording.
+    pub start_frame: Option<i64>,
+    /// Number of the frame at the trigger.
+    pub trigger_frame: Option<i64>,
+    /// Exposure time, s.
+    pub exposure_s: Option<f64>,
+    /// Camera.
+    pub camera: Option<String>,
+    /// Day and time as written.
+    pub recorded: Option<String>,
+    /// The user's comment.
+    pub comment: Option<String>,
+    /// Entries that make no sense and were not used.
+    pub warnings: Vec<String>,
+}
+
+/// How frames lie in the pixel file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Packing {
+    /// Format of the samples in the file.
+    pub format: PixelFormat,
+    /// Significant bits of the samples handed out.
+    pub depth_bits: u32,
+    /// Bits by which samples are moved down when they are handed out; 0 for all but 16-bit with side Higher.
+    pub shift: u32,
+    /// Bytes of a frame.
+    pub frame_bytes: u64,
+}
+
+impl Header {
+    /// Reads a header of either form; `name` is for messages.
+    ///
+    /// # Errors
+    /// [`Error::Source`] naming the key at fault.
+    pub fn parse(bytes: &[u8], name: &str) -> Result<Self> {
+        let header = if cihx::is_cihx(bytes) { cihx::parse(bytes, name)? } else { cih::parse(bytes, name)? };
+        header.check(name)?;
+        Ok(header)
+    }
+
+    fn check(&self, name: &str) -> Result<()> {
+        let fault = |key: &str, problem: String, advice: &str| {
+            Err(Error::Source(Fault::new(name, problem).at(Place::Key(key.into())).advice(advice)))
+        };
+        if self.width == 0 || self.height == 0 {
+            return fault(
+                "image size",
+                format!("{} x {} px", self.width, self.height),
+                "Export the recording again; the header is not complete",
+            );
+        }
+        if let Some(kind) = &self.color_type {
+            if !["mono", "raw", "bayer"].contains(&kind.to_lowercase().as_str()) {
+                return fault(
+                    "color type",
+                    format!("{kind} is not read, only Mono, Raw and Bayer are"),
+                    "Export the recording as Raw or as AVI",
+                );
+            }
+        }
+        if let Some(format) = &self.file_format {
+            if !format.to_lowercase().contains("mraw") {
+                return fault(
+                    "file format",
+                    format!("the pixels were saved as {format}, not as MRaw"),
+                    "Give the file or folder that holds the pictures",
+                );
+            }
+        }
+        Ok(())
+    }
+
+    /// How frames lie in the pixel file.
+    ///
+    /// # Errors
+    /// [`Error::Source`] for bits that are not read or a frame that no file can hold.
+    pub fn packing(&self, name: &str) -> Result<Packing> {
+        let format = match self.color_bit {
+            8 => PixelFormat::Gray8,
+            10 => PixelFormat::Packed10,
+            12 => PixelFormat::Packed12,
+            16 => PixelFormat::Gray16,
+            bits => {
+                return Err(Error::Source(
+                    Fault::new(
+                        name,
+                        format!("{bits} bits per pixel are not read, only 8, 10, 12 and 16 are"),
+                    )
+                    .at(Place::Key("color bit".into()))
+                    .advice("Export the recording with one of these"),
+                ));
+            }
+        };
+        let bits = u128::from(self.width) * u128::from(self.height) * u128::from(self.color_bit);
+        let frame_bytes =
+            u64::try_from(bits.div_ceil(8)).ok().filter(|b| i64::try_from(*b).is_ok()).ok_or_else(|| {
+                Error::Source(
+                    Fault::new(name, format!("a picture of {} x {} px", self.width, self.height))
+                        .at(Place::Key("image size".into()))
+                        .advice("Export the recording again; the header is wrong"),
+                )
+            })?;
+        // An 8-bit file of a 12-bit sensor holds 8 of the 12; a 16-bit file holds them all.
+        let effective = self.effective_depth.filter(|d| (1..=self.color_bit).contains(d));
+        let (depth_bits, shift) = match (format, effective, self.side) {
+            (PixelFormat::Gray16, Some(d), Side::Higher) if d >= 8 => (d, 16 - d),
+            (PixelFormat::Gray16, Some(d), Side::Lower) if d >= 8 => (d, 0),
+            _ => (self.color_bit, 0),
+        };
+        Ok(Packing { format, depth_bits, shift, frame_bytes })
+    }
+
+    /// Seconds per saved frame: save step over record rate. `None` if the header gives no rate.
+    pub fn time_base(&self) -> Option<TimeBase> {
+        let rate = self.record_rate_hz.filter(|r| r.is_finite() && *r > 0.0 && *r <= 1e9)?;
+        let (p, q) = clock::rational(rate);
+        Some(TimeBase { numerator: q.checked_mul(self.save_step.max(1))?, denominator: p })
+    }
+
+    /// Index in the file of the frame at the trigger, below 0 if it lies before the first saved one.
+    pub fn trigger_index(&self) -> Option<i64> {
+        let ahead = self.trigger_frame?.checked_sub(self.start_frame.unwrap_or(0))?;
+        ahead.checked_div_euclid(i64::try_from(self.save_step.max(1)).ok()?)
+    }
+}
+
+/// A number of a header, or a note that it is none. Whole numbers may be written `75.0`.
+pub(super) fn number<T: TryFrom<i128>>(key: &str, text: &str, warnings: &mut Vec<String>) -> Option<T> {
+    let text = text.trim();
+    let whole = text.parse::<i128>().ok().or_else(|| {
+        // Above 2^53 a float no longer counts in ones.
+        let value = text.parse::<f64>().ok()?;
+        (value.fract() == 0.0 && value.abs() < 9e15).then_some(value as i128)
+    });
+    let value = whole.and_then(|v| T::try_from(v).ok());
+    if value.is_none() && !text.is_empty() {
+        warnings.push(format!("{key}: {text:?} is not a number that makes sense; not used"));
+    }
+    value
+}
+
+/// A number that may be a fraction such as `1/15371`.
+pub(super) fn fraction(key: &str, text: &str, warnings: &mut Vec<String>) -> Option<f64> {
+    let text = text.trim();
+    let value = match text.split_once('/') {
+        Some((a, b)) => a.trim().parse::<f64>().ok().zip(b.trim().parse::<f64>().ok()).map(|(a, b)| a / b),
+        None => text.parse::<f64>().ok(),
+    };
+    let value = value.filter(|v| v.is_finite() && *v > 0.0);
+    if value.is_none() && !text.is_empty() {
+        warnings.push(format!("{key}: {text:?} is not a number above 0; not used"));
+    }
+    value
+}
+
+/// The error for a key without which the pixels cannot be read.
+pub(super) fn missing(name: &str, key: &str) -> Error {
+    Error::Source(
+        Fault::new(name, "it is not in the header, or not a number")
+            .at(Place::Key(key.into()))
+            .advice("Export the recording again; the header is not complete"),
+    )
+}
+
+/// Text cut to a length that fits a report.
+pub(super) fn short(text: &str) -> Option<String> {
+    let text: String = text.trim().chars().filter(|c| !c.is_control()).take(200).collect();
+    (!text.is_empty()).then_some(text)
+}

@@ -1,0 +1,322 @@
+//! Photron MRAW: a file of pixels without a header, and beside it a `.cih` or `.cihx` that explains it.
+//!
+//! Owns: [`MrawSource`]. Must not: unpack pixels; frames are lent from a memory map as they lie in the file.
+//! The one exception is 16-bit with the significant bits on top, which is moved down.
+
+pub mod cih;
+pub mod cihx;
+pub mod header;
+
+use std::fs::{self, File};
+use std::io::Read;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use memmap2::{Advice, Mmap, MmapOptions};
+
+use super::{OpenOptions, clock};
+use crate::error::{Error, Fault, Result};
+use crate::frame::{Bytes, Ending, Frame, FrameSource, PixelFormat, RateOrigin, SourceInfo, TimeBase};
+use header::{Header, Packing};
+
+/// Bytes mapped at a time: what was read is given back, so memory does not grow with the recording.
+const WINDOW_BYTES: u64 = 32 << 20;
+/// Longest header that is read; real ones have some kB.
+const HEADER_BYTES: u64 = 16 << 20;
+
+/// A Photron recording.
+pub struct MrawSource {
+    info: SourceInfo,
+    file: File,
+    packing: Packing,
+    /// Whole frames in the file, up to those declared.
+    frames: u64,
+    next: u64,
+    window: Option<(Range<u64>, Arc<Mmap>)>,
+    ending: Ending,
+}
+
+/// Whether a file is one of a Photron pair, by what it starts with or, for pixels, by its ending.
+pub(crate) fn is_photron(name: &str, first_bytes: &[u8]) -> bool {
+    has_ending(Path::new(name), &["mraw"]) || is_header(name, first_bytes)
+}
+
+fn is_header(name: &str, first_bytes: &[u8]) -> bool {
+    let text = first_bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(first_bytes);
+    text.starts_with(b"#Camera Information Header")
+        || cihx::is_cihx(first_bytes)
+        || has_ending(Path::new(name), &["cih", "cihx"])
+}
+
+fn has_ending(path: &Path, endings: &[&str]) -> bool {
+    path.extension().and_then(|e| e.to_str()).is_some_and(|e| endings.contains(&e.to_lowercase().as_str()))
+}
+
+/// The file beside `path` with the same stem and the first of `endings` that there is.
+fn partner(path: &Path, endings: &[&str]) -> Result<PathBuf> {
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let stem = path.file_stem().map(|s| s.to_string_lossy().to_lowercase());
+    let entries: Vec<PathBuf> =
+        fs::read_dir(folder).map(|d| d.flatten().map(|e| e.path()).collect()).unwrap_or_default();
+    endings
+        .iter()
+        .find_map(|ending| {
+            entries.iter().find(|p| {
+                has_ending(p, &[ending]) && p.file_stem().map(|s| s.to_string_lossy().to_lowercase()) == stem
+            })
+        })
+        .cloned()
+        .ok_or_else(|| {
+            let wanted = endings.iter().map(|e| format!(".{e}")).collect::<Vec<_>>().join(" or ");
+            Error::Source(
+                Fault::new(
+                    path.display(),
+                    format!("its partner ({wanted} of the same name) is not beside it"),
+                )
+                .advice("Copy both files of the recording into one folder"),
+            )
+        })
+}
+
+fn unreadable(path: &Path, error: &std::io::Error) -> Error {
+    Error::Source(
+        Fault::new(path.display(), format!("the file cannot be read ({error})"))
+            .advice("Check its permissions"),
+    )
+}
+
+impl MrawSource {
+    /// Opens a pair by either of its files.
+    ///
+    /// # Errors
+    /// [`Error::Source`] for a missing partner, a header that does not explain the pixels, or not one whole frame.
+    pub fn open(name: &str, options: &OpenOptions) -> Result<Self> {
+        let path = Path::new(name);
+        let mut first_bytes = Vec::new();
+        File::open(path)
+            .and_then(|f| f.take(4096).read_to_end(&mut first_bytes))
+            .map_err(|e| unreadable(path, &e))?;
+        let (header_path, pixels_path) = if has_ending(path, &["mraw"]) {
+            (partner(path, &["cihx", "cih"])?, path.to_owned())
+        } else {
+            (path.to_owned(), partner(path, &["mraw"])?)
+        };
+        let mut bytes = Vec::new();
+        File::open(&header_path)
+            .and_then(|f| f.take(HEADER_BYTES).read_to_end(&mut bytes))
+            .map_err(|e| unreadable(&header_path, &e))?;
+        let header_name = header_path.display().to_string();
+        let header = Header::parse(&bytes, &header_name)?;
+        let packing = header.packing(&header_name)?;
+
+        let file = File::open(&pixels_path).map_err(|e| unreadable(&pixels_path, &e))?;
+        let size = file.metadata().map_err(|e| unreadable(&pixels_path, &e))?.len();
+        let there = size / packing.frame_bytes;
+        let frames = header.total_frames.map_or(there, |n| n.min(there));
+        if frames == 0 {
+            return Err(Error::Source(
+                Fault::new(
+                    pixels_path.display(),
+                    format!("not one whole frame: {size} bytes, and one takes {}", packing.frame_bytes),
+                )
+                .advice("Copy the recording again, or check that the header is the right one"),
+            ));
+        }
+        let mut info = info(name, &header, &packing, options)?;
+        info.size_bytes = Some(size);
+        match header.total_frames {
+            Some(n) if n > there => info.warnings.push(format!(
+                "the header declares {n} frames ({} bytes), the file holds {there} ({size} bytes)",
+                u128::from(n) * u128::from(packing.frame_bytes)
+            )),
+            Some(_) if size > frames * packing.frame_bytes => info.warnings.push(format!(
+                "the file has {} bytes more than the frames that its header declares; they are not read",
+                size - frames * packing.frame_bytes
+            )),
+            None => info.warnings.push("the header does not say how many frames there are".to_owned()),
+            Some(_) => {}
+        }
+        Ok(Self { info, file, packing, frames, next: 0, window: None, ending: Ending::Complete })
+    }
+
+    /// The frame at `index`, from the window that holds it, mapped if it is not.
+    fn frame(&mut self, index: u64) -> Result<Frame> {
+        let size = self.packing.frame_bytes;
+        let at = index * size;
+        let window = match &self.window {
+            Some((range, map)) if range.contains(&at) => (range.clone(), Arc::clone(map)),
+            _ => {
+                let count = (WINDOW_BYTES / size).clamp(1, self.frames - index);
+                let range = at..at + count * size;
+                let map = self.map(&range)?;
+                self.window = Some((range.clone(), Arc::clone(&map)));
+                (range, map)
+            }
+        };
+        let begin = (at - window.0.start) as usize;
+        let lent = Lent { map: window.1, range: begin..begin + size as usize };
+        let (format, width) = (self.packing.format, self.info.width as usize);
+        let stride = match format {
+            PixelFormat::Gray8 => width,
+            PixelFormat::Gray16 => 2 * width,
+            // A row of packed pixels is a whole number of bytes or the frame is one run of bits.
+            _ if width * format.bits_per_pixel() as usize % 8 == 0 => {
+                width * format.bits_per_pixel() as usize / 8
+            }
+            _ => 0,
+        };
+        let plane: Box<dyn Bytes> = if self.packing.shift > 0 {
+            Box::new(moved_down(&lent, self.packing.shift))
+        } else {
+            Box::new(lent)
+        };
+        Ok(Frame {
+            index,
+            ticks: index as i64,
+            width: self.info.width,
+            height: self.info.height,
+            stride,
+            format,
+            depth_bits: self.packing.depth_bits,
+            plane: Some(plane),
+        })
+    }
+
+    fn map(&self, range: &Range<u64>) -> Result<Arc<Mmap>> {
+        let failed = |e: std::io::Error| {
+            Error::Source(
+                Fault::new(&self.info.name, format!("the file cannot be mapped into memory ({e})"))
+                    .at(crate::error::Place::Byte(range.start))
+                    .advice("Copy it to a local disk"),
+            )
+        };
+        let length = usize::try_from(range.end - range.start)
+            .map_err(|_| failed(std::io::Error::other("a frame is larger than memory")))?;
+        // SAFETY: the range lies inside the file as it was when opened, and the map is only read. As with every
+        // reader of memory maps, another program that cuts the file while it is read ends this one by a signal.
+        let map =
+            unsafe { MmapOptions::new().offset(range.start).len(length).map(&self.file) }.map_err(failed)?;
+        // Advice only speeds things up.
+        let _ = map.advise(Advice::Sequential);
+        Ok(Arc::new(map))
+    }
+}
+
+fn info(name: &str, header: &Header, packing: &Packing, options: &OpenOptions) -> Result<SourceInfo> {
+    let mut warnings = header.warnings.clone();
+    let (time_base, rate_origin) = match (options.fps, header.time_base()) {
+        (Some(fps), _) => (clock::time_base(fps)?, RateOrigin::User),
+        (None, Some(base)) => (base, RateOrigin::CameraHeader),
+        (None, None) => {
+            warnings.push("the header gives no rate; give it with --fps".to_owned());
+            (TimeBase { numerator: 1, denominator: 1 }, RateOrigin::Unknown)
+        }
+    };
+    if header.color_type.as_deref().is_some_and(|c| c.eq_ignore_ascii_case("bayer")) {
+        warnings.push("the sensor has a colour mosaic; its samples are taken as brightness".to_owned());
+    }
+    let mut details: Vec<(String, String)> = Vec::new();
+    let mut say = |word: &str, value: Option<String>| details.extend(value.map(|v| (word.to_owned(), v)));
+    say("camera", header.camera.clone());
+    say("recorded", header.recorded.clone());
+    say("record rate", header.record_rate_hz.map(|r| format!("{r} Hz")));
+    say("save step", Some(header.save_step.to_string()));
+    say("exposure", header.exposure_s.map(|s| format!("{s:e} s")));
+    say("trigger frame", header.trigger_index().map(|i| i.to_string()));
+    say("colour type", header.color_type.clone());
+    let sensor = header.effective_depth.map(|d| format!("{d} bit, side {:?}", header.side));
+    say("sensor depth", sensor);
+    say("comment", header.comment.clone());
+    let known = rate_origin != RateOrigin::Unknown;
+    Ok(SourceInfo {
+        name: name.to_owned(),
+        container: "Photron MRAW".into(),
+        codec: match packing.format {
+            PixelFormat::Gray8 => "8 bit".into(),
+            PixelFormat::Gray16 => "16 bit".into(),
+            PixelFormat::Packed10 => "packed 10 bit".into(),
+            PixelFormat::Packed12 => "packed 12 bit".into(),
+        },
+        width: header.width,
+        height: header.height,
+        format: packing.format,
+        depth_bits: packing.depth_bits,
+        declared_frames: header.total_frames,
+        time_base,
+        rate_hz: options
+            .fps
+            .or_else(|| known.then(|| time_base.denominator as f64 / time_base.numerator as f64)),
+        rate_origin,
+        converted_from: (packing.shift > 0).then(|| "16 bit, significant bits on top".to_owned()),
+        size_bytes: None,
+        details,
+        warnings,
+    })
+}
+
+impl FrameSource for MrawSource {
+    fn info(&self) -> &SourceInfo {
+        &self.info
+    }
+
+    fn next_frame(&mut self) -> Result<Option<Frame>> {
+        if self.next < self.frames {
+            self.next += 1;
+            return self.frame(self.next - 1).map(Some);
+        }
+        self.window = None;
+        let size = self.info.size_bytes.unwrap_or(0);
+        if let Some(declared) = self.info.declared_frames.filter(|n| *n > self.frames) {
+            let rest = size - self.frames * self.packing.frame_bytes;
+            self.ending = Ending::Early {
+                frames: self.frames,
+                byte: Some(size),
+                reason: format!(
+                    "the file ends {rest} bytes into frame {} of {declared} that its header declares",
+                    self.frames
+                ),
+            };
+        }
+        Ok(None)
+    }
+
+    fn ending(&self) -> Ending {
+        self.ending.clone()
+    }
+
+    fn sample(&mut self, count: usize) -> Result<Vec<Frame>> {
+        let n = self.frames.min(count as u64);
+        let window = self.window.take();
+        let frames = (0..n)
+            .map(|k| {
+                let index = ((u128::from(2 * k + 1) * u128::from(self.frames)) / u128::from(2 * n)) as u64;
+                let mut frame = self.frame(index)?;
+                // A copy, so that a few samples do not keep whole windows mapped.
+                if let Some(plane) = frame.plane.take() {
+                    frame.plane = Some(Box::new(plane.bytes().to_vec()));
+                }
+                Ok(frame)
+            })
+            .collect();
+        self.window = window;
+        frames
+    }
+}
+
+/// Bytes of a frame inside a window.
+struct Lent {
+    map: Arc<Mmap>,
+    range: Range<usize>,
+}
+
+impl Bytes for Lent {
+    fn bytes(&self) -> &[u8] {
+        &self.map[self.range.clone()]
+    }
+}
+
+fn moved_down(lent: &Lent, shift: u32) -> Vec<u8> {
+    let pairs = lent.bytes().chunks_exact(2);
+    pairs.flat_map(|p| (u16::from_le_bytes([p[0], p[1]]) >> shift).to_le_bytes()).collect()
+}

@@ -1,0 +1,134 @@
+//! Pictures as recordings: folders, patterns, gaps, TIFF stacks, broken files.
+
+use std::fs::File;
+use std::path::Path;
+
+use tiff::encoder::{TiffEncoder, colortype};
+use tracker::frame::{Ending, PixelFormat, RateOrigin};
+use tracker::source::{OpenOptions, open};
+
+use crate::film::{HEIGHT, WIDTH, encode, have_ffmpeg, index_of, picture, read_all, samples};
+
+fn with_fps(fps: f64) -> OpenOptions {
+    OpenOptions { fps: Some(fps), ..OpenOptions::default() }
+}
+
+#[test]
+fn a_folder_and_patterns_give_the_same_pictures_in_order() {
+    if !have_ffmpeg() {
+        return;
+    }
+    for (ending, arguments) in [
+        ("png", &[][..]),
+        ("bmp", &[]),
+        ("tif", &["-pix_fmt", "gray"]),
+        ("png", &["-pix_fmt", "gray16be"]),
+        ("tiff", &["-pix_fmt", "gray16le"]),
+        ("png", &["-pix_fmt", "rgb24"]),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        encode(folder.path(), &format!("img_%d.{ending}"), 24, arguments);
+        for name in
+            [".".to_owned(), format!("img_%d.{ending}"), format!("*.{ending}"), format!("img_*.{ending}")]
+        {
+            let path = folder.path().join(&name);
+            let mut source = open(path.to_str().unwrap(), &with_fps(250.0)).unwrap();
+            let deep = arguments.iter().any(|a| a.contains("16"));
+            assert_eq!(source.info().depth_bits, if deep { 16 } else { 8 });
+            assert_eq!(source.info().rate_hz, Some(250.0));
+            let frames = read_all(&mut *source);
+            assert_eq!((frames.len(), source.ending()), (24, Ending::Complete), "{name}");
+            for (i, frame) in frames.iter().enumerate() {
+                let values = samples(frame).unwrap();
+                let eight: Vec<u32> = values.iter().map(|v| if deep { v >> 8 } else { *v }).collect();
+                let truth: Vec<u32> = picture(i).iter().map(|v| u32::from(*v)).collect();
+                assert_eq!(eight, truth, "{name} frame {i}");
+            }
+        }
+    }
+}
+
+#[test]
+fn gaps_keep_their_place_and_broken_pictures_are_frames_without_pixels() {
+    if !have_ffmpeg() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    encode(folder.path(), "f%03d.png", 20, &[]);
+    std::fs::remove_file(folder.path().join("f006.png")).unwrap();
+    std::fs::remove_file(folder.path().join("f007.png")).unwrap();
+    let bad = folder.path().join("f011.png");
+    let bytes = std::fs::read(&bad).unwrap();
+    std::fs::write(&bad, &bytes[..bytes.len() / 2]).unwrap();
+    let mut source = open(folder.path().to_str().unwrap(), &with_fps(100.0)).unwrap();
+    assert!(source.info().warnings.iter().any(|w| w.contains("2 pictures are missing")));
+    assert!(source.sample(6).unwrap().iter().all(|f| f.plane.is_some()));
+    let frames = read_all(&mut *source);
+    assert_eq!(frames.len(), 20);
+    for (i, frame) in frames.iter().enumerate() {
+        assert_eq!((frame.index, frame.ticks), (i as u64, i as i64));
+        let told = samples(frame).map(|v| index_of(&v, 255).unwrap());
+        assert_eq!(told, if [5, 6, 10].contains(&i) { None } else { Some(i) }, "frame {i}");
+    }
+    // A broken last picture is an early end.
+    std::fs::write(folder.path().join("f020.png"), &bytes[..40]).unwrap();
+    let mut source = open(folder.path().to_str().unwrap(), &with_fps(100.0)).unwrap();
+    assert_eq!(read_all(&mut *source).len(), 19);
+    assert!(matches!(source.ending(), Ending::Early { frames: 19, .. }));
+}
+
+#[test]
+fn pictures_without_a_rate_say_so() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("a1.pgm"), b"P5 3 2 255\nabcdef").unwrap();
+    let source = open(folder.path().to_str().unwrap(), &OpenOptions::default()).unwrap();
+    assert_eq!((source.info().rate_hz, source.info().rate_origin), (None, RateOrigin::Unknown));
+    assert!(source.info().warnings.iter().any(|w| w.contains("--fps")));
+    let empty = tempfile::tempdir().unwrap();
+    let error = open(empty.path().to_str().unwrap(), &OpenOptions::default()).err().unwrap().to_string();
+    assert!(error.contains("no pictures"), "{error}");
+}
+
+#[test]
+fn a_picture_that_lies_about_its_size_is_refused_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.png");
+    let mut png = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR".to_vec();
+    png.extend(1_000_000_000u32.to_be_bytes());
+    png.extend(1_000_000_000u32.to_be_bytes());
+    png.extend([16, 0, 0, 0, 0, 1, 2, 3, 4]);
+    std::fs::write(&path, &png).unwrap();
+    let error = open(folder.path().to_str().unwrap(), &OpenOptions::default()).err().unwrap().to_string();
+    assert!(error.contains("1000000000 x 1000000000"), "{error}");
+}
+
+fn write_stack(path: &Path, count: usize) {
+    let mut encoder = TiffEncoder::new(File::create(path).unwrap()).unwrap();
+    for i in 0..count {
+        let deep: Vec<u16> = picture(i).iter().map(|v| u16::from(*v) << 4 | 3).collect();
+        encoder.write_image::<colortype::Gray16>(WIDTH as u32, HEIGHT as u32, &deep).unwrap();
+    }
+}
+
+#[test]
+fn the_pages_of_a_tiff_are_frames_and_a_cut_one_ends_early() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("stack.tif");
+    write_stack(&path, 12);
+    let mut source = open(path.to_str().unwrap(), &with_fps(1000.0)).unwrap();
+    assert_eq!((source.info().format, source.info().depth_bits), (PixelFormat::Gray16, 16));
+    assert_eq!(source.sample(5).unwrap().len(), 5);
+    let frames = read_all(&mut *source);
+    assert_eq!((frames.len(), source.ending()), (12, Ending::Complete));
+    for (i, frame) in frames.iter().enumerate() {
+        let truth: Vec<u32> = picture(i).iter().map(|v| u32::from(*v) << 4 | 3).collect();
+        assert_eq!(samples(frame).unwrap(), truth);
+    }
+    let whole = std::fs::read(&path).unwrap();
+    std::fs::write(&path, &whole[..whole.len() * 2 / 3]).unwrap();
+    let mut source = open(path.to_str().unwrap(), &with_fps(1000.0)).unwrap();
+    let frames = read_all(&mut *source);
+    assert!((6..9).contains(&frames.len()), "{}", frames.len());
+    let Ending::Early { frames: n, .. } = source.ending() else { panic!("not early") };
+    assert_eq!(n as usize, frames.len());
+}

@@ -1,0 +1,76 @@
+//! The second decoder gives what the first gives.
+
+use tracker::source::{Decoder, OpenOptions, open};
+
+use crate::film::{WIDTH, encode, have_ffmpeg, read_all, real, samples};
+
+/// Centre of what is brighter than the middle of the picture's range, weighted by how much brighter.
+fn centre(values: &[u32], width: usize) -> (f64, f64) {
+    let (low, high) = (values.iter().min().unwrap(), values.iter().max().unwrap());
+    let middle = f64::from(low + high) / 2.0;
+    let (mut n, mut x, mut y) = (0.0, 0.0, 0.0);
+    for (i, v) in values.iter().enumerate() {
+        let weight = f64::from(*v) - middle;
+        if weight > 0.0 {
+            n += weight;
+            x += weight * (i % width) as f64;
+            y += weight * (i / width) as f64;
+        }
+    }
+    (x / n, y / n)
+}
+
+#[test]
+fn both_decoders_give_the_same_frames_and_centres() {
+    let mut files = Vec::new();
+    let folder = tempfile::tempdir().unwrap();
+    if have_ffmpeg() {
+        for (name, arguments) in [
+            ("a.mp4", &["-c:v", "libx264", "-bf", "3", "-g", "12"][..]),
+            ("a.avi", &["-c:v", "rawvideo", "-pix_fmt", "gray"]),
+            ("a.mkv", &["-c:v", "ffv1", "-pix_fmt", "gray"]),
+            ("b.avi", &["-c:v", "mjpeg", "-q:v", "2", "-pix_fmt", "yuvj420p"]),
+            ("a.mov", &["-c:v", "libx265", "-x265-params", "log-level=none"]),
+        ] {
+            files
+                .push((encode(folder.path(), name, 30, arguments), name.ends_with("mkv") || name == "a.avi"));
+        }
+    }
+    files.extend(real("balltoss/BallTossOut.mp4").map(|p| (p, false)));
+    for (path, gray) in files {
+        let name = path.to_str().unwrap();
+        let mut first = open(name, &OpenOptions::default()).unwrap();
+        let options = OpenOptions { decoder: Decoder::Opencv, ..OpenOptions::default() };
+        let mut second = open(name, &options).unwrap();
+        assert!(!second.sample(4).unwrap().is_empty());
+        let (a, b) = (read_all(&mut *first), read_all(&mut *second));
+        assert_eq!(a.len(), b.len(), "{name}");
+        let width = if name.contains("Ball") { 640 } else { WIDTH };
+        let zero = [first.info().time_base.seconds(a[0].ticks), second.info().time_base.seconds(b[0].ticks)];
+        for (p, q) in a.iter().zip(&b) {
+            let times = [first.info().time_base.seconds(p.ticks), second.info().time_base.seconds(q.ticks)];
+            assert!((times[0] - zero[0] - times[1] + zero[1]).abs() < 1e-12, "{name} {} {times:?}", p.index);
+            let (u, v) = (samples(p).unwrap(), samples(q).unwrap());
+            if gray {
+                // Gray to BGR and back rounds twice at most.
+                assert!(u.iter().zip(&v).all(|(s, t)| s.abs_diff(*t) <= 2), "{name} frame {}", p.index);
+            }
+            let (c, d) = (centre(&u, width), centre(&v, width));
+            // Stretching limited range to full and rounding moves each of some hundred weights by half a level
+            // of about two hundred: 0.02 px is ten times what that can do to a centre.
+            assert!((c.0 - d.0).hypot(c.1 - d.1) < 0.02, "{name} frame {}: {c:?} {d:?}", p.index);
+        }
+    }
+}
+
+#[test]
+fn deep_recordings_are_not_squeezed() {
+    if !have_ffmpeg() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let path = encode(folder.path(), "a.mkv", 3, &["-c:v", "ffv1", "-pix_fmt", "gray16le"]);
+    let options = OpenOptions { decoder: Decoder::Opencv, ..OpenOptions::default() };
+    let error = open(path.to_str().unwrap(), &options).err().unwrap().to_string();
+    assert!(error.contains("16 bits") && error.contains("--decoder opencv"), "{error}");
+}
