@@ -37,7 +37,9 @@ from pydpend.errors import (
     TrackerError,
 )
 from pydpend.export import export
+from pydpend.filming import Film, Truth, film
 from pydpend.nodes import Nodes, Rig, read_nodes
+from pydpend.scoring import Score, score
 from pydpend.tracking import NodeRow, Tracker, detect, info, setup, track
 
 __all__ = [
@@ -49,6 +51,7 @@ __all__ = [
     "DetectError",
     "EncoderError",
     "EncoderSignal",
+    "Film",
     "FilmError",
     "FitError",
     "LinkAngles",
@@ -60,18 +63,21 @@ __all__ = [
     "PydpendError",
     "Rig",
     "RigError",
+    "Score",
     "SimulationError",
     "SourceError",
     "Synchronisation",
     "TableError",
     "Tracker",
     "TrackerError",
+    "Truth",
     "angles",
     "calibrate",
     "compare",
     "detect",
     "encoder_angles",
     "export",
+    "film",
     "find_linkage",
     "find_rest",
     "fit_damping",
@@ -81,6 +87,7 @@ __all__ = [
     "read_encoder",
     "read_holds",
     "read_nodes",
+    "score",
     "setup",
     "synchronise",
     "track",

@@ -4,7 +4,7 @@ Shapes: T frames, N nodes. Images are (H, W), uint8 or uint16. What is not seen 
 """
 
 from collections.abc import Callable, Sequence
-from typing import Any, Self, TypeAlias
+from typing import Any, Self, TypeAlias, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,6 +97,54 @@ def read_rig(path: str) -> str:
 
 def rig_toml(rig: str) -> str:
     """A rig's TOML from its JSON."""
+
+@final
+class Film:
+    """A scene ready to be filmed: H x W pixels, T frames, N markers, L links."""
+
+    @staticmethod
+    def read(path: str, motion: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None) -> Film: ...
+    @staticmethod
+    def from_json(
+        scene: str, motion: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+    ) -> Film: ...
+    @staticmethod
+    def preset(name: str, seed: int) -> Film: ...
+    def scene(self) -> str:
+        """The scene as JSON."""
+
+    def rig_toml(self, frame: int) -> str: ...
+    def image(self, frame: int) -> NDArray[Any]:
+        """Recorded levels (H, W), uint8 or uint16."""
+
+    def expected(self, frame: int) -> NDArray[np.float32]:
+        """Expected levels (H, W)."""
+
+    def truth(
+        self,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Times (T,), centres (T, N, 2), visible part (T, N), angles (T, L)."""
+
+    def write(
+        self,
+        output: str,
+        truth: str | None,
+        codec: str | None,
+        quality: int | None,
+        speed: str | None,
+        gray_only: bool,
+        bits: int | None,
+    ) -> None: ...
+
+def score_places(
+    nodes: list[str],
+    frame: NDArray[np.int64],
+    xy_px: NDArray[np.float64],
+    sigma_px: NDArray[np.float32],
+    truth: Film | str,
+    limit_px: float,
+) -> str:
+    """A table's places against the truth, as JSON."""
 
 def simulate_motion(
     model: dict[str, float],

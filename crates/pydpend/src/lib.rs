@@ -4,6 +4,7 @@
 
 mod dynamics;
 mod errors;
+mod film;
 mod images;
 mod live;
 mod settings;
@@ -18,6 +19,8 @@ use pyo3::prelude::*;
 /// The compiled half of pydpend; private.
 #[pymodule]
 mod _tracker {
+    #[pymodule_export]
+    use super::film::{PyFilm, score_places};
     #[pymodule_export]
     use super::live::{LiveTracker, detect};
     #[pymodule_export]

@@ -17,6 +17,7 @@ use serde::Serialize;
 
 use crate::error::{Error, Fault, Result};
 use crate::film::Truth;
+use crate::table::NodeTable;
 
 /// Distance within which a place agrees with a marker, px.
 pub const LIMIT_PX: f64 = 2.0;
@@ -36,6 +37,17 @@ pub struct Tracked {
     pub xy_px: Vec<[f64; 2]>,
     /// Stated standard uncertainties by frame, then node, px; empty if there are none.
     pub sigma_px: Vec<f32>,
+}
+
+impl From<&NodeTable> for Tracked {
+    fn from(table: &NodeTable) -> Self {
+        Self {
+            nodes: table.meta.rig.nodes.iter().map(|n| n.name.clone()).collect(),
+            frames: table.rows.frame.iter().map(|&f| f as u64).collect(),
+            xy_px: table.rows.xy_px.chunks_exact(2).map(|p| [p[0], p[1]]).collect(),
+            sigma_px: table.rows.sigma_px.clone(),
+        }
+    }
 }
 
 /// A tracked node and the true one it stands for.

@@ -130,7 +130,10 @@ impl VideoWriter {
         stream.set_time_base(time_base);
         stream.set_avg_frame_rate(time_base.invert());
         stream.set_rate(time_base.invert());
-        output.write_header().map_err(failed(&name, "writing the header"))?;
+        // No random identifiers and no version: the same film makes the same bytes.
+        let mut exact = Dictionary::new();
+        exact.set("fflags", "+bitexact");
+        output.write_header_with(exact).map_err(failed(&name, "writing the header"))?;
         let stream_time_base = output.stream(0).map_or(time_base, |s| s.time_base());
         Ok(Self {
             name,

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-use crate::{completions, film, info, track};
+use crate::{completions, film, info, score, track};
 
 /// A film of markers on rigid links in; where each marker is in each frame out.
 #[derive(Debug, Parser)]
@@ -21,6 +21,7 @@ enum Command {
     Info(info::Args),
     Track(track::Args),
     Film(film::Args),
+    Score(score::Args),
     Completions(completions::Args),
 }
 
@@ -31,6 +32,7 @@ impl Cli {
             Command::Info(args) => info::run(args),
             Command::Track(args) => track::run(args),
             Command::Film(args) => film::run(args),
+            Command::Score(args) => score::run(args),
             Command::Completions(args) => completions::run(args),
         }
     }

@@ -6,6 +6,7 @@ mod args;
 mod completions;
 mod film;
 mod info;
+mod score;
 mod track;
 mod watch;
 

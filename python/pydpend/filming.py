@@ -1,0 +1,204 @@
+"""The film maker: films of markers on links with known truth, to try a layout, a light and a frame rate.
+
+A scene is a TOML file or the same as a dictionary; ``tracker film --preset clean --print-scene`` prints one with every
+part. The tracker knows no physics: a pendulum's motion comes as times and angles, for example from
+:func:`pydpend.simulate`.
+
+A frame's time is the middle of its exposure. Recorded levels are
+``clip(round(mu + z * sqrt(read_noise**2 + shot_gain * max(mu - black, 0))), 0, top)`` with ``mu`` the expected level
+(:meth:`Film.expected`) and ``z`` independent standard normal numbers, from the seed and the frame's index alone.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pydpend import _tracker
+from pydpend.errors import FilmError, fault
+
+StrPath: TypeAlias = "str | os.PathLike[str]"
+Codec: TypeAlias = Literal["h264", "ffv1", "mjpeg", "raw"]
+
+PRESETS = ("clean", "noisy", "dim", "glints", "late", "dropout", "occluded", "fast")
+"""The scenes that come with the program, by which tracking is judged."""
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What is true of a film of T frames, N markers and L links.
+
+    ``t_s (T,)``: middle of each exposure. ``xy_px (T, N, 2)``: centres in image coordinates (y down), given also where
+    nothing can be seen. ``visible (T, N)``: part of a marker's area that is seen, 0 to 1. ``phi_rad (T, L)``: angles,
+    counter-clockwise positive, 0 hanging down. ``nodes``, ``bodies``: each marker's name and link.
+    """
+
+    t_s: NDArray[np.float64]
+    xy_px: NDArray[np.float64]
+    visible: NDArray[np.float64]
+    phi_rad: NDArray[np.float64]
+    nodes: tuple[str, ...]
+    bodies: tuple[str, ...]
+
+
+class Film:
+    """A scene ready to be filmed; nothing in it changes.
+
+    ``scene``: a TOML file's path, a dictionary of the same form, or the name of a preset.
+    ``motion``: times (T,) in s and angles (T, L) in rad of the links in the scene's order, counter-clockwise positive,
+    0 hanging down, or anything with ``t_s`` and ``phi_rad`` (a simulation, link angles); its first time is frame 0.
+    ``seed``, ``frames``, ``rate_hz``: replace the scene's.
+
+    Raises :class:`pydpend.FilmError` for a scene that makes no sense, naming line or key, or a motion too short.
+    """
+
+    def __init__(
+        self,
+        scene: StrPath | Mapping[str, Any],
+        *,
+        motion: Any = None,
+        seed: int | None = None,
+        frames: int | None = None,
+        rate_hz: float | None = None,
+    ) -> None:
+        moving = _motion(motion)
+        changes = {
+            key: value
+            for key, value in (("seed", seed), ("frames", frames), ("rate_hz", rate_hz))
+            if value is not None
+        }
+        if isinstance(scene, Mapping):
+            self._film = _tracker.Film.from_json(json.dumps({**scene, **changes}), moving)
+            return
+        if str(scene) in PRESETS:
+            self._film = _tracker.Film.preset(str(scene), seed or 0)
+        else:
+            # A motion that is given here may stand for a scene that is not complete without one.
+            self._film = _tracker.Film.read(os.fspath(scene), moving)
+        if changes or (moving is not None and str(scene) in PRESETS):
+            self._film = _tracker.Film.from_json(json.dumps({**self.scene, **changes}), moving)
+
+    @property
+    def scene(self) -> dict[str, Any]:
+        """The scene, with all that was left out filled in."""
+        scene: dict[str, Any] = json.loads(self._film.scene())
+        return _without_none(scene)
+
+    def image(self, frame: int) -> NDArray[np.uint8] | NDArray[np.uint16]:
+        """The recorded levels of a frame, (H, W); uint8 up to 8 bits, else uint16."""
+        image: NDArray[np.uint8] | NDArray[np.uint16] = self._film.image(frame)
+        return image
+
+    def expected(self, frame: int) -> NDArray[np.float32]:
+        """The expected levels of a frame, (H, W): no noise, no rounding, no saturation."""
+        return self._film.expected(frame)
+
+    def truth(self) -> Truth:
+        """What is true of every frame."""
+        time, xy, visible, phi = self._film.truth()
+        markers = self.scene.get("marker", [])
+        return Truth(
+            time,
+            xy,
+            visible,
+            phi,
+            nodes=tuple(m["name"] for m in markers),
+            bodies=tuple(m["link"] for m in markers),
+        )
+
+    def rig_toml(self, frame: int = 0) -> str:
+        """The rig file as a perfect ``tracker setup`` would write it from ``frame``."""
+        return self._film.rig_toml(frame)
+
+    def write(
+        self,
+        output: StrPath,
+        truth: StrPath | None = None,
+        *,
+        codec: Codec | None = None,
+        quality: int | None = None,
+        speed: str | None = None,
+        gray_only: bool = False,
+        bits: int | None = None,
+    ) -> None:
+        """Writes the film and, if wanted, its truth (.parquet or .csv, a row per frame and marker).
+
+        The ending of ``output`` decides the form: .mp4 .mov .mkv .avi, .mraw (with its .cih), .tif (pages), .y4m, or
+        numbered images as in ``frames/%05d.png``. ``quality``: H.264's rate factor 0 to 51 or MJPEG's 1 to 31.
+        ``bits``: of a .mraw, 8, 10, 12 or 16.
+
+        Raises :class:`pydpend.FilmError` if the form cannot hold the film or cannot be written.
+        """
+        self._film.write(
+            os.fspath(output),
+            None if truth is None else os.fspath(truth),
+            codec,
+            quality,
+            speed,
+            gray_only,
+            bits,
+        )
+
+
+def film(
+    scene: StrPath | Mapping[str, Any],
+    output: StrPath,
+    truth: StrPath | None = None,
+    motion: Any = None,
+    *,
+    seed: int | None = None,
+    frames: int | None = None,
+    rate_hz: float | None = None,
+    codec: Codec | None = None,
+    quality: int | None = None,
+    speed: str | None = None,
+    gray_only: bool = False,
+    bits: int | None = None,
+) -> Film:
+    """Films a scene into a file; see :class:`Film` and :meth:`Film.write`. Returns the film, which knows its truth."""
+    made = Film(scene, motion=motion, seed=seed, frames=frames, rate_hz=rate_hz)
+    made.write(output, truth, codec=codec, quality=quality, speed=speed, gray_only=gray_only, bits=bits)
+    return made
+
+
+def _motion(motion: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+    """Times (T,) and angles (T, L) of whatever moves."""
+    if motion is None:
+        return None
+    pair: tuple[ArrayLike, ArrayLike]
+    if hasattr(motion, "t_s") and hasattr(motion, "phi_rad"):
+        pair = (motion.t_s, motion.phi_rad)
+    else:
+        try:
+            first, second = motion
+        except (TypeError, ValueError):
+            raise FilmError(
+                fault("motion", "it is not times and angles", "Give (t_s, phi_rad) or a simulation")
+            ) from None
+        pair = (first, second)
+    t_s = np.ascontiguousarray(pair[0], dtype=np.float64)
+    phi_rad = np.ascontiguousarray(pair[1], dtype=np.float64)
+    if t_s.ndim != 1 or phi_rad.ndim != 2 or len(t_s) != len(phi_rad):
+        raise FilmError(
+            fault(
+                "motion",
+                f"times of shape {t_s.shape} and angles of shape {phi_rad.shape} do not go together",
+                "Give t_s (T,) and phi_rad (T, L)",
+            )
+        )
+    return t_s, phi_rad
+
+
+def _without_none(value: Any) -> Any:
+    """Leaves out keys without a value, as TOML does."""
+    if isinstance(value, dict):
+        return {key: _without_none(v) for key, v in value.items() if v is not None}
+    if isinstance(value, list):
+        return [_without_none(v) for v in value]
+    return value
