@@ -18,7 +18,7 @@ HELD_RAD_S = 1.0
 HELD_S = 0.1
 RELEASED_RAD_S = 4.0
 """Rate at which a held link has been let go."""
-SETTLE_S = 0.4
+SETTLE_S = 1.0
 """What is left out after a release by hand: the hand's last touch, and the first instants near the unstable
 equilibrium, which no initial state describes."""
 REST_RAD = np.radians(1.5)

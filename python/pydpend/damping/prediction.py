@@ -18,12 +18,14 @@ from pydpend.damping import shooting
 from pydpend.damping.maps import Maps, corrected
 from pydpend.damping.result import DampingFit, clean
 from pydpend.damping.shooting import Segments, Track
-from pydpend.damping.trajectory import SEGMENT_S, Recording
+from pydpend.damping.trajectory import Recording
 from pydpend.errors import FitError, fault
 
 Floats = NDArray[np.float64]
 
 WINDOWS_S = (0.5, 1.0, 2.0)
+PIECE_S = 0.25
+"""Pieces a window is shot over before it becomes one motion."""
 PAST_S = 0.5
 """Length of the past a forecast's state is fitted to."""
 NO_SLACK = 1e-3
@@ -97,7 +99,7 @@ def predict(
     """Predicts a recording with given parameters of the motion. Raises FitError when no window fits into
     it."""
     track = recording.track if maps is None else corrected([recording.track], maps)[0]
-    base = shooting.cut([track], [recording.span], SEGMENT_S)
+    base = shooting.cut([track], [recording.span], PIECE_S)
     if len(base) == 0:
         raise FitError(
             fault(recording.angles.name, "no segment has enough samples", "Give angles with fewer gaps")
@@ -110,7 +112,7 @@ def predict(
     in_window: dict[str, Window] = {}
     rows: dict[str, Floats] = {}
     for window in windows_s:
-        size = max(1, round(window / SEGMENT_S))
+        size = max(1, round(window / PIECE_S))
         errors, start = _windows(track, base, parameters, zeros, size)
         if start.size:
             in_window[f"{window:g}"] = _summary(errors)
@@ -224,7 +226,7 @@ def _forecast(
     track: Track, base: Segments, parameters: dict[str, float], zeros: Floats, ahead_s: float
 ) -> tuple[_Errors, Floats]:
     """Errors from the end of each stretch of the past to ``ahead_s`` later; zeros are given."""
-    size = max(1, round(PAST_S / SEGMENT_S))
+    size = max(1, round(PAST_S / PIECE_S))
     chains = base.grouped(size)
     if len(chains) == 0:
         return _Errors(np.zeros((0, 2)), np.zeros((0, 2))), np.zeros(0)

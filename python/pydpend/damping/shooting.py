@@ -88,12 +88,26 @@ class Solution:
         return float(self.squares.sum()) / max(freedom, 1.0)
 
 
+GAP_S = 0.2
+"""A segment with a longer gap than this in either link is left out: the motion on the other side of the gap is not
+known well enough to start from."""
+
+
+def _longest_gap(t_s: Floats, phi_rad: Floats) -> float:
+    """Longest time between neighbouring samples in which either link was seen, s."""
+    gaps = [np.diff(t_s[np.isfinite(column)]).max(initial=0.0) for column in phi_rad.T]
+    return float(max(gaps))
+
+
 def cut(
     tracks: Sequence[Track], spans: Sequence[tuple[float, float]], length_s: float, chained: bool = True
 ) -> Segments:
     """Segments of about ``length_s`` over each recording's span, with states from local cubics."""
     rows, times, states = _tracker.shooting_segments(tracks, spans, length_s, chained)
     good: NDArray[np.bool_] = np.asarray(np.isfinite(states).all(axis=1))
+    good &= np.array(
+        [_longest_gap(tracks[r][0][a:b], tracks[r][1][a:b]) <= GAP_S for r, a, b, _ in rows], dtype=bool
+    )
     segments = Segments(rows, times, states)
     if not good.all():
         rows = rows.copy()

@@ -23,7 +23,9 @@ from pydpend.model import Model
 
 Floats = NDArray[np.float64]
 
-SEGMENT_S = 0.25
+SEGMENT_S = 1.0
+"""Length of the segments. On the paper's trials one second makes the trials' coefficients agree better and
+predicts 2-s windows of the other trial better than 0.25 or 0.5 s (docs/validation.md)."""
 FLOOR = 0.02
 """Smallest slack, relative to what a segment's own samples determine its state to: information is then
 shared over 1/0.02 = 50 segments, and a coefficient's error is within a percent of that with none."""
@@ -155,7 +157,9 @@ def _refuse(recordings: Sequence[Recording], model: Model, first_s: float | None
 
 def _segments(recordings: Sequence[Recording], tracks: Sequence[Track], segment_s: float) -> Segments:
     longest = max(float(np.median(np.diff(r.angles.t_s))) for r in recordings)
-    segment_s = max(segment_s, 12 * longest)
+    shortest = min(r.span[1] - r.span[0] for r in recordings)
+    # A short motion is cut finer, so that the joints still say how well it is described.
+    segment_s = max(min(segment_s, shortest / 12), 12 * longest)
     segments = shooting.cut(tracks, [r.span for r in recordings], segment_s)
     if len(segments) < 4:
         raise FitError(

@@ -1,0 +1,67 @@
+"""The issue's table of accuracies over seeds held back (0-19): ``python -m tests.validate_damping CASE [SEEDS]``.
+
+Cases: exact, energy, inertias (true inertias), ratios (inertias up to 2 % off), slow (500 fps, 0.1 deg), all (every
+law). Prints each seed's worst relative error, and over all how often 95 % intervals hold the truth. Not run by pytest.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+
+import numpy as np
+from pydpend import energy
+from pydpend.damping import fit_damping
+from pydpend.model import derived
+
+from tests.free_decays import ALL_TERMS, TRUTH, measured, released
+
+RATIOS = {"lambda": "lambda_kg_m2", "sigma": "sigma_j", "kappa": "kappa_j", "a3": "a3_kg_m2"}
+
+
+def main(case: str, seeds: int) -> None:
+    """Runs one case and prints."""
+    true = derived("A")
+    truth = ALL_TERMS if case == "all" else TRUTH
+    inside, z, worst, ratio_ppm = [], [], [], []
+    for seed in range(seeds):
+        motion = released(seed, 60.0, 500.0 if case == "slow" else 1000.0, truth)
+        if case == "exact":
+            fit = energy.fit_profiles([energy.energy_profile(motion, true, "paper")])
+            errors = {n: v / getattr(truth, n) - 1 for n, v in zip(fit.names, fit.values, strict=True)}
+            print(seed, {n: f"{100 * e:+.4f} %" for n, e in errors.items()})
+            continue
+        angles = measured(motion, seed, 0.1 if case == "slow" else 0.05)
+        model = true
+        if case == "ratios":
+            factor = 1 + np.random.default_rng([seed, 3]).uniform(-0.02, 0.02, 4)
+            model = replace(
+                true, **{f: getattr(true, f) * float(k) for f, k in zip(RATIOS.values(), factor, strict=True)}
+            )
+        result = fit_damping(
+            angles,
+            model,
+            "energy" if case == "energy" else "trajectory",
+            "full" if case == "all" else "paper",
+            ratios=case in ("ratios", "all"),
+        )
+        error = {n: 100 * (e.value / getattr(truth, n) - 1) for n, e in result.coefficients.items()}
+        score = [(e.value - getattr(truth, n)) / e.sigma for n, e in result.coefficients.items()]
+        ppm = [
+            1e6 * (e.value * true.psi_kg_m2 / getattr(true, RATIOS[n]) - 1) for n, e in result.ratios.items()
+        ]
+        worst.append(max(error.values(), key=abs))
+        z += score
+        inside += [abs(s) < 1.96 for s in score]
+        ratio_ppm.append(float(np.abs(ppm).max()))
+        words = ", ".join(f"{n} {e:+.2f} %" for n, e in error.items())
+        print(f"{seed}: chi2 {result.chi2:.4f}; {words}; ratios within {ratio_ppm[-1]:.1f} ppm", flush=True)
+    if z:
+        print(
+            f"{case}: worst {max(np.abs(worst)):.2f} %, ratios {max(ratio_ppm):.1f} ppm, largest |z| "
+            f"{np.abs(z).max():.2f}, 95 % intervals hold {100 * np.mean(inside):.1f} % of {len(z)}"
+        )
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], int(sys.argv[2]) if len(sys.argv) > 2 else 20)
