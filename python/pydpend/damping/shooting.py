@@ -93,9 +93,12 @@ GAP_S = 0.2
 known well enough to start from."""
 
 
-def _longest_gap(t_s: Floats, phi_rad: Floats) -> float:
-    """Longest time between neighbouring samples in which either link was seen, s."""
-    gaps = [np.diff(t_s[np.isfinite(column)]).max(initial=0.0) for column in phi_rad.T]
+def _longest_gap(t_s: Floats, phi_rad: Floats, edges_s: Floats) -> float:
+    """Longest time between neighbouring samples (and edges) in which either link was not seen, s."""
+    gaps = [
+        np.diff(np.concatenate([edges_s[:1], t_s[np.isfinite(column)], edges_s[1:]])).max()
+        for column in phi_rad.T
+    ]
     return float(max(gaps))
 
 
@@ -105,13 +108,13 @@ def cut(
     """Segments of about ``length_s`` over each recording's span, with states from local cubics."""
     rows, times, states = _tracker.shooting_segments(tracks, spans, length_s, chained)
     good: NDArray[np.bool_] = np.asarray(np.isfinite(states).all(axis=1))
-    good &= np.array(
-        [_longest_gap(tracks[r][0][a:b], tracks[r][1][a:b]) <= GAP_S for r, a, b, _ in rows], dtype=bool
-    )
+    for k, (r, first, last, _) in enumerate(rows.tolist()):
+        t, phi, _ = tracks[r]
+        good[k] &= _longest_gap(t[first:last], phi[first:last], times[k]) <= GAP_S
     segments = Segments(rows, times, states)
     if not good.all():
         rows = rows.copy()
-        for k in np.flatnonzero(~good):
+        for k in np.flatnonzero(~good).tolist():
             if k > 0:
                 rows[k - 1, 3] = 0
         segments = Segments(rows, times, states).take(good)
