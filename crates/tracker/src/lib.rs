@@ -15,6 +15,7 @@ pub mod discover;
 pub mod error;
 pub mod film;
 pub mod frame;
+pub mod overlay;
 pub mod pipeline;
 pub mod rig;
 pub mod score;

@@ -9,7 +9,7 @@
 use nalgebra::{Isometry2, Vector2};
 
 use super::sample::Sample;
-use crate::detect::Detection;
+use crate::detect::{Detection, Flags};
 use crate::track::constellation::{Search, Sighting};
 use crate::track::mechanism::Link;
 use crate::track::nearest::Sky;
@@ -38,6 +38,8 @@ pub fn link_of(points: Vec<Vector2<f64>>, slack_px: f64) -> Link {
     Link {
         nodes: (0..points.len()).collect(),
         slack_px: vec![slack_px; points.len()],
+        whole_px: vec![0.0; points.len()],
+        area_px: vec![(0.0, 0.0); points.len()],
         template: points.iter().map(|p| p - home).collect(),
         home,
     }
@@ -175,8 +177,16 @@ pub fn find_bodies(sample: &Sample) -> Vec<Link> {
     links
 }
 
+fn looks_whole(d: &Detection) -> bool {
+    !d.flags.has(Flags::MERGED | Flags::PARTIAL | Flags::BORDER)
+}
+
 /// Adds to each body the points that stay with it in several frames, and drops nodes that are never seen.
 fn complete(links: &mut Vec<Link>, sample: &Sample) {
+    let mut areas: Vec<f32> = sample.moving.iter().flatten().map(|d| d.area_px).collect();
+    areas.sort_by(f32::total_cmp);
+    let usual = areas.get(areas.len() / 2).copied().unwrap_or(0.0);
+    let apart_px = (1.3 * (f64::from(usual) / std::f64::consts::PI).sqrt()).max(3.0);
     for _ in 0..4 {
         let mut local: Vec<Vec<Vec<Vector2<f64>>>> =
             links.iter().map(|l| vec![Vec::new(); l.nodes.len()]).collect();
@@ -200,7 +210,7 @@ fn complete(links: &mut Vec<Link>, sample: &Sample) {
                     }
                 }
                 for (d, used) in used.iter().enumerate() {
-                    if !used {
+                    if !used && looks_whole(&frame[d]) {
                         spare[b].push((f, place(&back, at(&frame[d]))));
                     }
                 }
@@ -209,18 +219,18 @@ fn complete(links: &mut Vec<Link>, sample: &Sample) {
         let mut changed = false;
         for (b, link) in links.iter_mut().enumerate() {
             let mut points: Vec<Vector2<f64>> = Vec::new();
-            for (j, seen) in local[b].iter().enumerate() {
+            for seen in &local[b] {
                 if seen.len() * 50 >= known[b] && seen.len() >= 3 {
                     points.push(middle(seen));
                 } else {
                     changed = true;
-                    let _ = j;
                 }
             }
             let before = points.len();
             let least = (known[b] / 25).max(6);
             for p in crowds(&spare[b], least) {
-                if points.iter().all(|q| (p - q).norm() > 3.0) {
+                // The rest of a half hidden marker, within a radius of its centre, is no marker of its own.
+                if points.iter().all(|q| (p - q).norm() > apart_px) {
                     points.push(p);
                 }
             }

@@ -77,6 +77,11 @@ impl Search<'_> {
         (own * own + self.link.slack_px[j].powi(2) + self.floor_px.powi(2)).sqrt()
     }
 
+    /// Whether detection `d` is the whole of node `j`, as far as its picture tells.
+    fn whole(&self, j: usize, d: usize) -> bool {
+        self.sky.whole(d) && self.sky.get(d).area_px >= self.link.whole_px[j]
+    }
+
     fn usual_sigma(&self, j: usize) -> f64 {
         let mut own = 0.0_f64;
         for d in 0..self.sky.len() {
@@ -149,7 +154,7 @@ impl Search<'_> {
                 let s = self.sigma(j, d);
                 if r > self.reach_sigma * s {
                     *pick = None;
-                } else if self.sky.whole(d) {
+                } else if self.whole(j, d) {
                     support += 1;
                     chi2 += (r / s).powi(2);
                 }
@@ -172,7 +177,7 @@ impl Search<'_> {
             .collect();
         for (j, pick) in picks.iter().enumerate() {
             if let Some(d) = *pick
-                && self.sky.whole(d)
+                && self.whole(j, d)
             {
                 let sigma_px = self.sigma(j, d);
                 pairs.push(Pair { local: self.link.template[j], place: self.sky.place(d), sigma_px });
@@ -233,7 +238,7 @@ impl Search<'_> {
                 }
                 for &d in &near {
                     let ray = self.sky.place(d) - a.place;
-                    if !self.free[d] || !self.sky.whole(d) || (ray.norm() - radius).abs() > reach {
+                    if !self.free[d] || !self.whole(j, d) || (ray.norm() - radius).abs() > reach {
                         continue;
                     }
                     let angle = ray.y.atan2(ray.x) - arm.y.atan2(arm.x);

@@ -18,13 +18,13 @@ const LEAST_SLACK_PX: f64 = 0.02;
 /// Seen places of one node in its body's coordinates.
 #[derive(Debug, Clone, Default)]
 struct Samples {
-    at: Vec<(Vector2<f64>, f64)>,
+    at: Vec<(Vector2<f64>, f64, f64)>,
     every: usize,
     count: usize,
 }
 
 impl Samples {
-    fn add(&mut self, local: Vector2<f64>, sigma_px: f64) {
+    fn add(&mut self, local: Vector2<f64>, sigma_px: f64, area_px: f64) {
         self.every = self.every.max(1);
         if self.count.is_multiple_of(self.every) {
             if self.at.len() == SAMPLES {
@@ -35,7 +35,7 @@ impl Samples {
                 });
                 self.every *= 2;
             }
-            self.at.push((local, sigma_px));
+            self.at.push((local, sigma_px, area_px));
         }
         self.count += 1;
     }
@@ -86,7 +86,7 @@ impl Lessons {
                     && sky.whole(d)
                 {
                     let local = place(&pose.inverse(), sky.place(d));
-                    sample.add(local, f64::from(sky.get(d).sigma_px));
+                    sample.add(local, f64::from(sky.get(d).sigma_px), f64::from(sky.get(d).area_px));
                 }
             }
         }
@@ -124,6 +124,13 @@ impl Lessons {
                 // The median of a Rayleigh square is 2 ln 2 of the variance of one coordinate.
                 let scatter = median(&mut square).unwrap_or(0.0) / (2.0 * std::f64::consts::LN_2);
                 let explained = median(&mut own).unwrap_or(0.0);
+                // Areas change with blur and noise, so the limit is below what is usual by four times their scatter.
+                let mut area: Vec<f64> = s.at.iter().map(|p| p.2).collect();
+                let usual = median(&mut area).unwrap_or(0.0);
+                let mut off: Vec<f64> = area.iter().map(|a| (a - usual).abs()).collect();
+                let scatter_px = 1.48 * median(&mut off).unwrap_or(0.0);
+                link.whole_px[j] = (usual - (4.0 * scatter_px).max(0.08 * usual)).max(0.0) as f32;
+                link.area_px[j] = (usual, scatter_px);
                 link.template[j] = centre;
                 link.slack_px[j] = (scatter - explained).max(0.0).sqrt().max(LEAST_SLACK_PX);
             }

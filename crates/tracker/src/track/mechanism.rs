@@ -16,6 +16,10 @@ pub struct Link {
     pub template: Vec<Vector2<f64>>,
     /// Standard uncertainty of each template place, px: what the detections' own does not explain.
     pub slack_px: Vec<f64>,
+    /// Least area of a whole marker, px; 0 where nothing is known of it. Smaller ones are half hidden.
+    pub whole_px: Vec<f32>,
+    /// Usual area of a marker and its scatter, px; 0 where nothing is known of it.
+    pub area_px: Vec<(f64, f64)>,
     /// Origin in the reference frame, px.
     pub home: Vector2<f64>,
 }
@@ -68,7 +72,9 @@ impl Mechanism {
                 let home = nodes.iter().map(|&i| at(i)).sum::<Vector2<f64>>() / nodes.len().max(1) as f64;
                 let template = nodes.iter().map(|&i| at(i) - home).collect();
                 let slack_px = vec![slack_px; nodes.len()];
-                Link { nodes, template, slack_px, home }
+                let whole_px = vec![0.0; nodes.len()];
+                let area_px = vec![(0.0, 0.0); nodes.len()];
+                Link { nodes, template, slack_px, whole_px, area_px, home }
             })
             .collect();
         let mut hinges = Vec::new();

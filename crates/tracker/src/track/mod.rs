@@ -7,6 +7,7 @@ pub mod joints;
 pub mod learn;
 pub mod mechanism;
 pub mod nearest;
+pub mod partly;
 pub mod predict;
 pub mod recording;
 pub mod rigid;

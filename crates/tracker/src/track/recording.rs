@@ -8,8 +8,9 @@ use super::Observation;
 use super::learn::Lessons;
 use super::mechanism::Mechanism;
 use super::nearest::Sky;
+use super::partly::Partly;
 use super::predict::Motion;
-use super::tracker::{BodySeen, Engine, Habits, Returns, observations};
+use super::tracker::{BodySeen, Engine, Habits, Returns, observations, partly};
 use crate::detect::Detection;
 use crate::error::Result;
 use crate::rig::Rig;
@@ -51,6 +52,7 @@ pub fn track_recording(store: &DetectionStore, rig: &Rig, sink: &mut Sink<'_>) -
     let habits = Habits::unknown(&mechanism, 0.05);
     let n = mechanism.nodes;
     let mut out = Output {
+        partly: Partly::default(),
         returns: Returns::new(n),
         summary: TrackSummary {
             seen: vec![0; n],
@@ -89,6 +91,7 @@ pub fn track_recording(store: &DetectionStore, rig: &Rig, sink: &mut Sink<'_>) -
     while let Some(p) = after.pending.pop_front() {
         out.write(store, &after.engine.mechanism, p, sink)?;
     }
+    out.hand_out(true, sink)?;
     Ok(out.summary)
 }
 
@@ -140,6 +143,7 @@ fn start_frame(store: &DetectionStore, rig: &Rig) -> usize {
 }
 
 struct Output {
+    partly: Partly,
     returns: Returns,
     summary: TrackSummary,
     scratch: Vec<Detection>,
@@ -155,17 +159,25 @@ impl Output {
     ) -> Result<()> {
         let i = (p.stamp.index - store.stamp(0).index) as usize;
         store.read(i, &mut self.scratch);
-        let mut row = observations(mechanism, &p.seen, &self.scratch);
-        self.returns.mark(&mut row);
-        let s = &mut self.summary;
-        s.frames += 1;
-        for (k, o) in row.iter().enumerate() {
-            let seen = o.x_px.is_finite();
-            s.seen[k] += u64::from(seen);
-            s.ambiguous[k] += u64::from(o.status == super::Status::Ambiguous);
-            s.seen_last[k] = seen;
+        let row = observations(mechanism, &p.seen, &self.scratch);
+        self.partly.push(p.stamp, row, &partly(mechanism, &p.seen));
+        self.hand_out(false, sink)
+    }
+
+    fn hand_out(&mut self, end: bool, sink: &mut Sink<'_>) -> Result<()> {
+        while let Some((stamp, mut row)) = self.partly.pop(end) {
+            self.returns.mark(&mut row);
+            let s = &mut self.summary;
+            s.frames += 1;
+            for (k, o) in row.iter().enumerate() {
+                let seen = o.x_px.is_finite();
+                s.seen[k] += u64::from(seen);
+                s.ambiguous[k] += u64::from(o.status == super::Status::Ambiguous);
+                s.seen_last[k] = seen;
+            }
+            sink(&stamp, &row)?;
         }
-        sink(&p.stamp, &row)
+        Ok(())
     }
 }
 
@@ -254,6 +266,7 @@ impl<'a> Pass<'a> {
                 // Other open bodies are not the question now.
                 if o != b && s.fit.is_none() {
                     s.picks = vec![None; s.picks.len()];
+                    s.beside = vec![None; s.picks.len()];
                 }
             }
             let seen = engine.step_one(b, i, &sky, &known);

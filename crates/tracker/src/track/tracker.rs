@@ -18,6 +18,17 @@ use crate::error::{Error, Fault, Result};
 use crate::rig::Rig;
 use crate::store::FrameStamp;
 
+/// The visible part of a half hidden marker.
+#[derive(Debug, Clone, Copy)]
+pub struct Beside {
+    /// The detection.
+    pub detection: usize,
+    /// Where the body says the marker's centre is, px.
+    pub place: Vector2<f64>,
+    /// How far the detection's centre is from it, px.
+    pub off_px: f32,
+}
+
 /// What a frame says about one body.
 #[derive(Debug, Clone, Default)]
 pub struct BodySeen {
@@ -27,6 +38,15 @@ pub struct BodySeen {
     pub picks: Vec<Option<usize>>,
     /// For each node of the body whether something seen may be it.
     pub open: Vec<bool>,
+    /// For each node of the body a detection beside its place, as a half hidden marker's is. No part of the pose.
+    pub beside: Vec<Option<Beside>>,
+}
+
+impl BodySeen {
+    /// Detections that are nodes of the body.
+    pub fn detections(&self) -> impl Iterator<Item = usize> {
+        self.picks.iter().flatten().copied().chain(self.beside.iter().flatten().map(|b| b.detection))
+    }
 }
 
 /// Deviations up to which a detection agrees with its node. With nine nodes and 1e5 frames a true one is lost to
@@ -44,8 +64,16 @@ const TENTATIVE: usize = 8;
 const PROOF_PX: f64 = 3.0;
 /// How exactly the only node seen of a body must be expected, px.
 const LONE_GATE_PX: f64 = 1.5;
-/// Poses that put every node closer together than this are the same, px.
-const SAME_POSE_PX: f64 = 1.5;
+/// Poses that put every node closer together than this give the same names, px: a half hidden marker shifts a
+/// pose by less.
+const SAME_POSE_PX: f64 = 5.0;
+/// How far the centre of a marker that is at least half seen may be from the marker's, in radii: that of half a
+/// disc is 0.42 from its centre.
+const BESIDE_RADII: f64 = 0.5;
+/// The same where the marker's size is not known, px.
+const BESIDE_PX: f64 = 2.0;
+/// How well a node's place must be known for a detection beside it to be its, px.
+const FIRM_PX: f64 = 0.3;
 
 /// What was learned of a recording's motion and clutter.
 #[derive(Debug, Clone)]
@@ -164,8 +192,8 @@ impl Engine {
         };
         let mut free = vec![true; sky.len()];
         for s in &seen {
-            for d in s.picks.iter().flatten() {
-                free[*d] = false;
+            for d in s.detections() {
+                free[d] = false;
             }
         }
         let given: Vec<bool> = seen.iter().map(|s| s.fit.is_some()).collect();
@@ -208,6 +236,9 @@ impl Engine {
                 settled[b] = true;
             }
         }
+        for &b in self.mechanism.order.iter().filter(|&&b| !given[b]) {
+            self.look_beside(b, sky, &mut free, &mut seen[b]);
+        }
         for b in 0..n {
             if let Some(f) = &seen[b].fit
                 && !given[b]
@@ -217,6 +248,37 @@ impl Engine {
             }
         }
         seen
+    }
+
+    /// Finds half hidden markers: where a body's pose is firm, the detection beside the place of a node not seen.
+    fn look_beside(&self, b: usize, sky: &Sky<'_>, free: &mut [bool], seen: &mut BodySeen) {
+        let Some(fit) = &seen.fit else { return };
+        let link = &self.mechanism.links[b];
+        for j in 0..link.nodes.len() {
+            let local = link.template[j];
+            if seen.picks[j].is_some() || fit.sigma_at(local) > FIRM_PX {
+                continue;
+            }
+            let there = place(&fit.pose, local);
+            let (usual, scatter) = link.area_px[j];
+            let radius = (usual / std::f64::consts::PI).sqrt();
+            let limit = if usual > 0.0 { BESIDE_RADII * radius } else { BESIDE_PX };
+            let Some((d, r)) = sky.nearest(there, limit) else { continue };
+            // The more is hidden, the farther off is the rest: what is whole is not beside.
+            let part = &sky.get(d);
+            let hidden = (1.0 - (f64::from(part.area_px) - 3.0 * scatter) / usual).max(0.0);
+            let most = radius * (1.1 * hidden + 0.1) + 4.0 * f64::from(part.sigma_px);
+            let off = usual == 0.0 || r <= most;
+            let nearer = link
+                .template
+                .iter()
+                .enumerate()
+                .any(|(k, &t)| k != j && (place(&fit.pose, t) - sky.place(d)).norm() < r);
+            if free[d] && off && !nearer {
+                free[d] = false;
+                seen.beside[j] = Some(Beside { detection: d, place: there, off_px: r as f32 });
+            }
+        }
     }
 
     /// Carries on the sightings of a body that nothing decided yet, and begins new ones; the one that stands, if
@@ -319,13 +381,14 @@ impl Engine {
         let mut free = vec![true; sky.len()];
         for (o, s) in known.iter().enumerate() {
             if o != b && s.fit.is_some() {
-                for d in s.picks.iter().flatten() {
-                    free[*d] = false;
+                for d in s.detections() {
+                    free[d] = false;
                 }
             }
         }
         let anchors = self.anchors(b, known);
-        let got = self.find(b, time, sky, &free, &anchors).seen;
+        let mut got = self.find(b, time, sky, &free, &anchors).seen;
+        self.look_beside(b, sky, &mut free, &mut got);
         if let Some(f) = &got.fit {
             self.motions[b].add(time, f);
         }
@@ -334,7 +397,8 @@ impl Engine {
 
     fn find(&self, b: usize, time: f64, sky: &Sky<'_>, free: &[bool], anchors: &[Anchor]) -> Finding {
         let n = self.mechanism.links[b].nodes.len();
-        let nothing = |open: Vec<bool>| BodySeen { fit: None, picks: vec![None; n], open };
+        let nothing =
+            |open: Vec<bool>| BodySeen { fit: None, picks: vec![None; n], open, beside: vec![None; n] };
         let mut open = vec![false; n];
         if sky.is_empty() {
             return Finding { seen: nothing(open), undecided: Vec::new() };
@@ -472,7 +536,7 @@ impl Engine {
 }
 
 fn accepted(s: Sighting, n: usize) -> BodySeen {
-    BodySeen { fit: Some(s.fit), picks: s.picks, open: vec![false; n] }
+    BodySeen { fit: Some(s.fit), picks: s.picks, open: vec![false; n], beside: vec![None; n] }
 }
 
 fn choose(n: usize, k: usize) -> f64 {
@@ -525,16 +589,41 @@ pub fn observations(mechanism: &Mechanism, seen: &[BodySeen], sky: &[Detection])
         for (j, &node) in link.nodes.iter().enumerate() {
             if let Some(Some(d)) = s.picks.get(j) {
                 let d = &sky[*d];
+                // A marker half hidden may agree by chance; its own uncertainty is that of a whole one.
+                let doubt = d.flags.has(Flags::PARTIAL | Flags::MERGED | Flags::BORDER)
+                    || d.area_px < link.whole_px[j];
                 out[node] = Observation {
                     x_px: d.x_px,
                     y_px: d.y_px,
-                    sigma_px: d.sigma_px,
+                    sigma_px: if doubt { d.sigma_px.hypot(0.2) } else { d.sigma_px },
+                    area_px: d.area_px,
+                    status: Status::Seen,
+                };
+            } else if let Some(Some(b)) = s.beside.get(j) {
+                let d = &sky[b.detection];
+                // The blob only shows that the marker is there: its centre is where the body says. What is given
+                // as uncertainty is the blob's whole disagreement, so that no fit gains from it.
+                out[node] = Observation {
+                    x_px: b.place.x,
+                    y_px: b.place.y,
+                    sigma_px: d.sigma_px.hypot(b.off_px),
                     area_px: d.area_px,
                     status: Status::Seen,
                 };
             } else if s.open.get(j) == Some(&true) {
                 out[node].status = Status::Ambiguous;
             }
+        }
+    }
+    out
+}
+
+/// For each node of the rig whether only a part of it is seen.
+pub fn partly(mechanism: &Mechanism, seen: &[BodySeen]) -> Vec<bool> {
+    let mut out = vec![false; mechanism.nodes];
+    for (link, s) in mechanism.links.iter().zip(seen) {
+        for (&node, b) in link.nodes.iter().zip(&s.beside) {
+            out[node] = b.is_some();
         }
     }
     out
@@ -551,6 +640,11 @@ impl Returns {
     /// No frame yet.
     pub fn new(nodes: usize) -> Self {
         Self { past: vec![(false, false); nodes] }
+    }
+
+    /// Whether a node was seen in the last frame.
+    pub fn in_last(&self, node: usize) -> bool {
+        self.past[node].1
     }
 
     /// Marks one frame's nodes; frames must come in order.
@@ -607,6 +701,12 @@ impl Tracker {
         let sky = Sky::new(detections);
         let seen = self.engine.step(stamp.index as f64, &sky, None);
         let mut row = observations(&self.engine.mechanism, &seen, detections);
+        for (k, partly) in partly(&self.engine.mechanism, &seen).into_iter().enumerate() {
+            // Live, a part is believed only if the marker was seen in the frame before.
+            if partly && !self.returns.in_last(k) {
+                row[k] = Observation::MISSING;
+            }
+        }
         self.returns.mark(&mut row);
         Ok(row)
     }
