@@ -1,20 +1,26 @@
 //! The recording with nodes, names, bodies, trails and gaps drawn into it, as pictures.
 //!
-//! Owns: [`Overlay`], [`still`]. Must not: decode or encode film, or track: it draws what a table says.
+//! Owns: [`Overlay`], [`still`], [`film`]. Must not: track: it draws what a table says.
 //!
 //! Every stroke has a dark rim, so that it is read on bright and on dark ground.
 
 use std::collections::VecDeque;
+use std::path::Path;
+use std::sync::Arc;
 
 use nalgebra::{Isometry2, Vector2};
 use opencv::core::{Mat, Point, Scalar, Vector};
 use opencv::prelude::*;
 use opencv::{imgcodecs, imgproc};
 
-use crate::detect::Detection;
-use crate::error::{Error, Fault, Result};
-use crate::frame::{Frame, PixelFormat};
+use crate::detect::{DetectSettings, Detection, Detector, Levels};
+use crate::error::{Error, Fault, Place, Result};
+use crate::film::encode::{Codec, VideoSettings, VideoWriter};
+use crate::frame::{Frame, PixelFormat, TimeBase};
+use crate::pipeline::{Observer, Stage};
 use crate::rig::Rig;
+use crate::source::{self, OpenOptions};
+use crate::table::NodeTable;
 use crate::track::mechanism::{Holder, Mechanism};
 use crate::track::predict::{Motion, Unrest, hung_at};
 use crate::track::rigid::{Pair, fit_pose, place};
@@ -309,7 +315,7 @@ fn gray8(frame: &Frame) -> Result<Vec<u8>> {
 ///
 /// # Errors
 /// [`Error::Film`] if the ending is not known or the file cannot be written.
-pub fn save(picture: &Mat, path: &std::path::Path) -> Result<()> {
+pub fn save(picture: &Mat, path: &Path) -> Result<()> {
     let name = path.display().to_string();
     let ending = path.extension().map_or_else(String::new, |e| format!(".{}", e.to_string_lossy()));
     let mut bytes: Vector<u8> = Vector::new();
@@ -347,14 +353,126 @@ pub fn still(frame: &Frame, rig: &Rig, detections: &[Detection]) -> Result<Mat> 
     Ok(picture)
 }
 
-/// The picture as planes of brightness and half-size colour (I420), for an encoder. Width and height even.
+/// The picture as planes of brightness and half-size colour (I420, full range), for an encoder. The last row and
+/// column are left out where there is no even number of them.
 ///
 /// # Errors
-/// [`Error::Film`] for odd sizes.
+/// [`Error::Film`] if OpenCV fails.
 pub fn planes(picture: &Mat) -> Result<Vec<u8>> {
+    let (w, h) = (picture.cols() & !1, picture.rows() & !1);
+    let even = picture.roi(opencv::core::Rect::new(0, 0, w, h)).map_err(failed)?.clone_pointee();
     let mut out = Mat::default();
-    imgproc::cvt_color_def(picture, &mut out, imgproc::COLOR_BGR2YUV_I420).map_err(failed)?;
-    Ok(out.data_bytes().map_err(failed)?.to_vec())
+    imgproc::cvt_color_def(&even, &mut out, imgproc::COLOR_BGR2YUV_I420).map_err(failed)?;
+    let mut planes = out.data_bytes().map_err(failed)?.to_vec();
+    // OpenCV gives television levels (16 to 235, colour 16 to 240); the film says full range.
+    let (luma, chroma) = planes.split_at_mut((w * h) as usize);
+    let stretch = |v: f64| v.round().clamp(0.0, 255.0) as u8;
+    let of_luma: Vec<u8> = (0..256).map(|v| stretch((f64::from(v) - 16.0) * 255.0 / 219.0)).collect();
+    let of_chroma: Vec<u8> =
+        (0..256).map(|v| stretch((f64::from(v) - 128.0) * 255.0 / 224.0 + 128.0)).collect();
+    luma.iter_mut().for_each(|v| *v = of_luma[usize::from(*v)]);
+    chroma.iter_mut().for_each(|v| *v = of_chroma[usize::from(*v)]);
+    Ok(planes)
+}
+
+/// How the film with the drawings is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FilmSettings {
+    /// Frames a second at which it plays.
+    pub play_fps: u32,
+    /// x264's constant rate factor.
+    pub quality: u32,
+}
+
+impl Default for FilmSettings {
+    fn default() -> Self {
+        Self { play_fps: 30, quality: 20 }
+    }
+}
+
+/// Writes the recording with its table drawn into it. Frames that the table does not have are left out.
+///
+/// # Errors
+/// [`Error::Source`] if the recording cannot be read, [`Error::Table`] if it is not the table's,
+/// [`Error::Film`] if the film cannot be written, [`Error::Interrupted`] if the observer asks to stop.
+pub fn film(
+    input: &str,
+    open: &OpenOptions,
+    table: &NodeTable,
+    output: &Path,
+    settings: &FilmSettings,
+    observer: &mut dyn Observer,
+) -> Result<()> {
+    let rig = &table.meta.rig;
+    let n = rig.nodes.len();
+    let mut source = source::open(input, open)?;
+    let [w, h] = rig.image_px;
+    let info = source.info();
+    if [info.width, info.height] != [w, h] {
+        return Err(Error::Table(
+            Fault::new(input, format!("{} x {} px, the table is of {w} x {h} px", info.width, info.height))
+                .advice("Give the recording that the table was made from"),
+        ));
+    }
+    let mut writer = VideoWriter::create(
+        output,
+        &VideoSettings {
+            width: w & !1,
+            height: h & !1,
+            depth_bits: 8,
+            time_base: TimeBase { numerator: 1, denominator: u64::from(settings.play_fps.max(1)) },
+            codec: Codec::H264,
+            quality: Some(settings.quality),
+            speed: Some("veryfast".into()),
+            gray_only: false,
+        },
+    )?;
+    observer.stage(Stage::Track, Some(table.frames() as u64));
+    let mut overlay = Overlay::new(rig);
+    let mut t = 0;
+    while let Some(frame) = source.next_frame()? {
+        while t < table.frames() && (table.rows.frame[t] as u64) < frame.index {
+            t += 1;
+        }
+        if t == table.frames() {
+            break;
+        }
+        if table.rows.frame[t] as u64 != frame.index {
+            continue;
+        }
+        let row: Vec<Observation> =
+            (0..n).map(|k| table.rows.observation(t, k, n).unwrap_or(Observation::MISSING)).collect();
+        let picture = overlay.draw(&frame, Some(table.rows.time_s[t]), &row)?;
+        writer.write_i420(&planes(&picture)?)?;
+        observer.progress(t as u64);
+        if observer.interrupted() {
+            writer.finish()?;
+            return Err(Error::Interrupted);
+        }
+    }
+    writer.finish()
+}
+
+/// A frame of a recording and what is detected in it.
+///
+/// # Errors
+/// Those of the source and of detection; [`Error::Source`] if there is no such frame.
+pub fn frame_at(
+    input: &str,
+    open: &OpenOptions,
+    detect: &DetectSettings,
+    index: u64,
+) -> Result<(Frame, Vec<Detection>)> {
+    let mut source = source::open(input, open)?;
+    let levels = Levels::learn(&source.sample(24)?, detect)?;
+    let mut detections = Vec::new();
+    while let Some(frame) = source.next_frame()? {
+        if frame.index == index {
+            Detector::new(Arc::new(levels), detect)?.detect(&frame, &mut detections)?;
+            return Ok((frame, detections));
+        }
+    }
+    Err(Error::Source(Fault::new(input, "it ends before this frame").at(Place::Frame(index))))
 }
 
 #[cfg(test)]

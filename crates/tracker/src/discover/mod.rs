@@ -2,6 +2,7 @@
 //!
 //! Owns: [`discover`], [`Discovery`]. Must not: name markers frame by frame (`track` does), or look at pixels.
 
+pub mod advice;
 mod arrange;
 mod bodies;
 mod lone;

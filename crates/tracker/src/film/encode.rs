@@ -162,6 +162,32 @@ impl VideoWriter {
         self.drain()
     }
 
+    /// Adds a frame in colour: a plane of brightness, then two of colour at half the size, without padding (I420),
+    /// full range. Only for H.264 that is not gray only.
+    ///
+    /// # Errors
+    /// [`Error::Film`] if encoding or writing fails, or the frame has another size or the file no colour.
+    pub fn write_i420(&mut self, planes: &[u8]) -> Result<()> {
+        let (w, h) = (self.width as usize, self.height as usize);
+        if self.pixel != Pixel::YUV420P || planes.len() != w * h * 3 / 2 {
+            return Err(fault(&self.name, format!("{} bytes are no colour frame of it", planes.len()), ""));
+        }
+        let mut picture = frame::Video::new(self.pixel, self.width, self.height);
+        picture.set_color_range(color::Range::JPEG);
+        let (luma, chroma) = planes.split_at(w * h);
+        let (blue, red) = chroma.split_at(w * h / 4);
+        for (k, (from, row)) in [(luma, w), (blue, w / 2), (red, w / 2)].into_iter().enumerate() {
+            let stride = picture.stride(k);
+            for (to, from) in picture.data_mut(k).chunks_mut(stride).zip(from.chunks(row)) {
+                to[..row].copy_from_slice(from);
+            }
+        }
+        picture.set_pts(Some(self.next));
+        self.next += 1;
+        self.encoder.send_frame(&picture).map_err(failed(&self.name, "encoding"))?;
+        self.drain()
+    }
+
     fn drain(&mut self) -> Result<()> {
         let mut packet = Packet::empty();
         loop {

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-use crate::{completions, film, info, score, track};
+use crate::{check, completions, film, info, overlay, score, setup, track};
 
 /// A film of markers on rigid links in; where each marker is in each frame out.
 #[derive(Debug, Parser)]
@@ -19,7 +19,10 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Info(info::Args),
+    Setup(setup::Args),
     Track(track::Args),
+    Overlay(overlay::Args),
+    Check(check::Args),
     Film(film::Args),
     Score(score::Args),
     Completions(completions::Args),
@@ -30,7 +33,10 @@ impl Cli {
     pub fn run(self) -> anyhow::Result<ExitCode> {
         match self.command {
             Command::Info(args) => info::run(args),
+            Command::Setup(args) => setup::run(args),
             Command::Track(args) => track::run(args),
+            Command::Overlay(args) => overlay::run(args),
+            Command::Check(args) => check::run(args),
             Command::Film(args) => film::run(args),
             Command::Score(args) => score::run(args),
             Command::Completions(args) => completions::run(args),

@@ -3,10 +3,13 @@
 //! Exit status: 0 done; 1 done, but the recording ended early or nodes stayed lost; 2 an error; 130 interrupted.
 
 mod args;
+mod check;
 mod completions;
 mod film;
 mod info;
+mod overlay;
 mod score;
+mod setup;
 mod track;
 mod watch;
 

@@ -1,0 +1,54 @@
+//! `tracker overlay`: a recording and its node table in, the film with nodes drawn out.
+//!
+//! Owns: its arguments. Must not: draw.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use tracker::error::{Error, Fault};
+use tracker::overlay::{self, FilmSettings};
+use tracker::source::OpenOptions;
+use tracker::table::read_table;
+
+use crate::watch::Watch;
+
+/// Draw nodes, names, bodies, trails and gaps into the recording
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The recording
+    input: String,
+    /// Its node table
+    nodes: PathBuf,
+    /// The film, H.264
+    #[arg(short, long, value_name = "OUT.mp4")]
+    output: PathBuf,
+    /// Frames a second at which it plays
+    #[arg(long, default_value_t = 30, value_name = "F")]
+    play_fps: u32,
+    /// Quality as x264's constant rate factor; smaller is better and larger
+    #[arg(long, default_value_t = 20, value_name = "CRF")]
+    quality: u32,
+    /// Replace the film if it is there already
+    #[arg(long)]
+    force: bool,
+    /// Print no progress
+    #[arg(long)]
+    quiet: bool,
+}
+
+/// Runs it.
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    if args.output.exists() && !args.force {
+        return Err(Error::Film(
+            Fault::new(args.output.display(), "it is there already")
+                .advice("Choose another name, or replace it with --force"),
+        )
+        .into());
+    }
+    let table = read_table(&args.nodes)?;
+    let mut watch = Watch::new(args.quiet)?;
+    let settings = FilmSettings { play_fps: args.play_fps, quality: args.quality };
+    overlay::film(&args.input, &OpenOptions::default(), &table, &args.output, &settings, &mut watch)?;
+    watch.finish();
+    Ok(ExitCode::SUCCESS)
+}

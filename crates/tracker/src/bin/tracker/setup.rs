@@ -1,0 +1,105 @@
+//! `tracker setup`: a recording in, its rig out, with an annotated picture and advice.
+//!
+//! Owns: its arguments, what is said of the result. Must not: find anything itself.
+
+use std::io::Write;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use tracker::discover::advice::advise;
+use tracker::error::{Error, Fault};
+use tracker::overlay;
+use tracker::pipeline::{Existing, RunSettings, run as run_pipeline};
+use tracker::source::OpenOptions;
+
+use crate::watch::Watch;
+
+/// Find markers, bodies and joints of a recording and write them as a rig file to be edited
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The recording
+    input: String,
+    /// The rig file
+    #[arg(short, long, value_name = "RIG.toml")]
+    output: PathBuf,
+    /// The reference frame with all that was found drawn into it; beside the rig file if not given
+    #[arg(long, value_name = "PICTURE.png")]
+    picture: Option<PathBuf>,
+    /// Frames a second of recorded time, instead of what the recording claims
+    #[arg(long, value_name = "F")]
+    fps: Option<f64>,
+    /// Replace files that are there already
+    #[arg(long)]
+    force: bool,
+    /// Print neither progress nor summary
+    #[arg(long)]
+    quiet: bool,
+}
+
+/// Runs it.
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let picture = args.picture.clone().unwrap_or_else(|| args.output.with_extension("png"));
+    for path in [&args.output, &picture] {
+        if path.exists() && !args.force {
+            return Err(Error::Rig(
+                Fault::new(path.display(), "it is there already")
+                    .advice("Choose another name, or replace it with --force"),
+            )
+            .into());
+        }
+    }
+    if args.input == "-" {
+        return Err(Error::Argument(
+            Fault::new("input", "standard input cannot be read again for the picture").advice("Give a file"),
+        )
+        .into());
+    }
+    let settings = RunSettings {
+        input: args.input.clone(),
+        output: None,
+        existing: Existing::Refuse,
+        collect: true,
+        open: OpenOptions { fps: args.fps, ..OpenOptions::default() },
+        ..RunSettings::default()
+    };
+    let mut watch = Watch::new(args.quiet)?;
+    let summary = run_pipeline(&settings, &mut watch)?;
+    watch.finish();
+    let rig = summary.meta.rig.clone();
+    let mut warnings = summary.warnings.clone();
+    if let Some(table) = &summary.table {
+        warnings.extend(advise(&rig, &table.rows, summary.meta.source.rate_hz));
+    }
+    let index = rig.reference_frame.unwrap_or(0);
+    let (frame, detections) = overlay::frame_at(&args.input, &settings.open, &settings.detect, index)?;
+    let saturated = detections.iter().filter(|d| d.flags.has(tracker::detect::Flags::SATURATED)).count();
+    if saturated > 0 {
+        warnings.push(format!(
+            "{saturated} of {} markers are saturated in the reference frame: their centres are less exact. Less \
+             light or a shorter exposure helps",
+            detections.len()
+        ));
+    }
+    overlay::save(&overlay::still(&frame, &rig, &detections)?, &picture)?;
+    std::fs::write(&args.output, rig.to_toml()?).map_err(|e| {
+        Error::Rig(Fault::new(args.output.display(), format!("the rig file cannot be written ({e})")))
+    })?;
+    for warning in &warnings {
+        eprintln!("tracker: note: {warning}");
+    }
+    if !args.quiet {
+        let mut out = std::io::stdout();
+        writeln!(out, "{}: {} nodes, reference frame {index}", args.output.display(), rig.nodes.len())?;
+        for body in &rig.bodies {
+            let nodes: Vec<&str> =
+                rig.nodes.iter().filter(|n| n.body == body.name).map(|n| n.name.as_str()).collect();
+            writeln!(out, "  {}: {}", body.name, nodes.join(" "))?;
+        }
+        for joint in &rig.joints {
+            let on = joint.bodies.join(" and ");
+            writeln!(out, "  {} of {on} at ({:.1}, {:.1}) px", joint.name, joint.x_px, joint.y_px)?;
+        }
+        writeln!(out, "{}: the picture", picture.display())?;
+    }
+    Ok(ExitCode::SUCCESS)
+}

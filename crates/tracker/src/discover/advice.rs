@@ -1,0 +1,120 @@
+//! What a user should change about a rig, a camera or a recording before trusting it.
+//!
+//! Owns: [`advise`]. Must not: look at pixels.
+
+use nalgebra::Vector2;
+
+use crate::rig::Rig;
+use crate::table::Rows;
+use crate::track::signature::Signatures;
+
+/// Signatures that differ by less are too alike, px: some times the misfit of a compressed film.
+const ALIKE_PX: f64 = 1.5;
+/// Markers this near to each other, in radii, run together in the picture.
+const MERGING_RADII: f64 = 2.5;
+
+/// Warnings, a sentence each. `rate_hz` is the rate of the recording, if known; `rows` its nodes.
+pub fn advise(rig: &Rig, rows: &Rows, rate_hz: Option<f64>) -> Vec<String> {
+    let n = rig.nodes.len();
+    let home: Vec<Vector2<f64>> = rig.nodes.iter().map(|a| Vector2::new(a.x_px, a.y_px)).collect();
+    let mut out = Vec::new();
+    out.extend(rate(rig, &home, rows, rate_hz));
+    for (b, body) in rig.bodies.iter().enumerate() {
+        let nodes: Vec<usize> = (0..n).filter(|&i| rig.node_bodies()[i] == b).collect();
+        let places: Vec<Vector2<f64>> = nodes.iter().map(|&i| home[i]).collect();
+        for (i, j) in Signatures::new(&places).alike(ALIKE_PX) {
+            out.push(format!(
+                "nodes {} and {} of body {} have the same distances to its other nodes: move one of them by a \
+                 few pixels, so that it can be told which comes back",
+                rig.nodes[nodes[i]].name, rig.nodes[nodes[j]].name, body.name
+            ));
+        }
+    }
+    out.extend(merging(rig, rows));
+    out.extend(not_at_rest(rig, rows));
+    out
+}
+
+fn place(rows: &Rows, n: usize, t: usize, k: usize) -> Option<Vector2<f64>> {
+    let p = Vector2::new(rows.xy_px[2 * (t * n + k)], rows.xy_px[2 * (t * n + k) + 1]);
+    p.x.is_finite().then_some(p)
+}
+
+/// The greatest step against half the spacing, what plain nearest neighbours need.
+fn rate(rig: &Rig, home: &[Vector2<f64>], rows: &Rows, rate_hz: Option<f64>) -> Option<String> {
+    let n = rig.nodes.len();
+    let mut worst: Option<(f64, usize, f64, f64)> = None;
+    for k in 0..n {
+        let spacing =
+            (0..n).filter(|&j| j != k).map(|j| (home[k] - home[j]).norm()).fold(f64::INFINITY, f64::min);
+        for t in 1..rows.frames() {
+            if let (Some(a), Some(b)) = (place(rows, n, t - 1, k), place(rows, n, t, k))
+                && rows.frame[t] == rows.frame[t - 1] + 1
+            {
+                let step = (b - a).norm();
+                let ratio = step / (spacing / 2.0);
+                if ratio > worst.map_or(1.0, |w| w.0) {
+                    worst = Some((ratio, k, step, spacing));
+                }
+            }
+        }
+    }
+    let (ratio, k, step, spacing) = worst?;
+    let least = rate_hz.map_or_else(
+        || format!("{ratio:.1} times the frame rate"),
+        |r| format!("at least {:.0} frames a second", (r * ratio).ceil()),
+    );
+    Some(format!(
+        "node {} moves up to {step:.0} px in a frame, over half its {spacing:.0} px from the next: only the motion \
+         of its body tells them apart. {least} would do without",
+        rig.nodes[k].name
+    ))
+}
+
+fn merging(rig: &Rig, rows: &Rows) -> Vec<String> {
+    let n = rig.nodes.len();
+    let bodies = rig.node_bodies();
+    let mut areas: Vec<f32> = rows.area_px.iter().copied().filter(|a| a.is_finite()).collect();
+    areas.sort_by(f32::total_cmp);
+    let Some(&area) = areas.get(areas.len() / 2) else { return Vec::new() };
+    let radius = (f64::from(area) / std::f64::consts::PI).sqrt();
+    let mut out = Vec::new();
+    for i in 0..n {
+        for j in i + 1..n {
+            let near = (0..rows.frames())
+                .filter_map(|t| Some((place(rows, n, t, i)? - place(rows, n, t, j)?).norm()))
+                .fold(f64::INFINITY, f64::min);
+            if near < MERGING_RADII * radius {
+                let same = bodies[i] == bodies[j];
+                out.push(format!(
+                    "nodes {} and {} come within {near:.1} px, {:.1} of their radii, and merge in the picture{}",
+                    rig.nodes[i].name,
+                    rig.nodes[j].name,
+                    near / radius,
+                    if same { ": put them farther apart" } else { " when their bodies cross" }
+                ));
+            }
+        }
+    }
+    out
+}
+
+fn not_at_rest(rig: &Rig, rows: &Rows) -> Option<String> {
+    let n = rig.nodes.len();
+    let t = rows.frame.iter().position(|&f| Some(f as u64) == rig.reference_frame)?;
+    let before = if t > 0 { t - 1 } else { t + 1 };
+    if before >= rows.frames() {
+        return None;
+    }
+    let (k, step) = (0..n)
+        .filter_map(|k| Some((k, (place(rows, n, t, k)? - place(rows, n, before, k)?).norm())))
+        .max_by(|a, b| a.1.total_cmp(&b.1))?;
+    (step > 0.5).then(|| {
+        format!(
+            "the reference frame {} is not at rest: node {} moves {step:.1} px in a frame, so angles have no zero \
+             from it. Film the rig hanging still first, or give a rest recording",
+            rig.reference_frame.unwrap_or(0),
+            rig.nodes[k].name
+        )
+    })
+}

@@ -1,0 +1,73 @@
+//! How well the nodes of a table keep their places in their bodies, and how they move.
+//!
+//! Owns: [`NodeMotion`], [`residuals`]. Must not: change a table.
+
+use nalgebra::Vector2;
+
+use super::mechanism::Mechanism;
+use super::rigid::{Pair, fit_pose, place};
+use crate::rig::Rig;
+use crate::table::Rows;
+
+/// What a table says of one node's motion. `None` where too little was seen.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct NodeMotion {
+    /// Stretches without it after it was first seen.
+    pub gaps: u64,
+    /// Root mean square distance to its place in the body, px per coordinate, over frames with three nodes of the
+    /// body seen or more. The body is as it stands in the rig file.
+    pub residual_px: Option<f64>,
+    /// Greatest step from frame to frame, px.
+    pub fastest_px: Option<f64>,
+}
+
+/// For each node of the rig, in its order.
+pub fn residuals(rig: &Rig, rows: &Rows) -> Vec<NodeMotion> {
+    let mechanism = Mechanism::new(rig, 0.0);
+    let n = rig.nodes.len();
+    let mut out = vec![NodeMotion { gaps: 0, residual_px: None, fastest_px: None }; n];
+    let mut squares = vec![(0.0, 0_u64); n];
+    let mut last: Vec<Option<(usize, Vector2<f64>)>> = vec![None; n];
+    for t in 0..rows.frames() {
+        let at = |k: usize| {
+            let p = Vector2::new(rows.xy_px[2 * (t * n + k)], rows.xy_px[2 * (t * n + k) + 1]);
+            p.x.is_finite().then_some(p)
+        };
+        for k in 0..n {
+            let Some(p) = at(k) else { continue };
+            if let Some((before, q)) = last[k] {
+                if before + 1 == t {
+                    let step = (p - q).norm();
+                    out[k].fastest_px = Some(out[k].fastest_px.map_or(step, |f| f.max(step)));
+                } else {
+                    out[k].gaps += 1;
+                }
+            }
+            last[k] = Some((t, p));
+        }
+        for link in &mechanism.links {
+            let seen: Vec<(usize, Pair)> = link
+                .nodes
+                .iter()
+                .zip(&link.template)
+                .filter_map(|(&k, &local)| {
+                    let sigma_px = f64::from(rows.sigma_px[t * n + k]).max(1e-3);
+                    Some((k, Pair { local, place: at(k)?, sigma_px }))
+                })
+                .collect();
+            if seen.len() < 3 {
+                continue;
+            }
+            let pairs: Vec<Pair> = seen.iter().map(|s| s.1).collect();
+            let Some(fit) = fit_pose(&pairs) else { continue };
+            for (k, p) in seen {
+                squares[k].0 += (place(&fit.pose, p.local) - p.place).norm_squared() / 2.0;
+                squares[k].1 += 1;
+            }
+        }
+    }
+    for (o, (sum, count)) in out.iter_mut().zip(squares) {
+        o.residual_px = (count > 0).then(|| (sum / count as f64).sqrt());
+    }
+    out
+}
