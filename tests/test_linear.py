@@ -16,6 +16,21 @@ from pydpend.simulate import simulate
 Array = npt.NDArray[np.float64]
 
 
+def e(p: float) -> Array:
+    """Along a link."""
+    return np.array([np.sin(p), -np.cos(p)])
+
+
+def n(p: float) -> Array:
+    """Across a link."""
+    return np.array([np.cos(p), np.sin(p)])
+
+
+def cross(r: Array) -> Array:
+    """r x F = cross(r) . F"""
+    return np.array([-r[1], r[0]])
+
+
 def newton_euler(m: Model, d: Damping, d1: float, i1: float, i2: float, x: Array) -> Array:
     """(a1, a2, N1, N2) from force and moment balances of both links, pin reactions as unknowns (10 equations).
 
@@ -24,8 +39,6 @@ def newton_euler(m: Model, d: Damping, d1: float, i1: float, i2: float, x: Array
     """
     p1, p2, w1, w2 = x
     d2 = m.kappa_j / (m.g_m_s2 * m.m2_kg)
-    e = lambda p: np.array([np.sin(p), -np.cos(p)])  # noqa: E731 - along a link
-    n = lambda p: np.array([np.cos(p), np.sin(p)])  # noqa: E731 - across it
     sign = np.sign([w1, w2 - w1])
     load = np.zeros(2)
     out = np.zeros(4)
@@ -42,7 +55,6 @@ def newton_euler(m: Model, d: Damping, d1: float, i1: float, i2: float, x: Array
         b[4:6] = [0, -m.m1_kg * m.g_m_s2]
         a[6:8, 4:6], a[6:8, 8:10] = m.m2_kg * np.eye(2), -np.eye(2)
         b[6:8] = [0, -m.m2_kg * m.g_m_s2]
-        cross = lambda r: np.array([-r[1], r[0]])  # noqa: E731 - r x F = cross(r) . F
         a[8, 0], a[8, 6:8], a[8, 8:10] = i1, -cross(-d1 * e(p1)), cross((m.l1_m - d1) * e(p1))
         b[8] = -joint1 + joint2
         a[9, 1], a[9, 8:10] = i2, -cross(-d2 * e(p2))
@@ -142,7 +154,7 @@ def test_figures_and_animation(tmp_path: Path) -> None:
     assert len(physics.phase_portrait(run).axes) == 2
     assert len(physics.comparison(run, run).axes) == 2
     found = poincare(model, Damping(), [2.0, 1.0, 0, 0], 5.0)
-    assert len(physics.section(found).axes[0].lines[0].get_xdata()) == len(found.t_s) > 1
+    assert np.size(physics.section(found).axes[0].lines[0].get_xdata()) == len(found.t_s) > 1
     physics.animate(run, model, tmp_path / "p.gif", fps=5)
     assert (tmp_path / "p.gif").read_bytes()[:3] == b"GIF"
     with pytest.raises(SimulationError, match="is not a film"):

@@ -40,7 +40,7 @@ def modes(model: Model, damping: Damping | None = None) -> Modes:
     state = np.block([[np.zeros((2, 2)), np.eye(2)], [-inverse @ stiff, -inverse @ viscous]])
     values, vectors = np.linalg.eig(state)
     # One of each conjugate pair; overdamped modes have real eigenvalues and are taken as they come.
-    order = sorted(range(4), key=lambda i: (round(abs(values[i]), 9), -values[i].imag))[::2]
+    order = sorted(range(4), key=lambda i: (round(float(abs(values[i])), 9), -float(values[i].imag)))[::2]
     frequency = np.array([abs(values[i].imag) / (2 * np.pi) for i in order])
     ratio = np.array([-values[i].real / abs(values[i]) for i in order])
     shape = np.empty((2, 2))

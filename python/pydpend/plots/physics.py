@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 from matplotlib.animation import FFMpegWriter, FuncAnimation, PillowWriter
+from matplotlib.artist import Artist
 from matplotlib.figure import Figure
 
 from pydpend.errors import SimulationError, fault
@@ -127,11 +128,7 @@ def animate(motion: Motion, model: Model, path: str | Path, *, fps: float = 25.0
         )
     if not (fps > 0 and speed > 0):
         raise SimulationError(fault("animate", f"fps {fps}, speed {speed}", "Both must be positive"))
-    writer = (
-        PillowWriter(fps=round(fps))
-        if path.suffix.lower() == ".gif"
-        else FFMpegWriter(fps=round(fps))
-    )
+    writer = PillowWriter(fps=round(fps)) if path.suffix.lower() == ".gif" else FFMpegWriter(fps=round(fps))
     if path.suffix.lower() == ".mp4" and not FFMpegWriter.isAvailable():
         raise SimulationError(
             fault(str(path), "the program ffmpeg is not there", "Install it or write a .gif")
@@ -153,7 +150,7 @@ def animate(motion: Motion, model: Model, path: str | Path, *, fps: float = 25.0
         (trace,) = ax.plot([], [], color=COLORS[2], linewidth=0.6)
         title = ax.set_title("")
 
-        def draw(i: int) -> tuple[object, ...]:
+        def draw(i: int) -> tuple[Artist, ...]:
             upper.set_data([0.0, elbow[i, 0]], [0.0, elbow[i, 1]])
             lower.set_data([elbow[i, 0], end[i, 0]], [elbow[i, 1], end[i, 1]])
             since = max(0, i - round(fps))
