@@ -38,8 +38,12 @@ from pydpend.errors import (
 )
 from pydpend.export import export
 from pydpend.filming import Film, Truth, film
+from pydpend.linear import lyapunov, modes, poincare
+from pydpend.model import Damping, Model, derived, published
 from pydpend.nodes import Nodes, Rig, read_nodes
 from pydpend.scoring import Score, score
+from pydpend.simulate import Simulation, simulate, simulate_many
+from pydpend.states import LinkStates, savitzky_golay, states
 from pydpend.tracking import NodeRow, Tracker, detect, info, setup, track
 
 __all__ = [
@@ -47,6 +51,7 @@ __all__ = [
     "ArgumentError",
     "Calibration",
     "Comparison",
+    "Damping",
     "DampingFit",
     "DetectError",
     "EncoderError",
@@ -55,7 +60,9 @@ __all__ = [
     "FilmError",
     "FitError",
     "LinkAngles",
+    "LinkStates",
     "Linkage",
+    "Model",
     "ModelError",
     "NodeRow",
     "Nodes",
@@ -64,6 +71,7 @@ __all__ = [
     "Rig",
     "RigError",
     "Score",
+    "Simulation",
     "SimulationError",
     "SourceError",
     "Synchronisation",
@@ -74,6 +82,7 @@ __all__ = [
     "angles",
     "calibrate",
     "compare",
+    "derived",
     "detect",
     "encoder_angles",
     "export",
@@ -82,13 +91,21 @@ __all__ = [
     "find_rest",
     "fit_damping",
     "info",
+    "lyapunov",
+    "modes",
+    "poincare",
+    "published",
     "read_angles",
     "read_calibration",
     "read_encoder",
     "read_holds",
     "read_nodes",
+    "savitzky_golay",
     "score",
     "setup",
+    "simulate",
+    "simulate_many",
+    "states",
     "synchronise",
     "track",
     "write_angles",
