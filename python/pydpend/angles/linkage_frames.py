@@ -82,10 +82,11 @@ def checked_sigma(linked: LinkageAngles, poses: list[Pose]) -> tuple[Floats, lis
         difference = apart[known] - np.median(apart[known])
         rigid2 = pose.sigma_rad[known] ** 2
         own2 = (sigma[known, k] / linked.linkage.sigma_scale * alone) ** 2
-        # By the median: frames with a half-hidden marker spoil the rigid angle, not the linkage's.
-        variance = float((1.4826 * np.median(np.abs(difference))) ** 2)
-        bias2 = variance - float(np.median(rigid2 - own2))
-        if bias2 > 4 * variance * np.sqrt(2 / 0.37 / difference.size):
+        # Frames that stand out have a half-hidden marker, which spoils the rigid angle, not the linkage's.
+        usual = np.abs(difference) < 4 * 1.4826 * np.median(np.abs(difference))
+        variance = float((difference[usual] ** 2).mean())
+        bias2 = variance - float((rigid2 - own2)[usual].mean())
+        if bias2 > 4 * variance * np.sqrt(2 / np.count_nonzero(usual)):
             before = float(np.sqrt(np.median(sigma[known, k] ** 2)))
             sigma[:, k] = np.sqrt((sigma[:, k] / linked.linkage.sigma_scale * alone) ** 2 + bias2)
             notes.append(
