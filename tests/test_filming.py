@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pydpend as dp
 import pytest
-from pydpend.filming import PRESETS
+from pydpend.filming import PRESETS, read_truth
 
 SCENE: dict[str, Any] = {
     "schema": 1,
@@ -124,3 +124,15 @@ def test_bad_calls_are_refused(tmp_path: Path) -> None:
         dp.Film(tmp_path / "none.toml")
     with pytest.raises(dp.FilmError, match="gif"):
         dp.Film(SCENE).write(tmp_path / "a.gif")
+
+
+@pytest.mark.parametrize("ending", ["csv", "parquet"])
+def test_truth_is_read_back(tmp_path: Path, ending: str) -> None:
+    film = dp.film(SCENE, tmp_path / "a.mkv", truth=tmp_path / f"t.{ending}")
+    read, truth = read_truth(tmp_path / f"t.{ending}"), film.truth()
+    for key in ("t_s", "xy_px", "visible", "phi_rad"):
+        np.testing.assert_array_equal(getattr(read, key), getattr(truth, key))
+    assert (read.nodes, read.bodies) == (truth.nodes, truth.bodies)
+    (tmp_path / "none.csv").write_text("frame,node\n1,n0\n")
+    with pytest.raises(dp.FilmError, match="no column time_s"):
+        read_truth(tmp_path / "none.csv")

@@ -18,7 +18,9 @@ from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
+import pyarrow as pa
 from numpy.typing import ArrayLike, NDArray
+from pyarrow import csv, parquet
 
 from pydpend import _tracker
 from pydpend.errors import FilmError, fault
@@ -87,8 +89,8 @@ class Film:
     @property
     def scene(self) -> dict[str, Any]:
         """The scene, with all that was left out filled in."""
-        scene: dict[str, Any] = json.loads(self._film.scene())
-        return _without_none(scene)
+        scene: dict[str, Any] = _without_none(json.loads(self._film.scene()))
+        return scene
 
     def image(self, frame: int) -> NDArray[np.uint8] | NDArray[np.uint16]:
         """The recorded levels of a frame, (H, W); uint8 up to 8 bits, else uint16."""
@@ -165,6 +167,41 @@ def film(
     made = Film(scene, motion=motion, seed=seed, frames=frames, rate_hz=rate_hz)
     made.write(output, truth, codec=codec, quality=quality, speed=speed, gray_only=gray_only, bits=bits)
     return made
+
+
+def read_truth(path: StrPath) -> Truth:
+    """Reads the truth that was written beside a film, .parquet or .csv; angles are those of all its links.
+
+    Raises :class:`pydpend.FilmError` for a file that is not one, naming the column.
+    """
+    name = os.fspath(path)
+    try:
+        table = csv.read_csv(name) if name.endswith(".csv") else parquet.read_table(name)
+    except (OSError, pa.ArrowException) as problem:
+        raise FilmError(fault(name, f"the truth cannot be read ({problem})")) from None
+    wanted = ["frame", "time_s", "node", "body", "x_px", "y_px", "visible", "phi1_rad"]
+    missing = [column for column in wanted if column not in table.column_names]
+    if missing:
+        advice = "Give the table that `tracker film --truth` wrote"
+        raise FilmError(fault(name, f"there is no column {missing[0]}", advice, place=missing[0]))
+    frame = table["frame"].to_numpy()
+    count = int(np.count_nonzero(frame == frame[0])) if len(frame) else 0
+    if count == 0 or len(frame) % count or np.any(frame.reshape(-1, count) != frame[::count, None]):
+        raise FilmError(fault(name, "it has not all markers in each frame", "Give the whole table"))
+
+    def column(key: str) -> NDArray[np.float64]:
+        values: NDArray[np.float64] = np.asarray(table[key].to_numpy(), dtype=np.float64)
+        return values.reshape(-1, count)
+
+    links = [f"phi{k}_rad" for k in range(1, len(table.column_names)) if f"phi{k}_rad" in table.column_names]
+    return Truth(
+        t_s=column("time_s")[:, 0],
+        xy_px=np.stack([column("x_px"), column("y_px")], axis=-1),
+        visible=column("visible"),
+        phi_rad=np.stack([column(key)[:, 0] for key in links], axis=-1),
+        nodes=tuple(table["node"].slice(0, count).to_pylist()),
+        bodies=tuple(table["body"].slice(0, count).to_pylist()),
+    )
 
 
 def _motion(motion: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
