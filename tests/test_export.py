@@ -10,7 +10,8 @@ import pydpend as dp
 import pytest
 from pydpend.cli import main
 from pydpend.export import export
-from test_nodes import some_nodes
+
+from tests.drawn_nodes import some_nodes
 
 
 def test_c3d_has_the_points_and_knows_which_are_missing(tmp_path: Path) -> None:

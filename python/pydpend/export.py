@@ -123,7 +123,7 @@ def _trc(nodes: Nodes, path: Path, px_per_m: float | None) -> None:
         for t in range(count):
             # Frames count from 1 here; what is not seen is left empty.
             cells = ("" if np.isnan(v) else f"{v:.6f}" for v in places[t].ravel())
-            file.write(f"{nodes.frame[t] + 1}\t{nodes.t_s[t]!r}\t" + "\t".join(cells) + "\n")
+            file.write(f"{nodes.frame[t] + 1}\t{float(nodes.t_s[t])!r}\t" + "\t".join(cells) + "\n")
 
 
 def _dltdv(nodes: Nodes, path: Path, px_per_m: float | None) -> None:

@@ -180,7 +180,8 @@ class Nodes:
     @property
     def seen(self) -> NDArray[np.bool_]:
         """Where a place is known, (T, N)."""
-        return (self.status == SEEN) | (self.status == REACQUIRED)
+        seen: NDArray[np.bool_] = (self.status == SEEN) | (self.status == REACQUIRED)
+        return seen
 
     @property
     def complete(self) -> bool:
