@@ -5,7 +5,7 @@ use tracker::source::{Decoder, OpenOptions, open};
 use crate::film::{WIDTH, encode, have_ffmpeg, read_all, real, samples};
 
 /// Centre of what is brighter than the middle of the picture's range, weighted by how much brighter.
-fn centre(values: &[u32], width: usize) -> (f64, f64) {
+fn centre(values: &[u32]) -> (f64, f64) {
     let (low, high) = (values.iter().min().unwrap(), values.iter().max().unwrap());
     let middle = f64::from(low + high) / 2.0;
     let (mut n, mut x, mut y) = (0.0, 0.0, 0.0);
@@ -13,8 +13,8 @@ fn centre(values: &[u32], width: usize) -> (f64, f64) {
         let weight = f64::from(*v) - middle;
         if weight > 0.0 {
             n += weight;
-            x += weight * (i % width) as f64;
-            y += weight * (i / width) as f64;
+            x += weight * (i % WIDTH) as f64;
+            y += weight * (i / WIDTH) as f64;
         }
     }
     (x / n, y / n)
@@ -45,7 +45,6 @@ fn both_decoders_give_the_same_frames_and_centres() {
         assert!(!second.sample(4).unwrap().is_empty());
         let (a, b) = (read_all(&mut *first), read_all(&mut *second));
         assert_eq!(a.len(), b.len(), "{name}");
-        let width = if name.contains("Ball") { 640 } else { WIDTH };
         let zero = [first.info().time_base.seconds(a[0].ticks), second.info().time_base.seconds(b[0].ticks)];
         for (p, q) in a.iter().zip(&b) {
             let times = [first.info().time_base.seconds(p.ticks), second.info().time_base.seconds(q.ticks)];
@@ -55,7 +54,11 @@ fn both_decoders_give_the_same_frames_and_centres() {
                 // Gray to BGR and back rounds twice at most.
                 assert!(u.iter().zip(&v).all(|(s, t)| s.abs_diff(*t) <= 2), "{name} frame {}", p.index);
             }
-            let (c, d) = (centre(&u, width), centre(&v, width));
+            if name.contains("Ball") {
+                // A natural scene has no one disc; stretching its range clips and would move a centre of it all.
+                continue;
+            }
+            let (c, d) = (centre(&u), centre(&v));
             // Stretching limited range to full and rounding moves each of some hundred weights by half a level
             // of about two hundred: 0.02 px is ten times what that can do to a centre.
             assert!((c.0 - d.0).hypot(c.1 - d.1) < 0.02, "{name} frame {}: {c:?} {d:?}", p.index);
