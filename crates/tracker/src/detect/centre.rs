@@ -2,7 +2,7 @@
 //!
 //! Owns: [`Centre`], [`Window`]. Must not: decide what is a marker.
 
-use super::fit::{DiscFit, Fitted, Patch};
+use super::fit::{DiscFit, Fitted, Patch, Ring, Start};
 use super::levels::{Levels, Side};
 use super::mask::Spans;
 use super::pixels::Pixels;
@@ -31,8 +31,13 @@ pub(crate) struct Window {
     y0: usize,
     width: usize,
     height: usize,
-    ring: Vec<f32>,
+    ground: Vec<f32>,
+    ring: Ring,
 }
+
+/// What an unknown shape adds to the uncertainty of its weighted centre: about what edges that fall on pixels in
+/// different ways move the centre of a small sharp blob, px.
+const SHAPE_PX: f64 = 0.01;
 
 /// Pixels that the window reaches beyond the blob: two for the edge's foot, two for the background.
 const MARGIN: usize = 4;
@@ -43,11 +48,9 @@ impl Window {
         self.y0 = (blob.y0 as usize).saturating_sub(margin);
         self.width = (blob.x1 as usize + margin + 1).min(pixels.width) - self.x0;
         self.height = (blob.y1 as usize + margin + 1).min(pixels.height) - self.y0;
-        self.row.resize(self.width, 0);
         self.heights.clear();
         for y in self.y0..self.y0 + self.height {
-            pixels.read(y, self.x0, &mut self.row);
-            self.heights.extend(self.row.iter().map(|&v| f32::from(v)));
+            pixels.append(y, self.x0, self.width, &mut self.row, &mut self.heights);
         }
     }
 
@@ -76,17 +79,88 @@ impl Window {
         (n > 0).then(|| f64::from(values[(n - 1) / 2] + values[n / 2]) / 2.0)
     }
 
-    /// A disc fitted to a blob's edge; `None` where none fits.
-    pub fn fit(&mut self, pixels: &Pixels<'_>, blob: &Blob, fit: &DiscFit<'_>) -> Option<Fitted> {
-        let margin = (fit.table.reach_px + 2.0).ceil() as usize;
-        self.load(pixels, blob, margin);
+    /// A disc fitted to a blob's edge, smeared along a path where that explains it better; `None` where none
+    /// fits. `avoid` are discs of neighbours, `[x, y, radius]`.
+    pub fn fit(
+        &mut self,
+        pixels: &Pixels<'_>,
+        blob: &Blob,
+        fit: &DiscFit<'_>,
+        avoid: [[f64; 3]; 2],
+    ) -> Option<Fitted> {
+        self.load(pixels, blob, (fit.table.reach_px + fit.band_px + 1.0).ceil() as usize);
         let [cx, cy] = blob.mean();
         let radius = (blob.area as f64 / std::f64::consts::PI).sqrt();
-        let base = self.around(cx, cy, radius + fit.table.reach_px + 0.7)?;
-        let top = self.around(cx, cy, (radius - fit.table.reach_px - 0.7).max(0.0))?;
+        let start = self.start(fit, [cx, cy, radius], avoid)?;
+        let sharp = self.run(fit, &start)?;
+        // Five standard deviations of chi-square over some hundred pixels, and worth the time.
+        if sharp.chi2 < 1.6 * fit.usual_chi2.max(1.0) {
+            return Some(sharp);
+        }
+        let Some(smear_px) = self.smear(&sharp) else { return Some(sharp) };
+        let disc = [sharp.x_px, sharp.y_px, sharp.radius_px, sharp.base, sharp.height];
+        match self.run(fit, &Start { disc, smear_px, avoid }) {
+            Some(smeared) if smeared.chi2 < 0.7 * sharp.chi2 => Some(smeared),
+            _ => Some(sharp),
+        }
+    }
+
+    /// One of two discs in a blob, whose pixels are kept out of it.
+    pub fn fit_beside(
+        &mut self,
+        pixels: &Pixels<'_>,
+        blob: &Blob,
+        fit: &DiscFit<'_>,
+        disc: [f64; 3],
+        other: [f64; 3],
+    ) -> Option<Fitted> {
+        self.load(pixels, blob, (fit.table.reach_px + fit.band_px + 1.0).ceil() as usize);
+        let start = self.start(fit, disc, [other, [0.0; 3]])?;
+        self.run(fit, &start)
+    }
+
+    fn run(&mut self, fit: &DiscFit<'_>, start: &Start) -> Option<Fitted> {
         let patch =
             Patch { values: &self.heights, width: self.width, x0: self.x0 as f64, y0: self.y0 as f64 };
-        fit.fit(&patch, [cx, cy, radius, base, top - base])
+        fit.fit(&patch, start, &mut self.ring)
+    }
+
+    fn start(&self, fit: &DiscFit<'_>, disc: [f64; 3], avoid: [[f64; 3]; 2]) -> Option<Start> {
+        let [cx, cy, radius] = disc;
+        let base = self.around(cx, cy, radius + fit.table.reach_px + 0.7)?;
+        let top = self.around(cx, cy, (radius - fit.table.reach_px - 0.7).max(0.0))?;
+        Some(Start { disc: [cx, cy, radius, base, top - base], smear_px: [0.0; 2], avoid })
+    }
+
+    /// The path that would give a disc its second moments: along the longer axis the variance grows by a
+    /// twelfth of the path's square. `None` where it is under half a pixel or longer than the disc.
+    fn smear(&self, disc: &Fitted) -> Option<[f64; 2]> {
+        let outer = (disc.radius_px + 3.0).powi(2);
+        let (mut s, mut xx, mut xy, mut yy, mut sx, mut sy) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+        for (j, row) in self.heights.chunks_exact(self.width).enumerate() {
+            for (i, &v) in row.iter().enumerate() {
+                let dx = (self.x0 + i) as f64 - disc.x_px;
+                let dy = (self.y0 + j) as f64 - disc.y_px;
+                if dx * dx + dy * dy <= outer {
+                    let h = (f64::from(v) - disc.base) / disc.height;
+                    s += h;
+                    sx += h * dx;
+                    sy += h * dy;
+                    xx += h * dx * dx;
+                    xy += h * dx * dy;
+                    yy += h * dy * dy;
+                }
+            }
+        }
+        if s <= 0.0 {
+            return None;
+        }
+        let (mx, my) = (sx / s, sy / s);
+        let (xx, xy, yy) = (xx / s - mx * mx, xy / s - mx * my, yy / s - my * my);
+        let twice = (xx - yy).hypot(2.0 * xy);
+        let path = (12.0 * twice).sqrt();
+        let angle = 0.5 * (2.0 * xy).atan2(xx - yy);
+        (path > 0.5 && path < 2.0 * disc.radius_px).then(|| [path * angle.cos(), path * angle.sin()])
     }
 
     /// Variances of the pixels just outside and just inside of a fitted disc's edge, appended to `flat`.
@@ -98,8 +172,8 @@ impl Window {
         fit: &DiscFit<'_>,
         flat: &mut [Vec<f64>; 2],
     ) {
-        let table = fit.table;
-        self.load(pixels, blob, (table.reach_px + 3.0).ceil() as usize);
+        let reach = fit.table.reach_px + fitted.smear_px[0].hypot(fitted.smear_px[1]) / 2.0;
+        self.load(pixels, blob, (reach + 3.0).ceil() as usize);
         let mut sums = [[0.0; 3]; 2];
         for (j, row) in self.heights.chunks_exact(self.width).enumerate() {
             for (i, &v) in row.iter().enumerate() {
@@ -108,7 +182,7 @@ impl Window {
                 let inside = fitted.radius_px - dx.hypot(dy);
                 let v = f64::from(v);
                 let lost = fit.saturated(v);
-                if inside.abs() > table.reach_px && inside.abs() < table.reach_px + 2.0 && !lost {
+                if inside.abs() > reach && inside.abs() < reach + 2.0 && !lost {
                     let s = &mut sums[usize::from(inside > 0.0)];
                     let h = v - fitted.base - if inside > 0.0 { fitted.height } else { 0.0 };
                     s[0] += 1.0;
@@ -137,20 +211,20 @@ impl Window {
         let threshold = levels.threshold(cx, cy);
         for _ in 0..3 {
             // The background is the median of a ring just outside.
-            self.ring.clear();
+            self.ground.clear();
             for (j, row) in self.heights.chunks_exact(self.width).enumerate() {
                 for (i, &v) in row.iter().enumerate() {
                     let (dx, dy) = ((self.x0 + i) as f64 - cx, (self.y0 + j) as f64 - cy);
                     let q = dx * dx + dy * dy;
                     if q > inner && q <= outer && sign * (f64::from(v) - threshold) < 0.0 {
-                        self.ring.push(v);
+                        self.ground.push(v);
                     }
                 }
             }
-            let base = if self.ring.is_empty() {
+            let base = if self.ground.is_empty() {
                 levels.background.at(cx, cy)
             } else {
-                f64::from(self.ring.iter().sum::<f32>()) / self.ring.len() as f64
+                f64::from(self.ground.iter().sum::<f32>()) / self.ground.len() as f64
             };
             let (mut s, mut sx, mut sy, mut q, mut n) = (0.0, 0.0, 0.0, 0.0, 0.0);
             result.saturated = 0;
@@ -183,7 +257,7 @@ impl Window {
             let _ = n;
             cx += sx / s;
             cy += sy / s;
-            result.sigma_px = q.sqrt() / s;
+            result.sigma_px = (q.sqrt() / s).hypot(SHAPE_PX);
         }
         result.x_px = cx;
         result.y_px = cy;

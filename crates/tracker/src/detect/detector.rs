@@ -8,13 +8,14 @@ use std::sync::Arc;
 use super::centre::{Centre, Window};
 use super::contours::contour_centres;
 use super::edge::EdgeTable;
-use super::fit::DiscFit;
+use super::fit::{DiscFit, Fitted};
 use super::lens::Undistort;
 use super::levels::{Levels, Side};
+use super::marker::LARGEST_MISFIT;
 use super::mask::Spans;
 use super::pixels::Pixels;
 use super::runs::{Blob, Labeller, Plan, Segment};
-use super::{Centroid, DetectSettings, Detection, shape};
+use super::{Centroid, DetectSettings, Detection, Flags, shape};
 use crate::error::{Error, Fault, Place, Result};
 use crate::frame::Frame;
 
@@ -29,6 +30,8 @@ pub struct Detector {
     labeller: Labeller,
     blobs: Vec<Blob>,
     window: Window,
+    /// Height of the tallest blob of the frame, px.
+    tallest: u32,
     table: Option<EdgeTable>,
     mask: Vec<u8>,
     row: Vec<u16>,
@@ -57,6 +60,7 @@ impl Detector {
             labeller: Labeller::default(),
             blobs: Vec::new(),
             window: Window::default(),
+            tallest: 0,
             table,
             mask: Vec::new(),
             row: Vec::new(),
@@ -101,6 +105,7 @@ impl Detector {
     fn weighted(&mut self, pixels: &Pixels<'_>, out: &mut Vec<Detection>) {
         // Step 1: blobs beyond the threshold.
         self.labeller.find(pixels, &self.plan, self.levels.side, &mut self.blobs);
+        self.tallest = self.blobs.iter().map(|b| b.y1 - b.y0 + 1).max().unwrap_or(0);
         let [least, most] = self.levels.area_px;
         for i in 0..self.blobs.len() {
             let blob = &self.blobs[i].clone();
@@ -109,28 +114,84 @@ impl Detector {
             if area < least || area > most {
                 continue;
             }
-            // Step 3: centre. Step 4: what its shape says.
-            let centre = self.centre(pixels, blob);
+            // Step 3: centre, or centres where two markers touch. Step 4: what its shape says.
+            if self.split(pixels, blob, out) {
+                continue;
+            }
+            let avoid = self.neighbours(i);
+            let centre = self.centre(pixels, blob, avoid);
             out.push(detection(blob, &centre, &self.levels));
         }
     }
 
-    fn centre(&mut self, pixels: &Pixels<'_>, blob: &Blob) -> Centre {
+    /// Discs of the two blobs nearest to blob `i` that reach into its window.
+    fn neighbours(&self, i: usize) -> [[f64; 3]; 2] {
+        let mut near = [[0.0; 3]; 2];
+        let Some(table) = &self.table else { return near };
+        let blob = &self.blobs[i];
+        let reach = table.reach_px.ceil() as u32 * 2 + 4;
+        let (left, right) = (blob.x0.saturating_sub(reach), blob.x1 + reach);
+        let (above, below) = (blob.y0.saturating_sub(reach), blob.y1 + reach);
+        // Blobs are in order of their first row.
+        let before = self.blobs[..i].iter().rev().take_while(|b| b.y0 + self.tallest > above);
+        let after = self.blobs[i + 1..].iter().take_while(|b| b.y0 <= below);
+        let mut n = 0;
+        for b in before.chain(after) {
+            let meets = b.x0 <= right && b.x1 >= left && b.y0 <= below && b.y1 >= above;
+            if meets && b.area >= 4 && n < 2 {
+                let [x, y] = b.mean();
+                near[n] = [x, y, (b.area as f64 / std::f64::consts::PI).sqrt() * b.elongation().sqrt()];
+                n += 1;
+            }
+        }
+        near
+    }
+
+    /// Two touching markers as two detections, if two discs fit; otherwise false.
+    fn split(&mut self, pixels: &Pixels<'_>, blob: &Blob, out: &mut Vec<Detection>) -> bool {
+        let Some([mut a, mut b]) = shape::two_discs(blob, &self.levels) else { return false };
+        let (Some(table), Some(marker)) = (&self.table, self.levels.marker) else { return false };
+        let fit = disc_fit(table, &self.levels);
+        let mut found = None;
+        for _ in 0..3 {
+            // Each with the other kept out of it, then again with the better places.
+            let fa = self.window.fit_beside(pixels, blob, &fit, a, b);
+            let fb = self.window.fit_beside(pixels, blob, &fit, b, a);
+            let (Some(fa), Some(fb)) = (fa, fb) else { return false };
+            a = [fa.x_px, fa.y_px, fa.radius_px];
+            b = [fb.x_px, fb.y_px, fb.radius_px];
+            found = Some([fa, fb]);
+        }
+        let Some(found) = found else { return false };
+        let slack = (4.0 * marker.radius_spread).max(0.12);
+        let good = found.iter().all(|f| {
+            f.chi2 < shape::misfit_limit(&self.levels) && (f.radius_px / marker.radius_px - 1.0).abs() < slack
+        }) && (a[0] - b[0]).hypot(a[1] - b[1]) > 0.8 * marker.radius_px;
+        if !good {
+            return false;
+        }
+        for f in found {
+            let centre = centre_of(&f);
+            out.push(Detection {
+                x_px: f.x_px,
+                y_px: f.y_px,
+                sigma_px: centre.sigma_px as f32,
+                area_px: (std::f64::consts::PI * f.radius_px * f.radius_px) as f32,
+                peak: centre.peak as f32,
+                elongation: 1.0,
+                flags: Flags(Flags::MERGED | if f.saturated >= 3 { Flags::SATURATED } else { 0 }),
+            });
+        }
+        true
+    }
+
+    fn centre(&mut self, pixels: &Pixels<'_>, blob: &Blob, avoid: [[f64; 3]; 2]) -> Centre {
         if let Some(table) = &self.table {
-            let l = &self.levels;
-            let fit = DiscFit { table, noise: l.noise, side: l.side, saturation: l.saturation };
-            if let Some(f) = self.window.fit(pixels, blob, &fit)
-                && f.rms < 0.15 * f.height.abs() + 2.0 * l.noise.variance(f.base).sqrt()
+            let fit = disc_fit(table, &self.levels);
+            if let Some(f) = self.window.fit(pixels, blob, &fit, avoid)
+                && f.rms < LARGEST_MISFIT * f.height.abs() + 2.0 * self.levels.noise.variance(f.base).sqrt()
             {
-                return Centre {
-                    x_px: f.x_px,
-                    y_px: f.y_px,
-                    // Where the disc fits worse than noise alone, its centre is less sure by as much.
-                    sigma_px: f.sigma_px * f.chi2.max(1.0).sqrt(),
-                    peak: f.height.abs(),
-                    saturated: f.saturated,
-                    fitted: Some(f),
-                };
+                return centre_of(&f);
             }
         }
         self.window.weighted(pixels, &self.spans, blob, &self.levels)
@@ -180,6 +241,32 @@ impl Detector {
             });
         }
         Ok(())
+    }
+}
+
+fn disc_fit<'a>(table: &'a EdgeTable, levels: &Levels) -> DiscFit<'a> {
+    // In much noise more pixels beside the edge are worth their time.
+    let clear = levels.contrast > 30.0 * levels.noise.variance(levels.noise.dark).sqrt();
+    let band_px = if clear { 0.75 } else { 2.0 };
+    DiscFit {
+        table,
+        noise: levels.noise,
+        side: levels.side,
+        saturation: levels.saturation,
+        band_px,
+        usual_chi2: levels.marker.map_or(1.0, |m| m.chi2_high),
+    }
+}
+
+fn centre_of(f: &Fitted) -> Centre {
+    Centre {
+        x_px: f.x_px,
+        y_px: f.y_px,
+        // Where the disc fits worse than noise alone, its centre is less sure by as much.
+        sigma_px: f.sigma_px * f.chi2.max(1.0).sqrt(),
+        peak: f.height.abs(),
+        saturated: f.saturated,
+        fitted: Some(*f),
     }
 }
 

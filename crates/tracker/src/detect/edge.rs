@@ -2,6 +2,8 @@
 //!
 //! Owns: [`EdgeTable`]. Must not: fit anything.
 
+use std::array::from_fn;
+
 /// Steps of distance per pixel.
 const PER_PX: usize = 32;
 /// Directions of the edge from along an axis to along a diagonal.
@@ -74,21 +76,23 @@ impl EdgeTable {
         Self { rows, columns, reach_px: half as f64 / PER_PX as f64 }
     }
 
-    /// Coverage and slope at a distance inside the edge, where the edge's normal has the smaller component
-    /// `minor` (at most 0.71).
+    /// Coverage and slope of eight pixels at distances inside the edge, where the edge's normal has the smaller
+    /// component `minor` (at most 0.71).
     #[inline]
-    pub fn at(&self, inside_px: f32, minor: f32) -> (f32, f32) {
-        let t = (inside_px + self.reach_px as f32) * PER_PX as f32;
-        if t <= 0.0 {
-            return (0.0, 0.0);
-        }
-        let i = (t + 0.5) as usize;
-        if i >= self.columns {
-            return (1.0, 0.0);
-        }
-        let k = ((minor * (DIRECTIONS as f32 * std::f32::consts::SQRT_2)) as usize).min(DIRECTIONS - 1);
-        let [p, slope] = self.rows[k * self.columns + i];
-        (p + slope * (t - i as f32) / PER_PX as f32, slope)
+    pub fn at(&self, inside_px: [f32; 8], minor: [f32; 8]) -> ([f32; 8], [f32; 8]) {
+        let last = (self.columns - 1) as f32;
+        let reach = self.reach_px as f32;
+        let steps = PER_PX as f32;
+        let t = inside_px.map(|d| ((d + reach) * steps).max(0.0).min(last));
+        let column = t.map(|t| (t + 0.5) as i32);
+        let row = minor.map(|m| {
+            (m * (DIRECTIONS as f32 * std::f32::consts::SQRT_2)).min(DIRECTIONS as f32 - 1.0) as i32
+        });
+        let columns = self.columns as i32;
+        let entry: [[f32; 2]; 8] =
+            from_fn(|i| self.rows.get((row[i] * columns + column[i]) as usize).copied().unwrap_or([0.0; 2]));
+        let cover = from_fn(|i| entry[i][0] + entry[i][1] * ((t[i] - column[i] as f32) * (1.0 / steps)));
+        (cover, entry.map(|e| e[1]))
     }
 }
 
@@ -106,7 +110,7 @@ mod tests {
                 let (dx, dy) = (f64::from(x) - c[0], f64::from(y) - c[1]);
                 let rho = dx.hypot(dy);
                 let minor = (dx.abs().min(dy.abs()) / rho) as f32;
-                let p = f64::from(table.at((r - rho) as f32, minor).0);
+                let p = f64::from(table.at([(r - rho) as f32; 8], [minor; 8]).0[0]);
                 worst = worst.max((p - disc_in_pixel(dx, dy, r)).abs());
             }
         }
@@ -117,9 +121,9 @@ mod tests {
     #[test]
     fn blur_keeps_the_middle_and_widens_the_edge() {
         let (sharp, soft) = (EdgeTable::new(50.0, 0.0), EdgeTable::new(50.0, 0.8));
-        assert!((f64::from(soft.at(0.0, 0.3).0) - 0.5).abs() < 0.01);
+        assert!((f64::from(soft.at([0.0; 8], [0.3; 8]).0[0]) - 0.5).abs() < 0.01);
         // One standard deviation of blur and pixel together: sqrt(0.64 + 1/12) = 0.85 px holds 84 %.
-        assert!((f64::from(soft.at(0.85, 0.3).0) - 0.841).abs() < 0.01);
-        assert_eq!(sharp.at(0.85, 0.3).0, 1.0);
+        assert!((f64::from(soft.at([0.85; 8], [0.3; 8]).0[0]) - 0.841).abs() < 0.01);
+        assert_eq!(sharp.at([0.85; 8], [0.3; 8]).0[0], 1.0);
     }
 }

@@ -34,6 +34,12 @@ pub(crate) struct Sample<'a> {
 
 /// Blurs that are tried, px.
 const BLURS_PX: [f64; 8] = [0.0, 0.15, 0.3, 0.45, 0.6, 0.8, 1.1, 1.5];
+/// Band beside the edge while learning, px.
+const BAND_PX: f64 = 1.5;
+/// Longer over shorter axis up to which a blob may be a disc, smeared a little.
+const ROUND: f64 = 1.4;
+/// Root mean square misfit of a disc, as a part of its height.
+pub(crate) const LARGEST_MISFIT: f64 = 0.15;
 /// Blobs that are fitted; more would change nothing.
 const MOST: usize = 60;
 
@@ -45,17 +51,26 @@ pub(crate) fn learn(
     saturation: Option<f64>,
 ) -> Option<(Marker, Noise)> {
     let step = samples.len().div_ceil(MOST).max(1);
-    let samples: Vec<&Sample<'_>> = samples.iter().step_by(step).filter(|s| !s.blob.border).collect();
+    // Only what may be a disc teaches what discs look like.
+    let samples: Vec<&Sample<'_>> = samples
+        .iter()
+        .step_by(step)
+        .filter(|s| !s.blob.border && s.blob.elongation() < ROUND && s.blob.fill() > 0.85)
+        .collect();
     let areas = sorted(samples.iter().map(|s| s.blob.area as f64));
     let radius = (quantile(&areas, 0.5) / std::f64::consts::PI).sqrt();
     if samples.is_empty() || radius < 1.2 {
         return None;
     }
     let mut window = Window::default();
+    let read = noise.read;
     let fits = |table: &EdgeTable, noise: Noise, window: &mut Window| -> Vec<(usize, Fitted)> {
-        let fit = DiscFit { table, noise, side, saturation };
+        let fit = DiscFit { table, noise, side, saturation, band_px: BAND_PX, usual_chi2: 1.0 };
         (0..samples.len())
-            .filter_map(|i| window.fit(&samples[i].pixels, &samples[i].blob, &fit).map(|f| (i, f)))
+            .filter_map(|i| {
+                window.fit(&samples[i].pixels, &samples[i].blob, &fit, [[0.0; 3]; 2]).map(|f| (i, f))
+            })
+            .filter(|(_, f)| f.rms < LARGEST_MISFIT * f.height.abs() + 2.0 * read.sqrt())
             .collect()
     };
     // Step 1: the blur whose discs fit best, first on the list, then between its neighbours.
@@ -90,7 +105,7 @@ pub(crate) fn learn(
     let table = EdgeTable::new(radius, blur);
     let found = fits(&table, noise, &mut window);
     let mut flat = [Vec::new(), Vec::new()];
-    let fit = DiscFit { table: &table, noise, side, saturation };
+    let fit = DiscFit { table: &table, noise, side, saturation, band_px: BAND_PX, usual_chi2: 1.0 };
     for (i, f) in &found {
         window.flat_variances(&samples[*i].pixels, &samples[*i].blob, f, &fit, &mut flat);
     }

@@ -17,6 +17,7 @@ mod mask;
 mod pixels;
 mod runs;
 mod shape;
+mod skip;
 #[cfg(test)]
 mod tests;
 

@@ -62,6 +62,15 @@ impl<'a> Pixels<'a> {
         (bit / 8, bit % 8)
     }
 
+    /// First byte from which packed groups are counted for row `y`.
+    pub fn group_origin(&self, y: usize) -> usize {
+        if self.row_bits == self.width * self.format.bits_per_pixel() as usize {
+            0
+        } else {
+            y * self.row_bits / 8
+        }
+    }
+
     /// Samples from `x` of row `y` into `out`, as many as `out` holds.
     ///
     /// Both ends must lie inside the row.
@@ -85,6 +94,19 @@ impl<'a> Pixels<'a> {
         }
     }
 
+    /// The same as floats, appended to `out`; `row` is scratch.
+    #[inline]
+    pub fn append(&self, y: usize, x: usize, count: usize, row: &mut Vec<u16>, out: &mut Vec<f32>) {
+        if self.format == PixelFormat::Gray8 {
+            let (byte, _) = self.start(y, x);
+            out.extend(self.bytes[byte..byte + count].iter().map(|&b| f32::from(b)));
+        } else {
+            row.resize(count, 0);
+            self.read(y, x, row);
+            out.extend(row.iter().map(|&v| f32::from(v)));
+        }
+    }
+
     /// Most significant bits first; a sample of 10 or 12 bits spans at most three bytes.
     fn unpack<const BITS: usize>(&self, byte: usize, skip: usize, out: &mut [u16]) {
         let mut bit = byte * 8 + skip;
@@ -98,22 +120,27 @@ impl<'a> Pixels<'a> {
     }
 }
 
+/// Samples as a stream of bits, most significant first; 16 bits little-endian.
+#[cfg(test)]
+pub(crate) fn pack(values: &[u16], bits: usize) -> Vec<u8> {
+    if bits == 16 {
+        return values.iter().flat_map(|v| v.to_le_bytes()).collect();
+    }
+    let mut bytes = vec![0u8; (values.len() * bits).div_ceil(8)];
+    for (i, &v) in values.iter().enumerate() {
+        for b in 0..bits {
+            if v >> (bits - 1 - b) & 1 == 1 {
+                let at = i * bits + b;
+                bytes[at / 8] |= 0x80 >> (at % 8);
+            }
+        }
+    }
+    bytes
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn packed(values: &[u16], bits: usize) -> Vec<u8> {
-        let mut bytes = vec![0u8; (values.len() * bits).div_ceil(8)];
-        for (i, &v) in values.iter().enumerate() {
-            for b in 0..bits {
-                if v >> (bits - 1 - b) & 1 == 1 {
-                    let at = i * bits + b;
-                    bytes[at / 8] |= 0x80 >> (at % 8);
-                }
-            }
-        }
-        bytes
-    }
 
     #[test]
     fn packed_rows_that_end_inside_a_byte_are_read_back() {
@@ -128,7 +155,7 @@ mod tests {
                 stride: 0,
                 format,
                 depth_bits: bits as u32,
-                plane: Some(Box::new(packed(&values, bits))),
+                plane: Some(Box::new(pack(&values, bits))),
             };
             let pixels = Pixels::of(&frame).unwrap().unwrap();
             for y in 0..h {

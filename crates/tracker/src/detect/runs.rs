@@ -6,6 +6,8 @@
 
 use super::levels::Side;
 use super::pixels::Pixels;
+use super::skip::{Sample, Skip};
+use crate::frame::PixelFormat;
 
 /// What one pass adds up about a connected set of pixels beyond the threshold.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -117,10 +119,12 @@ pub(crate) struct Labeller {
     parents: Vec<u32>,
     blobs: Vec<Blob>,
     row: Vec<u16>,
+    skip: Skip,
 }
 
-/// Pixels tested at once before any is looked at on its own.
-const CHUNK: usize = 64;
+/// Pixels tested at once, first many, then few, before any is looked at on its own.
+const MANY: usize = 128;
+const FEW: usize = 16;
 
 impl Labeller {
     /// Appends the blobs of a frame to `out` (cleared first), in order of their first pixel.
@@ -145,24 +149,39 @@ impl Labeller {
     }
 
     fn scan(&mut self, pixels: &Pixels<'_>, y: usize, s: Segment, edge_rows: (usize, usize), side: Side) {
-        let mut row = std::mem::take(&mut self.row);
-        row.resize((s.end - s.start) as usize, 0);
-        pixels.read(y, s.start as usize, &mut row);
+        if !self.skip.may_hold(pixels, y, (s.start, s.end), s.threshold, side) {
+            return;
+        }
         let edge_row = y == edge_rows.0 || y == edge_rows.1;
+        if pixels.format == PixelFormat::Gray8 {
+            let from = pixels.start(y, s.start as usize).0;
+            self.runs(&pixels.bytes[from..from + (s.end - s.start) as usize], y, s, edge_row, side);
+        } else {
+            let mut row = std::mem::take(&mut self.row);
+            row.resize((s.end - s.start) as usize, 0);
+            pixels.read(y, s.start as usize, &mut row);
+            self.runs(&row, y, s, edge_row, side);
+            self.row = row;
+        }
+    }
+
+    /// The runs of a stretch in which there may be some.
+    fn runs<T: Sample>(&mut self, row: &[T], y: usize, s: Segment, edge_row: bool, side: Side) {
+        let Some(limit) = T::limit(s.threshold, side) else { return };
         let mut open: Option<u32> = None;
         let mut x = s.start;
-        for chunk in row.chunks(CHUNK) {
-            let extreme = match side {
-                Side::Bright => chunk.iter().fold(0, |m: u16, &v| m.max(v)) >= s.threshold,
-                Side::Dark => chunk.iter().fold(u16::MAX, |m: u16, &v| m.min(v)) <= s.threshold,
-            };
-            if extreme {
-                for &v in chunk {
-                    let beyond = match side {
-                        Side::Bright => v >= s.threshold,
-                        Side::Dark => v <= s.threshold,
-                    };
-                    match (beyond, open) {
+        for many in row.chunks(MANY) {
+            if open.is_none() && !T::any(many, limit, side) {
+                x += many.len() as u32;
+                continue;
+            }
+            for few in many.chunks(FEW) {
+                if open.is_none() && !T::any(few, limit, side) {
+                    x += few.len() as u32;
+                    continue;
+                }
+                for &v in few {
+                    match (v.beyond(limit, side), open) {
                         (true, None) => open = Some(x),
                         (false, Some(x0)) => {
                             self.run(y as u32, x0, x, edge_row || (s.edge.0 && x0 == s.start));
@@ -172,17 +191,11 @@ impl Labeller {
                     }
                     x += 1;
                 }
-            } else {
-                if let Some(x0) = open.take() {
-                    self.run(y as u32, x0, x, edge_row || (s.edge.0 && x0 == s.start));
-                }
-                x += chunk.len() as u32;
             }
         }
         if let Some(x0) = open {
             self.run(y as u32, x0, x, edge_row || (s.edge.0 && x0 == s.start) || s.edge.1);
         }
-        self.row = row;
     }
 
     fn run(&mut self, y: u32, x0: u32, end: u32, border: bool) {

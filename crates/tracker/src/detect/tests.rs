@@ -167,3 +167,73 @@ fn the_contour_method_finds_the_same_markers() {
         assert!(found.iter().any(|d| (d.x_px - t[0]).hypot(d.y_px - t[1]) < 0.35), "{t:?}");
     }
 }
+
+#[test]
+fn the_number_of_threads_changes_no_bit() {
+    let frames: Vec<Frame> = (0..24)
+        .map(|i| {
+            let discs = scattered(i, 12, 6.0, 150.0);
+            Scene { size: [168, 168], ground: 20.0, noise: 6.0, discs, top: 255.0 }.frame(i, 8)
+        })
+        .collect();
+    let settings = DetectSettings::default();
+    let levels = learn(&frames[..6], &settings);
+    let run = |threads: usize| -> Vec<Vec<Detection>> {
+        let mut found = vec![Vec::new(); frames.len()];
+        std::thread::scope(|scope| {
+            for (frames, found) in
+                frames.chunks(frames.len().div_ceil(threads)).zip(found.chunks_mut(24usize.div_ceil(threads)))
+            {
+                let (levels, settings) = (&levels, &settings);
+                scope.spawn(move || {
+                    let mut detector = Detector::new(Arc::clone(levels), settings).unwrap();
+                    for (frame, out) in frames.iter().zip(found) {
+                        detector.detect(frame, out).unwrap();
+                    }
+                });
+            }
+        });
+        found
+    };
+    let one = run(1);
+    assert!(one.iter().all(|f| f.len() == 12));
+    // Equal to the bit: no tolerance.
+    assert_eq!(one, run(2));
+    assert_eq!(one, run(8));
+}
+
+#[test]
+fn touching_markers_are_two_detections_and_half_a_marker_is_flagged() {
+    let teach: Vec<Frame> = (0..4)
+        .map(|i| {
+            let discs = scattered(i, 12, 6.0, 200.0);
+            Scene { size: [168, 168], ground: 20.0, noise: 1.0, discs, top: 255.0 }.frame(i, 8)
+        })
+        .collect();
+    let settings = DetectSettings::default();
+    let levels = learn(&teach, &settings);
+    let pair = Scene {
+        size: [168, 168],
+        ground: 20.0,
+        noise: 1.0,
+        discs: vec![[60.3, 60.7, 6.0, 200.0], [71.9, 63.2, 6.0, 200.0], [120.0, 120.0, 6.0, 200.0]],
+        top: 255.0,
+    };
+    let found = detect(&pair.frame(9, 8), &levels, &settings);
+    assert_eq!(found.len(), 3, "{found:?}");
+    for t in &pair.discs {
+        // A tenth of a pixel: the edge where they touch is left out of both.
+        let near = found.iter().find(|d| (d.x_px - t[0]).hypot(d.y_px - t[1]) < 0.1);
+        assert!(near.is_some_and(|d| d.flags.has(Flags::MERGED) == (t[0] < 100.0)), "{t:?} {found:?}");
+    }
+    // A third of a marker hidden behind something dark.
+    let mut frame = pair.frame(10, 8);
+    let mut bytes = frame.plane.as_ref().unwrap().bytes().to_vec();
+    for y in 112..130 {
+        bytes[y * 168 + 122..y * 168 + 130].fill(20);
+    }
+    frame.plane = Some(Box::new(bytes));
+    let found = detect(&frame, &levels, &settings);
+    let hidden = found.iter().find(|d| d.y_px > 100.0).unwrap();
+    assert!(hidden.flags.has(Flags::PARTIAL), "{hidden:?}");
+}

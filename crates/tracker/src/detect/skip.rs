@@ -1,0 +1,220 @@
+//! Passing over background at vector speed: whether any pixel of a stretch is beyond the threshold.
+//!
+//! Owns: [`Skip`], the trait [`Sample`]. Must not: say where. Written so that the compiler makes vector
+//! instructions of it: saturating differences, or-ed together, one test at the end.
+
+use super::levels::Side;
+use super::pixels::Pixels;
+use crate::frame::PixelFormat;
+
+/// A sample that can be compared with a threshold many at a time.
+pub(crate) trait Sample: Copy {
+    /// The threshold as a limit to subtract; `None` where no sample of this type can be beyond it.
+    fn limit(threshold: u16, side: Side) -> Option<Self>;
+    /// Whether any sample is beyond the limit.
+    fn any(values: &[Self], limit: Self, side: Side) -> bool;
+    /// Whether this one is.
+    fn beyond(self, limit: Self, side: Side) -> bool;
+}
+
+macro_rules! sample {
+    ($t:ty) => {
+        impl Sample for $t {
+            #[inline]
+            fn limit(threshold: u16, side: Side) -> Option<Self> {
+                // Beyond is above the limit for bright markers and below it for dark ones.
+                match side {
+                    Side::Bright => <$t>::try_from(threshold.saturating_sub(1)).ok(),
+                    Side::Dark => Some(<$t>::try_from(threshold.saturating_add(1)).unwrap_or(<$t>::MAX)),
+                }
+            }
+
+            #[inline]
+            fn any(values: &[Self], limit: Self, side: Side) -> bool {
+                let mut beyond: $t = 0;
+                match side {
+                    Side::Bright => {
+                        for &v in values {
+                            beyond |= v.saturating_sub(limit);
+                        }
+                    }
+                    Side::Dark => {
+                        for &v in values {
+                            beyond |= limit.saturating_sub(v);
+                        }
+                    }
+                }
+                beyond != 0
+            }
+
+            #[inline]
+            fn beyond(self, limit: Self, side: Side) -> bool {
+                match side {
+                    Side::Bright => self > limit,
+                    Side::Dark => self < limit,
+                }
+            }
+        }
+    };
+}
+sample!(u8);
+sample!(u16);
+
+/// Sixteen-bit words of a packed stretch tested at once: a multiple of the packing's period and of a vector.
+const LANES: usize = 120;
+
+/// For a packed format: at each byte of the period a big-endian word holds one whole sample or none. `keep`
+/// takes the neighbours' upper bits away, `limit` is the threshold shifted to where the sample lies; the lower
+/// bits that are left of its neighbour do not change the comparison.
+#[derive(Debug, Clone, PartialEq)]
+struct Words {
+    keep: [[u16; LANES]; 2],
+    limit: [[u16; LANES]; 2],
+}
+
+impl Words {
+    fn new(bits: usize, threshold: u16, side: Side) -> Self {
+        let period = if bits == 12 { 3 } else { 5 };
+        let never = match side {
+            Side::Bright => u16::MAX,
+            Side::Dark => 0,
+        };
+        let mut this = Self { keep: [[0; LANES]; 2], limit: [[never; LANES]; 2] };
+        for phase in 0..2 {
+            for lane in 0..LANES {
+                let byte = (2 * lane + phase) % period;
+                let within = (byte * 8).next_multiple_of(bits) - byte * 8;
+                if within >= 8 {
+                    continue;
+                }
+                let shift = 16 - within - bits;
+                this.keep[phase][lane] = u16::MAX >> within;
+                let t = u32::from(threshold);
+                this.limit[phase][lane] = match side {
+                    Side::Bright => (t << shift).saturating_sub(1).min(0xffff) as u16,
+                    Side::Dark => ((t + 1) << shift).min(0xffff) as u16,
+                };
+            }
+        }
+        this
+    }
+
+    /// Whether any sample in `2 * LANES` bytes is beyond; `bytes` has one more.
+    #[inline]
+    fn any(&self, bytes: &[u8], side: Side) -> bool {
+        let mut beyond = 0;
+        for phase in 0..2 {
+            let words = bytes[phase..phase + 2 * LANES].chunks_exact(2);
+            for ((b, keep), limit) in words.zip(&self.keep[phase]).zip(&self.limit[phase]) {
+                let v = u16::from_be_bytes([b[0], b[1]]) & keep;
+                beyond |= match side {
+                    Side::Bright => v.saturating_sub(*limit),
+                    Side::Dark => limit.saturating_sub(v),
+                };
+            }
+        }
+        beyond != 0
+    }
+}
+
+/// Says whether a stretch may hold a pixel beyond the threshold. Never wrongly no.
+#[derive(Debug, Default)]
+pub(crate) struct Skip {
+    words: Option<(u16, Side, PixelFormat, Box<Words>)>,
+}
+
+impl Skip {
+    /// Whether columns `start..end` of row `y` may hold a pixel beyond the threshold. For packed rows that do
+    /// not end on whole bytes the pixels just before and behind are looked at too.
+    #[inline]
+    pub fn may_hold(
+        &mut self,
+        pixels: &Pixels<'_>,
+        y: usize,
+        columns: (u32, u32),
+        threshold: u16,
+        side: Side,
+    ) -> bool {
+        let (start, end) = (columns.0 as usize, columns.1 as usize);
+        let from = pixels.start(y, start).0;
+        match pixels.format {
+            PixelFormat::Gray8 => u8::limit(threshold, side)
+                .is_some_and(|limit| u8::any(&pixels.bytes[from..from + end - start], limit, side)),
+            PixelFormat::Gray16 => {
+                let Some(limit) = u16::limit(threshold, side) else { return false };
+                let mut beyond = 0;
+                for b in pixels.bytes[from..from + 2 * (end - start)].chunks_exact(2) {
+                    let v = u16::from_le_bytes([b[0], b[1]]);
+                    beyond |= match side {
+                        Side::Bright => v.saturating_sub(limit),
+                        Side::Dark => limit.saturating_sub(v),
+                    };
+                }
+                beyond != 0
+            }
+            PixelFormat::Packed10 | PixelFormat::Packed12 => {
+                let bits = pixels.format.bits_per_pixel() as usize;
+                let known = matches!(&self.words, Some((t, s, f, _))
+                    if *t == threshold && *s == side && *f == pixels.format);
+                if !known {
+                    let words = Box::new(Words::new(bits, threshold, side));
+                    self.words = Some((threshold, side, pixels.format, words));
+                }
+                let Some((_, _, _, words)) = &self.words else { return true };
+                // Back to the start of a group of samples that begins on a byte.
+                let origin = pixels.group_origin(y);
+                let period = if bits == 12 { 3 } else { 5 };
+                let mut at = origin + (from - origin) / period * period;
+                let (last, skip) = pixels.start(y, end);
+                let last = last + usize::from(skip > 0);
+                while at < last {
+                    let Some(chunk) = pixels.bytes.get(at..at + 2 * LANES + 1) else { return true };
+                    if words.any(chunk, side) {
+                        return true;
+                    }
+                    at += 2 * LANES;
+                }
+                false
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_single_pixel_is_never_passed_over_in_any_format() {
+        for format in [PixelFormat::Gray8, PixelFormat::Gray16, PixelFormat::Packed10, PixelFormat::Packed12]
+        {
+            let bits = format.bits_per_pixel() as usize;
+            let top = if bits == 16 { 4095 } else { (1u32 << bits) - 1 } as u16;
+            // An odd width, so that packed rows end inside bytes.
+            let (w, h) = (701usize, 3usize);
+            for side in [Side::Bright, Side::Dark] {
+                let (ground, t) = match side {
+                    Side::Bright => (top / 2, top / 2 + 1),
+                    Side::Dark => (top / 2, top / 2 - 1),
+                };
+                for x in [0, 1, 2, 3, 4, 5, 158, 159, 160, 161, 350, 697, 698, 699, 700] {
+                    let mut values = vec![ground; w * h];
+                    values[w + x] = t;
+                    let bytes = crate::detect::pixels::pack(&values, bits);
+                    let pixels = Pixels::of_samples(&bytes, w, h, format);
+                    let mut skip = Skip::default();
+                    assert!(skip.may_hold(&pixels, 1, (0, w as u32), t, side), "{format:?} {side:?} {x}");
+                    // A step farther and nothing is beyond; the last row's tail may be looked at in full.
+                    let farther = match side {
+                        Side::Bright => t + 1,
+                        Side::Dark => t - 1,
+                    };
+                    assert!(
+                        !skip.may_hold(&pixels, 0, (0, w as u32), farther, side),
+                        "{format:?} {side:?} {x} farther"
+                    );
+                }
+            }
+        }
+    }
+}
