@@ -47,17 +47,8 @@ pub fn discover(store: &DetectionStore, image_px: [u32; 2]) -> Result<Discovery>
                 .advice("Give a rig with --rig, or a longer recording"),
         ));
     }
-    let links = bodies::find_bodies(&sample);
-    let mut found: Vec<Found> = links
-        .into_iter()
-        .map(|link| Found { link, poses: Vec::with_capacity(sample.frames.len()) })
-        .collect();
-    let links: Vec<_> = found.iter().map(|f| f.link.clone()).collect();
-    for frame in &sample.moving {
-        for (f, s) in found.iter_mut().zip(bodies::poses(&links, frame)) {
-            f.poses.push(s.map(|s| s.fit.pose));
-        }
-    }
+    let mut sample = sample;
+    let mut found = moving_bodies(&mut sample);
     let standing = sample.standing.clone();
     if found.is_empty() {
         found = lone::find_lone(store, &sample, &standing);
@@ -87,6 +78,34 @@ pub fn discover(store: &DetectionStore, image_px: [u32; 2]) -> Result<Discovery>
         ));
     }
     Ok(Discovery { rig, standing: standing.iter().map(|p| [p.x, p.y]).collect(), warnings })
+}
+
+/// Bodies with their poses. Those that do not move are no bodies: their points are counted among the standing.
+fn moving_bodies(sample: &mut Sample) -> Vec<Found> {
+    loop {
+        let links = bodies::find_bodies(sample);
+        let mut found: Vec<Found> = links
+            .iter()
+            .map(|link| Found { link: link.clone(), poses: Vec::with_capacity(sample.frames.len()) })
+            .collect();
+        for frame in &sample.moving {
+            for (f, s) in found.iter_mut().zip(bodies::poses(&links, frame)) {
+                f.poses.push(s.map(|s| s.fit.pose));
+            }
+        }
+        let mut changed = false;
+        for f in &found {
+            for &t in &f.link.template {
+                let places: Vec<Vector2<f64>> = f.poses.iter().flatten().map(|p| place(p, t)).collect();
+                if let Some(still) = sample::still_place(&places) {
+                    changed |= sample.stands(still);
+                }
+            }
+        }
+        if !changed {
+            return found;
+        }
+    }
 }
 
 /// The frame of the sample in which most nodes are seen, the first of those, and whether it shows all.

@@ -14,6 +14,8 @@ const FRAMES: usize = 3000;
 const KEPT: usize = 400;
 /// Below this a place has not changed, px.
 const SAME_PLACE_PX: f64 = 1.5;
+/// Within this of its middle a marker does not move, px: what comes and goes in front of it shifts it so far.
+const STILL_PX: f64 = 6.0;
 /// Part of the kept frames in which a standing point is seen at least.
 const STANDING_PART: f64 = 0.6;
 
@@ -84,6 +86,33 @@ impl Sample {
         }
         sample
     }
+}
+
+impl Sample {
+    /// Counts a place among the standing, and what is seen there no longer among the moving. Whether there was
+    /// any such.
+    pub fn stands(&mut self, still: Vector2<f64>) -> bool {
+        let mut changed = false;
+        for frame in &mut self.moving {
+            let before = frame.len();
+            frame.retain(|d| (at(d) - still).norm() > STILL_PX);
+            changed |= frame.len() != before;
+        }
+        if self.standing.iter().all(|p| (p - still).norm() > SAME_PLACE_PX) {
+            self.standing.push(still);
+        }
+        changed
+    }
+}
+
+/// The middle of places that are all but a tenth within [`STILL_PX`] of it: a marker that does not move.
+pub fn still_place(places: &[Vector2<f64>]) -> Option<Vector2<f64>> {
+    if places.is_empty() {
+        return None;
+    }
+    let centre = super::bodies::middle(places);
+    let far = places.iter().filter(|p| (*p - centre).norm() > STILL_PX).count();
+    (10 * far <= places.len()).then_some(centre)
 }
 
 /// Places at which something is seen in most of the frames.
