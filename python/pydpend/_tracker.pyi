@@ -4,37 +4,53 @@ Shapes: T frames, N nodes. Images are (H, W), uint8 or uint16. What is not seen 
 """
 
 from collections.abc import Callable, Sequence
-from typing import Any, Self, TypeAlias, final
+from typing import Any, Self, final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pydpend.crossing import (
+    Callback,
+    Columns,
+    DetectArguments,
+    Found,
+    Frames,
+    HeldColumns,
+    OpenArguments,
+    Row,
+)
+
+__all__ = [
+    "VERSION",
+    "Film",
+    "LiveTracker",
+    "arrow_reader",
+    "check_table",
+    "detect",
+    "follow_motion",
+    "info",
+    "learn_noise",
+    "poincare_section",
+    "read_meta",
+    "read_rig",
+    "read_table",
+    "rig_toml",
+    "score_places",
+    "setup",
+    "shooting_fit",
+    "shooting_segments",
+    "shooting_trace",
+    "simulate_ensemble",
+    "simulate_motion",
+    "smooth_angles",
+    "tangent_growth",
+    "term_names",
+    "track",
+    "unit_powers",
+    "write_table",
+]
+
 VERSION: str
-
-HeldColumns: TypeAlias = tuple[
-    NDArray[np.int64],
-    NDArray[np.float64],
-    NDArray[np.float64],
-    NDArray[np.float32],
-    NDArray[np.float32],
-    NDArray[np.uint8],
-]
-Columns: TypeAlias = tuple[
-    NDArray[np.int64],
-    NDArray[np.float64],
-    NDArray[np.float64],
-    NDArray[np.float32],
-    NDArray[np.float32],
-    NDArray[np.uint8],
-    str,
-]
-
-Found: TypeAlias = tuple[NDArray[np.float64], NDArray[np.float32], NDArray[np.uint8]]
-Row: TypeAlias = tuple[NDArray[np.float64], NDArray[np.float32], NDArray[np.float32], NDArray[np.uint8]]
-DetectArguments: TypeAlias = tuple[float | None, str, str]
-OpenArguments: TypeAlias = tuple[float | None, str, bool, int]
-Frames: TypeAlias = tuple[int, int | None] | None
-Callback: TypeAlias = Callable[[str, int, int | None], object] | None
 
 def track(
     input: str,
@@ -64,6 +80,7 @@ def detect(
 ) -> Found:
     """Centres (D, 2) in px; sigma in px, area in px, peak, elongation (D, 4); flags (D,)."""
 
+@final
 class LiveTracker:
     """Follows the markers of a rig, image by image."""
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pydpend import _tracker
+from pydpend.crossing import Columns, HeldColumns
 from pydpend.errors import ArgumentError, fault
 
 if TYPE_CHECKING:
@@ -219,7 +220,7 @@ class Nodes:
         reader = _tracker.arrow_reader(self._columns(), self.rig.to_json())
         return reader.__arrow_c_stream__(requested_schema)
 
-    def _columns(self) -> _tracker.HeldColumns:
+    def _columns(self) -> HeldColumns:
         columns = (self.frame, self.t_s, self.xy_px, self.sigma_px, self.area_px, self.status)
         wanted = (
             ("frame", np.int64, 1),
@@ -257,7 +258,7 @@ class Nodes:
         return json.dumps({**meta, "rig": json.loads(self.rig.to_json())})
 
 
-def nodes_of(columns: _tracker.Columns) -> Nodes:
+def nodes_of(columns: Columns) -> Nodes:
     """Nodes of what the compiled half hands over."""
     frame, t_s, xy_px, sigma_px, area_px, status, text = columns
     meta = json.loads(text)

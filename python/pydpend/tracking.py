@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pydpend import _tracker
+from pydpend.crossing import Found
 from pydpend.errors import ArgumentError, fault
 from pydpend.nodes import Nodes, Rig, nodes_of
 
@@ -242,7 +243,7 @@ def info(path: Path, *, fps: float | None = None, decoder: Decoder = "auto") -> 
     return known
 
 
-def _detections(found: _tracker.Found) -> NDArray[np.void]:
+def _detections(found: Found) -> NDArray[np.void]:
     xy_px, rest, flags = found
     out = np.empty(len(flags), dtype=DETECTION)
     out["x_px"], out["y_px"] = xy_px.T

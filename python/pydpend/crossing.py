@@ -1,0 +1,38 @@
+"""The types of what crosses between Python and the compiled half.
+
+T frames, N nodes, D detections. What is not seen is NaN.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+HeldColumns: TypeAlias = tuple[
+    NDArray[np.int64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.float32],
+    NDArray[np.float32],
+    NDArray[np.uint8],
+]
+Columns: TypeAlias = tuple[
+    NDArray[np.int64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.float32],
+    NDArray[np.float32],
+    NDArray[np.uint8],
+    str,
+]
+
+Found: TypeAlias = tuple[NDArray[np.float64], NDArray[np.float32], NDArray[np.uint8]]
+Row: TypeAlias = tuple[NDArray[np.float64], NDArray[np.float32], NDArray[np.float32], NDArray[np.uint8]]
+DetectArguments: TypeAlias = tuple[float | None, str, str]
+OpenArguments: TypeAlias = tuple[float | None, str, bool, int]
+Frames: TypeAlias = tuple[int, int | None] | None
+Callback: TypeAlias = Callable[[str, int, int | None], object] | None
+"""Called with stage, frames done and frames in all, if known."""
