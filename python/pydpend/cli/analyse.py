@@ -1,0 +1,86 @@
+"""From recordings to a report: tracks films, finds angles, compares an encoder, fits the damping.
+
+Finished stages are kept: call it again after a change and only what depends on the change is done again.
+
+  pydpend analyse drop.mp4 --encoder drop.csv --calibration holds/ -o run/
+  pydpend analyse trial1.parquet trial2.parquet -o both/
+  pydpend analyse --config run.toml -o run/
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from dataclasses import fields, replace
+from pathlib import Path
+
+HELP = "film, nodes or angles in, a run folder with a report out"
+
+
+def add_arguments(p: argparse.ArgumentParser) -> None:
+    """One flag for each field of `Options`, and how to run."""
+    from pydpend.analyse.options import Options, option_docs
+
+    docs = option_docs()
+    p.add_argument("inputs", nargs="*", metavar="RECORDING|NODES|ANGLES", help=docs["inputs"])
+    p.add_argument("-o", "--output", metavar="DIR", help="run folder, made or gone on with")
+    p.add_argument("--config", metavar="TOML", help="options from a file; flags given besides replace them")
+    p.add_argument("--write-config", action="store_true", help="print the options as TOML and stop")
+    p.add_argument("--dry-run", action="store_true", help="say what would be done and stop")
+    p.add_argument("--json", action="store_true", help="print what was done as JSON")
+    p.add_argument("--quiet", action="store_true", help="no progress")
+    for f in fields(Options):
+        if f.name == "inputs":
+            continue
+        flag = "--" + f.name.removesuffix("_s").removesuffix("_deg").replace("_", "-")
+        text = docs[f.name].replace("``", "").replace("%", "%%")
+        kind = str(f.type)
+        if kind == "bool":
+            p.add_argument(flag, dest=f.name, action=argparse.BooleanOptionalAction, default=None, help=text)
+        else:
+            number = float if kind.startswith("float") else int if kind.startswith("int") else str
+            p.add_argument(flag, dest=f.name, type=number, default=None, help=text)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Runs the stages."""
+    from pydpend.analyse import Options, analyse, plan, read_config, write_config
+    from pydpend.analyse.folder import RunFolder
+    from pydpend.errors import PydpendError, fault
+
+    options = read_config(args.config) if args.config else Options()
+    given = {f.name: getattr(args, f.name) for f in fields(Options) if f.name != "inputs"}
+    given = {k: v for k, v in given.items() if v is not None}
+    if args.inputs:
+        given["inputs"] = tuple(args.inputs)
+    options = replace(options, **given)
+    if args.write_config:
+        print(write_config(options))
+        return 0
+    if args.output is None:
+        raise PydpendError(fault("-o", "the run folder is not named", "Give -o DIR"))
+    folder = Path(args.output)
+    if args.dry_run:
+        todo = plan(options, folder)
+        run_folder = RunFolder.open(folder) if (folder / "run.json").exists() else RunFolder(folder)
+        states = {s.name: "kept" if run_folder.holds(s.name, s.key) else "to do" for s in todo}
+        if args.json:
+            print(json.dumps(states, indent=1))
+        else:
+            for s in todo:
+                print(f"{states[s.name]:6} {s.title}")
+        return 0
+
+    def tell(number: int, of: int, title: str, what: str) -> None:
+        if not args.quiet and what != "start":
+            print(f"[{number}/{of}] {title}: {what}", file=sys.stderr, flush=True)
+        elif not args.quiet and sys.stderr.isatty():
+            print(f"[{number}/{of}] {title} ...", end="\r", file=sys.stderr, flush=True)
+
+    outcome = analyse(options, folder, tell)
+    if args.json:
+        print(json.dumps(outcome.to_json(), indent=1))
+    else:
+        print(f"{outcome.message}; report: {outcome.folder / 'report.html'}")
+    return 0 if outcome.status == "done" else 1

@@ -1,0 +1,224 @@
+// The report's plots, the film beside them, and one cursor for all. Needs uPlot; asks nothing of a network.
+"use strict";
+(() => {
+  const data = JSON.parse(document.getElementById("report-data").textContent);
+  const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+  const STATUS = { missing: "--line", seen: "--s2", reacquired: "--s0", ambiguous: "--s1" };
+  const STATUS_BY_CODE = ["missing", "seen", "reacquired", "ambiguous"];
+
+  // Arrays are base64 of little-endian float32; NaN is a gap, which uPlot calls null.
+  const cache = new Map();
+  function array(key) {
+    if (!cache.has(key)) {
+      const raw = atob(data.arrays[key]);
+      const bytes = new Uint8Array(raw.length);
+      for (let i = 0; i < raw.length; i++) bytes[i] = raw.charCodeAt(i);
+      cache.set(key, Array.from(new Float32Array(bytes.buffer), (v) => (Number.isNaN(v) ? null : v)));
+    }
+    return cache.get(key);
+  }
+
+  // Charts of one group share their time range and their cursor.
+  const groups = new Map();
+  function group(name) {
+    if (!groups.has(name)) groups.set(name, { charts: [], range: null, film: null, busy: false, time: null });
+    return groups.get(name);
+  }
+
+  function setRange(g, min, max) {
+    if (g.busy) return;
+    g.busy = true;
+    g.range = [min, max];
+    for (const c of g.charts) c.setScale("x", { min, max });
+    g.busy = false;
+  }
+
+  function full(g) {
+    let min = Infinity, max = -Infinity;
+    for (const c of g.charts) {
+      const x = c.data[0];
+      if (x.length) { min = Math.min(min, x[0]); max = Math.max(max, x[x.length - 1]); }
+    }
+    return [min, max];
+  }
+
+  function putCursor(g, time) {
+    g.time = time;
+    for (const c of g.charts) {
+      const left = c.valToPos(time, "x");
+      if (Number.isFinite(left)) c.setCursor({ left, top: -10 }, false);
+    }
+  }
+
+  function gotoTime(g, time) {
+    putCursor(g, time);
+    if (g.film) g.film.seek(time);
+  }
+
+  function statusMap(spec) {
+    return (u) => {
+      const { ctx } = u, nodes = spec.nodes;
+      const top = u.bbox.top, height = u.bbox.height / nodes.length;
+      ctx.save();
+      ctx.beginPath();
+      ctx.rect(u.bbox.left, u.bbox.top, u.bbox.width, u.bbox.height);
+      ctx.clip();
+      for (let n = 0; n < nodes.length; n++) {
+        for (const [code, from, to] of spec.runs[n]) {
+          const x0 = u.valToPos(from, "x", true), x1 = Math.max(u.valToPos(to, "x", true), x0 + devicePixelRatio);
+          if (x1 < u.bbox.left || x0 > u.bbox.left + u.bbox.width) continue;
+          ctx.fillStyle = css(STATUS[STATUS_BY_CODE[code]]);
+          ctx.fillRect(x0, top + n * height + height * 0.12, x1 - x0, height * 0.76);
+        }
+      }
+      ctx.restore();
+    };
+  }
+
+  function options(spec, width, g) {
+    const ink = css("--ink"), grid = { stroke: css("--grid"), width: 1 };
+    const axis = { stroke: ink, grid, ticks: grid, font: "12px system-ui, sans-serif", labelFont: "12px system-ui, sans-serif", labelSize: 18 };
+    const series = [{ label: spec.x_label, value: (u, v) => (v == null ? "–" : v.toFixed(4)) }];
+    const bands = [];
+    for (const s of spec.series) {
+      const stroke = s.color === undefined ? "transparent" : css(`--s${s.color % 6}`);
+      series.push({
+        label: s.label, stroke: s.band ? "transparent" : stroke, width: s.points ? 0 : 1.25,
+        points: s.points ? { show: true, size: 4, fill: stroke, stroke } : { show: false },
+        value: (u, v) => (v == null ? "–" : v.toPrecision(6)), scale: "y", spanGaps: false, dash: s.dash,
+      });
+      if (s.band) bands.push({ series: [series.length - 1 + s.band[0], series.length - 1 + s.band[1]], fill: stroke + "40" });
+    }
+    const map = spec.kind === "status";
+    return {
+      width, height: spec.height || 240, title: spec.title, series, bands,
+      scales: { x: { time: false }, y: map ? { range: () => [0, spec.nodes.length] } : spec.y_range ? { range: () => spec.y_range } : {} },
+      axes: [
+        { ...axis, label: spec.x_label, size: 34 },
+        { ...axis, label: spec.y_label, size: 64,
+          ...(map ? { splits: () => spec.nodes.map((_, i) => spec.nodes.length - i - 0.5), values: () => spec.nodes } : {}) },
+      ],
+      cursor: { drag: { x: true, y: false }, sync: { key: spec.group }, focus: { prox: -1 }, y: false },
+      legend: { show: !map, live: true },
+      hooks: {
+        setScale: [(u, key) => {
+          if (key !== "x") return;
+          const { min, max } = u.scales.x;
+          if (min != null) setRange(g, min, max);
+        }],
+        draw: map ? [statusMap(spec)] : [],
+      },
+    };
+  }
+
+  function wheel(u, g) {
+    u.over.addEventListener("wheel", (e) => {
+      if (!(e.ctrlKey || e.shiftKey || e.altKey)) return; // plain scrolling scrolls the page
+      e.preventDefault();
+      const { min, max } = u.scales.x, [lo, hi] = full(g);
+      const at = u.posToVal(e.offsetX, "x");
+      let a, b;
+      if (e.shiftKey) {
+        const shift = ((e.deltaY || e.deltaX) > 0 ? 0.1 : -0.1) * (max - min);
+        a = min + shift; b = max + shift;
+      } else {
+        const f = e.deltaY > 0 ? 1.25 : 0.8;
+        a = at - (at - min) * f; b = at + (max - at) * f;
+      }
+      if (b - a >= hi - lo) { a = lo; b = hi; }
+      if (a < lo) { b += lo - a; a = lo; }
+      if (b > hi) { a -= b - hi; b = hi; }
+      setRange(g, a, b);
+    }, { passive: false });
+  }
+
+  function build(spec) {
+    const host = document.getElementById(spec.id);
+    const g = group(spec.group);
+    const columns = [array(spec.x), ...spec.series.map((s) => array(s.y))];
+    const u = new uPlot(options(spec, host.clientWidth, g), columns, host);
+    g.charts.push(u);
+    wheel(u, g);
+    let down = null;
+    u.over.addEventListener("mousedown", (e) => { down = e.clientX; });
+    u.over.addEventListener("mouseup", (e) => {
+      if (down !== null && Math.abs(e.clientX - down) < 4) gotoTime(g, u.posToVal(e.offsetX, "x"));
+      down = null;
+    });
+    host.tabIndex = 0;
+    host.setAttribute("role", "img");
+    host.addEventListener("keydown", (e) => {
+      const { min, max } = u.scales.x, [lo, hi] = full(g), span = max - min;
+      if (e.key === "+" || e.key === "=") setRange(g, min + span * 0.1, max - span * 0.1);
+      else if (e.key === "-") setRange(g, Math.max(lo, min - span * 0.125), Math.min(hi, max + span * 0.125));
+      else if (e.key === "0" || e.key === "Home") setRange(g, lo, hi);
+      else if ((e.key === "ArrowLeft" || e.key === "ArrowRight") && g.film) g.film.step(e.key === "ArrowLeft" ? -1 : 1);
+      else return;
+      e.preventDefault();
+    });
+    return { u, host, spec, g };
+  }
+
+  let built = [];
+  function rebuild() {
+    const ranges = new Map([...groups].map(([k, g]) => [k, g.range]));
+    for (const b of built) b.u.destroy();
+    for (const g of groups.values()) { g.charts = []; g.busy = false; }
+    built = data.charts.map(build);
+    for (const [k, r] of ranges) if (r) setRange(group(k), r[0], r[1]);
+  }
+
+  // The film: frame k of the embedded video shows the recording at times[k].
+  function film(spec) {
+    const box = document.getElementById(spec.id), video = box.querySelector("video"), out = box.querySelector("output");
+    const times = array(spec.times), rate = spec.rate_hz, g = group(spec.group);
+    const frameNow = () => Math.min(times.length - 1, Math.max(0, Math.floor(video.currentTime * rate + 1e-3)));
+    const nearest = (time) => {
+      let lo = 0, hi = times.length - 1;
+      while (lo < hi) { const mid = (lo + hi) >> 1; if (times[mid] < time) lo = mid + 1; else hi = mid; }
+      return lo > 0 && Math.abs(times[lo - 1] - time) <= Math.abs(times[lo] - time) ? lo - 1 : lo;
+    };
+    const show = () => {
+      const k = frameNow();
+      out.textContent = `t = ${times[k].toFixed(4)} s, film frame ${k + 1} of ${times.length}`;
+      putCursor(g, times[k]);
+    };
+    const seekFrame = (k) => { video.currentTime = (Math.min(times.length - 1, Math.max(0, k)) + 0.5) / rate; };
+    g.film = {
+      seek: (time) => { video.pause(); seekFrame(nearest(time)); },
+      step: (d) => { video.pause(); seekFrame(frameNow() + d); },
+    };
+    video.addEventListener("seeked", show);
+    video.addEventListener("loadeddata", show);
+    if ("requestVideoFrameCallback" in HTMLVideoElement.prototype) {
+      const tick = () => { show(); video.requestVideoFrameCallback(tick); };
+      video.requestVideoFrameCallback(tick);
+    } else {
+      video.addEventListener("timeupdate", show);
+    }
+    box.addEventListener("keydown", (e) => {
+      if (e.key !== "ArrowLeft" && e.key !== "ArrowRight") return;
+      g.film.step(e.key === "ArrowLeft" ? -1 : 1);
+      e.preventDefault();
+    });
+    for (const b of box.querySelectorAll("button[data-step]")) {
+      b.addEventListener("click", () => g.film.step(Number(b.dataset.step)));
+    }
+  }
+
+  rebuild();
+  data.films.forEach(film);
+  for (const b of document.querySelectorAll("button[data-reset]")) {
+    b.addEventListener("click", () => { const g = group(b.dataset.reset); setRange(g, ...full(g)); });
+  }
+  let pending = 0;
+  addEventListener("resize", () => {
+    cancelAnimationFrame(pending);
+    pending = requestAnimationFrame(() => {
+      for (const b of built) b.u.setSize({ width: b.host.clientWidth, height: b.spec.height || 240 });
+    });
+  });
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", rebuild);
+  // For tests and for people with a console: the charts and groups as they are.
+  window.pydpendReport = { groups, data, ready: true };
+})();

@@ -1,0 +1,78 @@
+"""What a run folder holds, as a page. Reads files, computes nothing that a stage has not."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from pydpend.report import damping, recording
+from pydpend.report.page import Block, Code, Heading, Listing, Page, Section, Table, Text
+
+
+def read_json(path: Path) -> dict[str, Any] | None:
+    """A JSON object, or ``None`` where the stage that writes it was not done."""
+    if not path.exists():
+        return None
+    value: dict[str, Any] = json.loads(path.read_text("utf-8"))
+    return value
+
+
+def report_page(folder: str | Path) -> Page:
+    """The report of a run folder (`pydpend.analyse`)."""
+    path = Path(folder)
+    run = read_json(path / "run.json") or {"facts": {}, "stages": {}}
+    facts: dict[str, Any] = run["facts"]
+    stages: set[str] = set(run["stages"])
+    found: list[dict[str, Any]] = facts.get("recordings", [])
+    fit = read_json(path / "fit" / "fit.json") if "fit" in stages else None
+    prediction = read_json(path / "prediction.json") if "prediction" in stages else None
+
+    warnings: list[str] = [f"{name}: {why}" for name, why in facts.get("not_done", {}).items()]
+    answer: list[Block] = []
+    parts: list[Section] = []
+    for i, r in enumerate(found):
+        part = recording.read(path, r, stages)
+        warnings += part.warnings
+        answer += [Heading(r["label"]), part.answer] if part.answer is not None else []
+        parts += part.sections(f"r{i}", r["label"] if len(found) > 1 else "")
+    if fit is not None:
+        warnings += damping.warnings(fit)
+        answer += [Heading("Damping"), damping.answer(fit)]
+        parts += damping.sections(path, fit, prediction)
+    if not answer:
+        answer = [Text("No stage gave a result; the warnings say why.")]
+    names = ", ".join(r["label"] for r in found) or path.name
+    return Page(
+        title=f"Analysis of {names}",
+        subtitle=f"pydpend {facts.get('version', '')}",
+        warnings=tuple(dict.fromkeys(warnings)),
+        sections=(
+            Section("answer", "Results", tuple(answer)),
+            *parts,
+            Section("reproduce", "Reproduce and cite", tuple(_reproduce(facts, found))),
+        ),
+    )
+
+
+def _reproduce(facts: dict[str, Any], found: list[dict[str, Any]]) -> list[Block]:
+    rows = tuple((r["label"], r["kind"], r["digest"][:16]) for r in found)
+    return [
+        Text("This page was made by"),
+        Code(facts.get("command", "")),
+        Table(("input", "read as", "SHA-256 (first 16)"), rows),
+        Text(
+            "Every number, table and option is in the folder beside this page; README.txt there lists them."
+        ),
+        Text(
+            f"Cite as: The pydpend developers, pydpend {facts.get('version', '')} (software), and for the method "
+            "A. D. Myers, J. R. Tempelman, D. Petrushenko, F. A. Khasawneh, The Double Pendulum: An Experimental "
+            "Design Report (2020)."
+        ),
+        Listing(
+            (
+                "Angles are absolute, counter-clockwise positive, zero hanging down, unwrapped over turns.",
+                "An uncertainty is one standard uncertainty.",
+            )
+        ),
+    ]

@@ -1,0 +1,249 @@
+"""What a report page is made of, and how it becomes HTML.
+
+Everything that comes from a user's file (names, metadata) is text here and is escaped by the template; only the
+SVG that pydpend draws itself and the assets beside this file go in as they are.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+from dataclasses import dataclass, field
+from importlib.resources import files
+from typing import Any
+
+import jinja2
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class Text:
+    """A paragraph."""
+
+    text: str
+    quiet: bool = False
+    kind: str = field(default="text", init=False)
+
+
+@dataclass(frozen=True)
+class Heading:
+    """A heading within a section."""
+
+    text: str
+    kind: str = field(default="heading", init=False)
+
+
+@dataclass(frozen=True)
+class Listing:
+    """A list of sentences."""
+
+    entries: tuple[str, ...]
+    kind: str = field(default="list", init=False)
+
+
+@dataclass(frozen=True)
+class Code:
+    """Text to be copied."""
+
+    text: str
+    kind: str = field(default="code", init=False)
+
+
+@dataclass(frozen=True)
+class Table:
+    """Cells as text; ``numbers`` are the columns set to the right."""
+
+    header: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    caption: str = ""
+    numbers: frozenset[int] = frozenset()
+    kind: str = field(default="table", init=False)
+
+    def is_number(self, column: int) -> bool:
+        """Whether the column holds numbers."""
+        return column in self.numbers
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A drawing made by pydpend, as SVG."""
+
+    svg: str
+    caption: str
+    kind: str = field(default="figure", init=False)
+
+
+@dataclass(frozen=True)
+class Reset:
+    """How to move in the charts of a group, and the way back."""
+
+    group: str
+    kind: str = field(default="reset", init=False)
+
+
+@dataclass(frozen=True)
+class Film:
+    """A film in the page. Frame k shows the recording at ``times_s[k]``; its own rate is ``rate_hz``."""
+
+    id: str
+    group: str
+    mp4: bytes
+    times_s: NDArray[np.float64]
+    rate_hz: float
+    caption: str
+    kind: str = field(default="film", init=False)
+
+    @property
+    def base64(self) -> str:
+        """The file as base64."""
+        return base64.b64encode(self.mp4).decode("ascii")
+
+
+@dataclass(frozen=True)
+class Series:
+    """One curve. ``band`` (i, j): fill between the series i and j places before this one (0 is itself)."""
+
+    label: str
+    y: NDArray[np.float64]
+    color: int | None = 0
+    points: bool = False
+    band: tuple[int, int] | None = None
+
+
+@dataclass(frozen=True)
+class Chart:
+    """Curves over a common x that can be zoomed; charts of a ``group`` move together."""
+
+    id: str
+    title: str
+    group: str
+    x: NDArray[np.float64]
+    series: tuple[Series, ...]
+    x_label: str = "time (s)"
+    y_label: str = ""
+    height: int = 240
+    key: tuple[tuple[str, str], ...] = ()
+    kind: str = field(default="chart", init=False)
+
+
+@dataclass(frozen=True)
+class StatusMap:
+    """What was known of each node over time. ``runs[n]``: (status code, from s, to s)."""
+
+    id: str
+    title: str
+    group: str
+    t_s: NDArray[np.float64]
+    nodes: tuple[str, ...]
+    runs: tuple[tuple[tuple[int, float, float], ...], ...]
+    height: int = 240
+    key: tuple[tuple[str, str], ...] = (
+        ("seen", "--s2"),
+        ("reacquired", "--s0"),
+        ("ambiguous", "--s1"),
+        ("missing", "--line"),
+    )
+    kind: str = field(default="chart", init=False)
+
+
+Block = Text | Heading | Listing | Code | Table | Figure | Reset | Film | Chart | StatusMap
+
+
+@dataclass(frozen=True)
+class Section:
+    """A part of the page with its own link."""
+
+    id: str
+    title: str
+    blocks: tuple[Block, ...]
+
+
+@dataclass(frozen=True)
+class Page:
+    """The whole page: warnings first, then the sections in order."""
+
+    title: str
+    subtitle: str
+    warnings: tuple[str, ...]
+    sections: tuple[Section, ...]
+
+
+class _Arrays:
+    """Collects arrays as base64 of little-endian float32; the same array is kept once."""
+
+    def __init__(self) -> None:
+        self.encoded: dict[str, str] = {}
+        self._names: dict[bytes, str] = {}
+
+    def add(self, values: NDArray[np.float64]) -> str:
+        raw = np.ascontiguousarray(values, dtype="<f4").tobytes()
+        if raw not in self._names:
+            self._names[raw] = f"a{len(self._names)}"
+            self.encoded[self._names[raw]] = base64.b64encode(raw).decode("ascii")
+        return self._names[raw]
+
+
+def _chart_data(chart: Chart | StatusMap, arrays: _Arrays) -> dict[str, Any]:
+    data: dict[str, Any] = {
+        "id": chart.id,
+        "title": chart.title,
+        "group": chart.group,
+        "height": chart.height,
+    }
+    if isinstance(chart, StatusMap):
+        edges = np.array([chart.t_s[0], chart.t_s[-1]])
+        return data | {
+            "kind": "status",
+            "x": arrays.add(edges),
+            "x_label": "time (s)",
+            "y_label": "",
+            "nodes": list(chart.nodes),
+            "runs": chart.runs,
+            "series": [{"label": "", "y": arrays.add(np.full(2, np.nan))}],
+        }
+    series = []
+    for s in chart.series:
+        entry: dict[str, Any] = {"label": s.label, "y": arrays.add(s.y)}
+        if s.color is not None:
+            entry["color"] = s.color
+        if s.points:
+            entry["points"] = True
+        if s.band is not None:
+            entry["band"] = [-s.band[0], -s.band[1]]
+        series.append(entry)
+    return data | {
+        "kind": "lines",
+        "x": arrays.add(chart.x),
+        "x_label": chart.x_label,
+        "y_label": chart.y_label,
+        "series": series,
+    }
+
+
+def render(page: Page) -> str:
+    """The page as HTML that needs nothing outside itself."""
+    arrays = _Arrays()
+    blocks = [b for s in page.sections for b in s.blocks]
+    charts = [_chart_data(b, arrays) for b in blocks if isinstance(b, (Chart, StatusMap))]
+    films = [
+        {"id": b.id, "group": b.group, "times": arrays.add(b.times_s), "rate_hz": b.rate_hz}
+        for b in blocks
+        if isinstance(b, Film)
+    ]
+    data = json.dumps({"charts": charts, "films": films, "arrays": arrays.encoded}, allow_nan=False)
+    # Inside <script> only "</" and "<!--" are special; without any "<" neither can occur.
+    data = data.replace("<", "\\u003c")
+    here = files("pydpend.report") / "assets"
+    read = {
+        key: (here / name).read_text("utf-8")
+        for key, name in {
+            "css": "report.css",
+            "js": "report.js",
+            "uplot_css": "uPlot.min.css",
+            "uplot_js": "uPlot.iife.min.js",
+        }.items()
+    }
+    environment = jinja2.Environment(autoescape=True, trim_blocks=True, undefined=jinja2.StrictUndefined)
+    template = environment.from_string((here / "report.html.j2").read_text("utf-8"))
+    return template.render(page=page, assets=read, data_json=data)

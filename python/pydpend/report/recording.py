@@ -1,0 +1,272 @@
+"""The part of the page that belongs to one recording: film, angles, identity of the markers, encoder."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pydpend.angles import LinkAngles, read_angles
+from pydpend.nodes import Nodes, read_nodes
+from pydpend.report.page import Block, Chart, Figure, Film, Reset, Section, Series, StatusMap, Table
+from pydpend.report.words import with_sigma
+
+
+@dataclass
+class Part:
+    """What one recording adds to the page."""
+
+    label: str
+    nodes: Nodes | None = None
+    angles: LinkAngles | None = None
+    meta: dict[str, Any] = field(default_factory=dict)
+    film: tuple[bytes, dict[str, Any]] | None = None
+    comparison: dict[str, Any] | None = None
+    compared: dict[str, NDArray[np.float64]] | None = None
+    calibration: str | None = None
+    warnings: list[str] = field(default_factory=list)
+    answer: Table | None = None
+
+    def sections(self, id_: str, suffix: str) -> list[Section]:
+        """The sections, titled with the recording's name where there are several."""
+        end = f": {suffix}" if suffix else ""
+        out: list[Section] = []
+        if self.angles is not None:
+            out.append(Section(f"{id_}-angles", f"Angles{end}", tuple(self._angle_blocks(id_))))
+        elif self.film is not None:
+            out.append(Section(f"{id_}-film", f"Film{end}", tuple(self._film_blocks(id_))))
+        if self.nodes is not None:
+            out.append(Section(f"{id_}-nodes", f"Markers{end}", tuple(self._node_blocks(id_))))
+        if self.comparison is not None:
+            out.append(Section(f"{id_}-encoder", f"Encoder{end}", tuple(self._encoder_blocks(id_))))
+        return out
+
+    def _film_blocks(self, id_: str) -> list[Block]:
+        if self.film is None:
+            return []
+        mp4, about = self.film
+        every = int(about["every"])
+        shown = "every frame" if every == 1 else f"one frame in {every}"
+        return [
+            Film(
+                f"{id_}-overlay",
+                id_,
+                mp4,
+                np.asarray(about["times_s"], dtype=np.float64),
+                float(about["rate_hz"]),
+                f"{self.label} with nodes and bodies drawn in; {shown}. The plots below follow it.",
+            )
+        ]
+
+    def _angle_blocks(self, id_: str) -> list[Block]:
+        assert self.angles is not None
+        a = self.angles
+        degrees = np.degrees(a.phi_rad)
+        sigmas = np.degrees(a.sigma_rad)
+        angle = tuple(Series(f"phi{k + 1} (deg)", degrees[:, k], k) for k in range(a.links))
+        blocks: list[Block] = [
+            *self._film_blocks(id_),
+            Chart(f"{id_}-phi", "Angles", id_, a.t_s, angle, y_label="angle (deg)", height=280),
+        ]
+        if np.isfinite(sigmas).any():
+            sigma = tuple(Series(f"sigma of phi{k + 1} (deg)", sigmas[:, k], k) for k in range(a.links))
+            blocks.append(
+                Chart(
+                    f"{id_}-sigma",
+                    "Standard uncertainty of each angle",
+                    id_,
+                    a.t_s,
+                    sigma,
+                    y_label="sigma (deg)",
+                    height=180,
+                )
+            )
+        blocks.append(Reset(id_))
+        return blocks
+
+    def _node_blocks(self, id_: str) -> list[Block]:
+        assert self.nodes is not None
+        n = self.nodes
+        names = tuple(node.name for node in n.rig.nodes)
+        runs = tuple(_runs(n.t_s, n.status[:, i]) for i in range(len(names)))
+        rows = []
+        for i, node in enumerate(n.rig.nodes):
+            seen = np.isin(n.status[:, i], (1, 2))
+            lengths = _gaps(seen)
+            sigma = n.sigma_px[seen, i]
+            rows.append(
+                (
+                    node.name,
+                    node.body,
+                    f"{100 * seen.mean():.2f} %",
+                    str(len(lengths)),
+                    str(max(lengths, default=0)),
+                    str(int((n.status[:, i] == 3).sum())),
+                    f"{np.nanmedian(sigma):.4f}" if sigma.size else "–",
+                )
+            )
+        return [
+            StatusMap(
+                f"{id_}-status",
+                "What was known of each node",
+                id_,
+                n.t_s,
+                names,
+                runs,
+                height=40 + 22 * len(names),
+            ),
+            Table(
+                (
+                    "node",
+                    "body",
+                    "seen",
+                    "gaps",
+                    "longest gap (frames)",
+                    "ambiguous (frames)",
+                    "median sigma (px)",
+                ),
+                tuple(rows),
+                numbers=frozenset({2, 3, 4, 5, 6}),
+            ),
+        ]
+
+    def _encoder_blocks(self, id_: str) -> list[Block]:
+        assert self.comparison is not None
+        c = self.comparison
+        clocks, shares = c["clocks"], c["shares"]
+        rows = [
+            ("readings compared", str(c["n"])),
+            ("RMS of film minus encoder (deg)", f"{c['rms_deg']:.4f}"),
+            ("largest (deg)", f"{c['largest_deg']:.3f}"),
+            ("gain", with_sigma(c["gain"], c["gain_sigma"])),
+            (
+                "zero of the encoder (deg)",
+                with_sigma(math.degrees(c["offset_rad"]), math.degrees(c["offset_sigma_rad"])),
+            ),
+        ]
+        if clocks["given"]:
+            rows.append(("delay (ms)", with_sigma(1e3 * c["delay_s"], 1e3 * c["delay_sigma_s"])))
+        else:
+            rows += [
+                ("clock offset (s)", with_sigma(clocks["offset_s"], clocks["offset_sigma_s"])),
+                ("clock drift (ppm)", with_sigma(1e6 * clocks["drift"], 1e6 * clocks["drift_sigma"])),
+            ]
+        names = {"encoder": "encoder's noise", "video": "film's noise", "unexplained": "neither"}
+        rows += [
+            (f"share of the residual explained by {names[k]} (%)", f"{100 * v:.1f}")
+            for k, v in shares.items()
+            if v is not None
+        ]
+        blocks: list[Block] = [Table(("quantity", "value"), tuple(rows), numbers=frozenset({1}))]
+        if self.calibration is not None:
+            blocks.append(
+                Figure(self.calibration, "Calibration line of the encoder and its residuals (Fig. 10).")
+            )
+        if self.compared is not None:
+            t = self.compared["time_s"]
+            both = (
+                Series("film (deg)", np.degrees(self.compared["video_rad"]), 0),
+                Series("encoder (deg)", np.degrees(self.compared["encoder_rad"]), 1),
+            )
+            sigma = np.full(t.size, math.degrees(c["stated_sigma_rad"]["encoder"] or math.nan))
+            left = np.degrees(self.compared["residual_rad"])
+            blocks += [
+                Chart(f"{id_}-both", "Film and encoder, phi1", id_, t, both, y_label="phi1 (deg)"),
+                Chart(
+                    f"{id_}-difference",
+                    "Film minus encoder; the band is the encoder's stated standard uncertainty",
+                    id_,
+                    t,
+                    (
+                        Series("+ sigma", sigma, 1),
+                        Series("- sigma", -sigma, 1, band=(1, 0)),
+                        Series("difference (deg)", left, 0),
+                    ),
+                    y_label="difference (deg)",
+                ),
+                Reset(id_),
+            ]
+        return blocks
+
+
+def _runs(t_s: NDArray[np.float64], status: NDArray[np.uint8]) -> tuple[tuple[int, float, float], ...]:
+    """Stretches of the same status as (code, from s, to s)."""
+    edges = np.flatnonzero(np.diff(status)) + 1
+    starts = np.concatenate(([0], edges))
+    ends = np.concatenate((edges, [status.size]))
+    step = float(np.median(np.diff(t_s))) if t_s.size > 1 else 1.0
+    return tuple(
+        (int(status[a]), float(t_s[a]), float(t_s[b]) if b < t_s.size else float(t_s[-1]) + step)
+        for a, b in zip(starts, ends, strict=True)
+    )
+
+
+def _gaps(seen: NDArray[np.bool_]) -> list[int]:
+    """Lengths in frames of the stretches not seen."""
+    change = np.diff(np.concatenate(([True], seen, [True])).astype(np.int8))
+    return [int(b - a) for a, b in zip(np.flatnonzero(change < 0), np.flatnonzero(change > 0), strict=True)]
+
+
+def read(folder: Path, facts: dict[str, Any], stages: set[str]) -> Part:
+    """Everything the run folder holds of one recording."""
+    name = facts["name"]
+    here = folder / name
+    part = Part(facts["label"])
+    rows: list[tuple[str, str]] = []
+    if f"{name}/track" in stages or facts["kind"] == "nodes":
+        nodes = read_nodes(here / "nodes.parquet" if f"{name}/track" in stages else facts["path"])
+        part.nodes = nodes
+        seen = np.isin(nodes.status, (1, 2))
+        rows += [
+            ("frames", str(nodes.frame.size)),
+            ("duration", f"{nodes.t_s[-1] - nodes.t_s[0]:.3f} s"),
+            ("nodes, bodies", f"{len(nodes.rig.nodes)}, {len(nodes.rig.bodies)}"),
+            ("node-frames seen", f"{100 * seen.mean():.3f} %"),
+            ("median uncertainty of a centre", f"{np.nanmedian(nodes.sigma_px):.4f} px"),
+        ]
+        part.warnings += [f"{part.label}: {w}" for w in nodes.meta.get("warnings", [])]
+        ending = nodes.meta.get("ending")
+        if isinstance(ending, dict) and ending.get("early"):
+            part.warnings.append(f"{part.label}: the recording ended early: {ending['early']}")
+    if f"{name}/angles" in stages:
+        part.angles = read_angles(here / "angles.parquet", name=part.label)
+        part.meta = json.loads((here / "angles.json").read_text("utf-8"))
+        part.warnings += [f"{part.label}: {note}" for note in part.meta.get("notes", [])]
+        for k in range(part.angles.links):
+            sigma = part.angles.sigma_rad[:, k]
+            if np.isfinite(sigma).any():
+                rows.append(
+                    (f"median uncertainty of phi{k + 1}", f"{math.degrees(np.nanmedian(sigma)):.4f} deg")
+                )
+        turns = (np.nanmax(part.angles.phi_rad, axis=0) - np.nanmin(part.angles.phi_rad, axis=0)) / (
+            2 * np.pi
+        )
+        rows.append(("range in turns", ", ".join(f"{t:.2f}" for t in turns)))
+    if f"{name}/overlay" in stages:
+        about = json.loads((here / "overlay.json").read_text("utf-8"))
+        part.film = ((here / "overlay.mp4").read_bytes(), about)
+    if f"{name}/encoder" in stages:
+        part.comparison = json.loads((here / "comparison.json").read_text("utf-8"))
+        part.compared = _columns(here / "comparison.parquet")
+        drawing = here / "calibration.svg"
+        if drawing.exists():
+            # Written by pydpend's own plots; what precedes <svg> is XML's preamble.
+            text = drawing.read_text("utf-8")
+            part.calibration = text[text.index("<svg") :]
+        part.warnings += [f"{part.label}: {note}" for note in part.comparison["notes"]]
+        rows.append(("film against encoder, RMS", f"{part.comparison['rms_deg']:.4f} deg"))
+    if rows:
+        part.answer = Table(("", "value"), tuple(rows), numbers=frozenset({1}))
+    return part
+
+
+def _columns(path: Path) -> dict[str, NDArray[np.float64]]:
+    import pyarrow.parquet as pq
+
+    table = pq.read_table(path)
+    return {n: table.column(n).to_numpy().astype(np.float64) for n in table.column_names}

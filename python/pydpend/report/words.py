@@ -1,0 +1,18 @@
+"""Numbers as people read them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def with_sigma(value: float | None, sigma: float | None) -> str:
+    """A value and its uncertainty, both to the uncertainty's second digit."""
+    if value is None:
+        return "–"
+    if sigma is None or not sigma > 0:
+        return f"{value:.5g}"
+    exponent = int(np.floor(np.log10(max(abs(value), sigma))))
+    digits = max(0, exponent - int(np.floor(np.log10(sigma))) + 1)
+    scale = 10.0**exponent
+    text = f"{value / scale:.{digits}f} ± {sigma / scale:.{digits}f}"
+    return text if exponent == 0 else f"({text}) × 10^{exponent}"

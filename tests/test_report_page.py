@@ -1,0 +1,213 @@
+"""The report page in a real browser: plots draw, the film plays, one cursor moves both ways, nothing leaves."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from playwright.sync_api import Browser, Page, sync_playwright
+from pydpend.report import page as p
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+FRAMES, RATE, STEP = 60, 30.0, 0.05
+HOSTILE = "<script>alert(1)</script>"
+
+
+@pytest.fixture(scope="module")
+def mp4(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    path = tmp_path_factory.mktemp("film") / "film.mp4"
+    source = f"testsrc=size=160x120:rate={RATE:g}:duration={FRAMES / RATE:g}"
+    subprocess.run(
+        [
+            "ffmpeg",
+            "-v",
+            "error",
+            "-f",
+            "lavfi",
+            "-i",
+            source,
+            "-c:v",
+            "libx264",
+            "-pix_fmt",
+            "yuv420p",
+            "-g",
+            "10",
+            "-movflags",
+            "+faststart",
+            str(path),
+        ],
+        check=True,
+    )
+    return path.read_bytes()
+
+
+@pytest.fixture(scope="module")
+def html(mp4: bytes, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    t = np.arange(100_000) * (FRAMES * STEP / 100_000)
+    y = np.sin(2 * np.pi * t)
+    y[5000:6000] = np.nan
+    page = p.Page(
+        title=f"Analysis of {HOSTILE}",
+        subtitle="pydpend",
+        warnings=(f"a node called {HOSTILE}",),
+        sections=(
+            p.Section("answer", "Results", (p.Table(("quantity", "value"), ((HOSTILE, "1.0 ± 0.1"),)),)),
+            p.Section(
+                "angles",
+                "Angles",
+                (
+                    p.Film("film", "g", mp4, np.arange(FRAMES) * STEP, RATE, "the film"),
+                    p.Chart("one", "Angles", "g", t, (p.Series("phi1", y), p.Series("phi2", 2 * y, 1))),
+                    p.Chart(
+                        "two",
+                        "With a band",
+                        "g",
+                        t,
+                        (p.Series("hi", y + 1), p.Series("lo", y - 1, band=(1, 0)), p.Series("y", y)),
+                    ),
+                    p.StatusMap(
+                        "map",
+                        "Nodes",
+                        "g",
+                        t,
+                        (HOSTILE, "n1"),
+                        (((1, 0.0, 3.0),), ((1, 0.0, 1.0), (0, 1.0, 3.0))),
+                    ),
+                    p.Reset("g"),
+                ),
+            ),
+        ),
+    )
+    path = tmp_path_factory.mktemp("page") / "report.html"
+    path.write_text(p.render(page), encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    if CHROMIUM is None:
+        pytest.fail("chromium is not installed; `make test` installs it")
+    flags = ["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-sync"]
+    with sync_playwright() as driver:
+        running = driver.chromium.launch(executable_path=CHROMIUM, args=flags)
+        yield running
+        running.close()
+
+
+@pytest.fixture
+def opened(browser: Browser, html: Path) -> Iterator[Page]:
+    problems: list[str] = []
+    page = browser.new_page(viewport={"width": 1100, "height": 900})
+    page.on("console", lambda m: problems.append(m.text) if m.type in ("error", "warning") else None)
+    page.on("pageerror", lambda e: problems.append(str(e)))
+    page.on("dialog", lambda d: (problems.append(f"dialog {d.message}"), d.dismiss())[1])
+    page.on(
+        "request",
+        lambda r: problems.append(r.url) if not r.url.startswith(("file:", "data:", "blob:")) else None,
+    )
+    page.goto(html.as_uri())
+    until(page, "window.pydpendReport?.ready === true")
+    yield page
+    page.close()
+    assert problems == []
+
+
+def until(page: Page, condition: str, seconds: float = 20.0) -> None:
+    """Polls: the page's content policy forbids the driver's own waiting, which compiles text in the page."""
+    end = time.monotonic() + seconds
+    while not page.evaluate(condition):
+        assert time.monotonic() < end, f"not within {seconds} s: {condition}"
+        page.wait_for_timeout(20)
+
+
+def film_time(page: Page) -> float:
+    return float(page.evaluate("document.querySelector('video').currentTime"))
+
+
+def cursor_time(page: Page) -> float:
+    return float(page.evaluate("window.pydpendReport.groups.get('g').time"))
+
+
+def test_plots_draw(opened: Page) -> None:
+    # Ink on the canvas: pixels that are neither transparent nor the ground.
+    inked = opened.evaluate(
+        """() => [...document.querySelectorAll('canvas')].map(c => {
+            const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;
+            let n = 0; for (let i = 3; i < d.length; i += 4) if (d[i] > 0) n++; return n; })"""
+    )
+    assert len(inked) == 3
+    assert min(inked) > 1000
+
+
+def test_a_click_in_a_plot_takes_the_film_there(opened: Page) -> None:
+    until(opened, "document.querySelector('video').readyState >= 2")
+    over = opened.locator("#one .u-over")
+    over.scroll_into_view_if_needed()
+    box = over.bounding_box()
+    assert box is not None
+    opened.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    # The middle of the plot is t = 1.5 s, which is film frame 30: its middle is (30 + 0.5) / 30 s.
+    until(
+        opened,
+        "!document.querySelector('video').seeking && document.querySelector('video').currentTime > 0.5",
+    )
+    assert abs(film_time(opened) - 30.5 / RATE) < 1.01 / RATE
+
+
+def test_arrow_keys_step_a_frame_and_the_cursor_follows(opened: Page) -> None:
+    until(opened, "document.querySelector('video').readyState >= 2")
+    opened.focus("#one")
+    for _ in range(3):
+        before = film_time(opened)
+        opened.keyboard.press("ArrowRight")
+        until(opened, f"document.querySelector('video').currentTime > {before} + 0.5 / {RATE}")
+        until(opened, "!document.querySelector('video').seeking")
+    until(opened, f"Math.abs(window.pydpendReport.groups.get('g').time - {3 * STEP}) < 1e-3")
+    assert abs(cursor_time(opened) - 3 * STEP) < 1e-3
+
+
+def test_the_cursor_follows_the_playing_film(opened: Page) -> None:
+    until(opened, "document.querySelector('video').readyState >= 2")
+    opened.evaluate("document.querySelector('video').play()")
+    until(opened, "window.pydpendReport.groups.get('g').time > 0.3")
+    opened.evaluate("document.querySelector('video').pause()")
+
+
+def test_zoom_is_shared_and_undone(opened: Page) -> None:
+    over = opened.locator("#two .u-over")
+    over.scroll_into_view_if_needed()
+    box = over.bounding_box()
+    assert box is not None
+    y = box["y"] + box["height"] / 2
+    opened.mouse.move(box["x"] + 0.25 * box["width"], y)
+    opened.mouse.down()
+    opened.mouse.move(box["x"] + 0.5 * box["width"], y, steps=5)
+    opened.mouse.up()
+    ranges = "window.pydpendReport.groups.get('g').charts.map(c => [c.scales.x.min, c.scales.x.max])"
+    until(opened, f"{ranges}.every(r => r[1] - r[0] < 1)")
+    found = opened.evaluate(ranges)
+    assert all(abs(r[0] - 0.75) < 0.05 and abs(r[1] - 1.5) < 0.05 for r in found), found
+    opened.click("button[data-reset]")
+    until(opened, f"{ranges}.every(r => r[1] - r[0] > 2.9)")
+
+
+def test_names_are_text(opened: Page) -> None:
+    assert HOSTILE in opened.inner_text("h1")
+    assert HOSTILE in opened.inner_text("#warnings")
+
+
+@pytest.mark.parametrize(("width", "scheme"), [(1100, "light"), (1100, "dark"), (390, "light")])
+def test_it_fits_the_width(browser: Browser, html: Path, width: int, scheme: str) -> None:
+    context = browser.new_context(
+        viewport={"width": width, "height": 800}, color_scheme="dark" if scheme == "dark" else "light"
+    )
+    page = context.new_page()
+    page.goto(html.as_uri())
+    until(page, "window.pydpendReport?.ready === true")
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    context.close()
