@@ -54,8 +54,6 @@ class Options:
     """Which columns of angles tables are which, e.g. ``time_s=t_s,phi1_rad=theta1_rad,phi2_rad=theta2_rad``."""
     hanging_deg: float = 0.0
     """What angles tables call hanging down."""
-    overlay: bool = True
-    """Draw the overlay film."""
     threads: int | None = None
     """Threads for tracking; all cores if not given. Changes no result."""
 

@@ -15,7 +15,7 @@ from pydpend.analyse import stages
 from pydpend.analyse.folder import RunFolder, digest, write_whole
 from pydpend.analyse.options import Options
 from pydpend.analyse.recordings import Recording, recordings
-from pydpend.errors import PydpendError, fault
+from pydpend.errors import PydpendError
 
 Progress = Callable[[int, int, str, str], None]
 """Called as ``progress(stage number from 1, stages, title, "start" | "kept" | "done" | "not done: why")``."""
@@ -122,21 +122,20 @@ def _plan_recording(r: Recording, options: Options, folder: Path, add: Callable[
             lambda: stages.track(r, options, here),
         )
         needs = (f"{r.name}/track",)
-        if options.overlay:
-            add(
-                f"{r.name}/overlay",
-                f"Overlay film of {r.label}",
-                (f"{r.name}/overlay.mp4", f"{r.name}/overlay.json"),
-                needs,
-                [r.digest],
-                lambda: stages.overlay(r, options, here),
-            )
     add(
         f"{r.name}/angles",
         f"Angles of {r.label}",
         (f"{r.name}/angles.parquet", f"{r.name}/angles.json"),
         needs,
-        [r.digest, options.columns, options.hanging_deg],
+        [
+            r.digest,
+            options.columns,
+            options.hanging_deg,
+            options.estimator,
+            options.zero,
+            stages.file_key(options.zero),
+            options.link_length_m,
+        ],
         lambda: stages.angles(r, options, here),
     )
     if r.encoder is not None:
@@ -207,11 +206,3 @@ def analyse(options: Options, folder: str | Path, progress: Progress | None = No
         f"{len(missing)} of {len(said)} stages could not be done" if missing else "every stage is done",
         said,
     )
-
-
-def check_inputs(options: Options) -> None:
-    """Refuses a run without inputs before anything is made."""
-    if not options.inputs:
-        raise PydpendError(
-            fault("inputs", "there is nothing to analyse", "Name a film, a node table or angles")
-        )

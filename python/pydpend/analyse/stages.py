@@ -75,28 +75,6 @@ def track(r: Recording, options: Options, here: Path) -> str:
     return f"{nodes.frame.size} frames, {len(nodes.rig.nodes)} nodes"
 
 
-def overlay(r: Recording, options: Options, here: Path) -> str:
-    """``overlay.mp4`` for the report, and which recording time each of its frames shows."""
-    from pydpend.tracking import overlay as draw
-
-    nodes = _nodes(here, r)
-    # About a minute and a half of film at 30 frames a second is what a person looks at and a page can carry.
-    every = max(1, math.ceil(nodes.frame.size / MOST_OVERLAY_FRAMES))
-    rate = draw(r.path, here / "nodes.parquet", here / "overlay.mp4", every=every, width=OVERLAY_WIDTH)
-    shown = list(range(0, nodes.frame.size, every))
-    _write_json(
-        here / "overlay.json",
-        {"rate_hz": rate, "every": every, "times_s": [float(nodes.t_s[i]) for i in shown]},
-    )
-    return f"{len(shown)} frames"
-
-
-MOST_OVERLAY_FRAMES = 2500
-"""Frames of an overlay film, at most."""
-OVERLAY_WIDTH = 640
-"""Width of an overlay film, px, at most."""
-
-
 def _nodes(here: Path, r: Recording) -> Nodes:
     from pydpend.nodes import read_nodes
 
@@ -222,7 +200,8 @@ def fit(found: tuple[Recording, ...], options: Options, folder: Path) -> str:
     """Damping of all recordings together, and of each if there are several."""
     import warnings
 
-    from pydpend.damping import fit_damping, write_fit
+    from pydpend.damping import fit_damping
+    from pydpend.damping.stored import write_fit
     from pydpend.plots.damping import save_figures
     from pydpend.trials import summary
 

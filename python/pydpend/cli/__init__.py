@@ -11,11 +11,16 @@ import argparse
 import importlib
 import os
 import sys
-from importlib.metadata import version
 
 from pydpend.errors import PydpendError
 
-COMMANDS: tuple[str, ...] = ("angles", "calibrate", "compare", "fit", "predict")
+COMMANDS: tuple[str, ...] = ("analyse", "angles", "calibrate", "compare", "fit", "predict", "export")
+
+
+def _version() -> str:
+    from pydpend import _tracker
+
+    return _tracker.VERSION
 
 
 def parser() -> argparse.ArgumentParser:
@@ -24,7 +29,7 @@ def parser() -> argparse.ArgumentParser:
         prog="pydpend",
         description="From node tables and angles to encoder comparison, damping and a report.",
     )
-    top.add_argument("--version", action="version", version=f"pydpend {version('pydpend')}")
+    top.add_argument("--version", action="version", version=f"pydpend {_version()}")
     commands = top.add_subparsers(dest="command", metavar="COMMAND", required=True)
     for name in COMMANDS:
         module = importlib.import_module(f"pydpend.cli.{name}")

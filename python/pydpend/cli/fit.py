@@ -121,6 +121,7 @@ def run(args: argparse.Namespace) -> int:
     import warnings
 
     from pydpend.damping import fit_damping
+    from pydpend.damping.stored import write_fit, write_json
 
     recordings = [read(path, args) for path in args.angles]
     with warnings.catch_warnings():
@@ -146,57 +147,25 @@ def run(args: argparse.Namespace) -> int:
     )
     if report is not None:
         print(file=sys.stderr)
-    args.output.mkdir(parents=True, exist_ok=True)
-    _write(fit, recordings, args.output, not args.no_figures)
+    trials = None
     if len(recordings) > 1:
         from pydpend.trials import summary
 
         trials = summary([fit_damping(r, model, **options) for r in recordings], fit)
+    args.output.mkdir(parents=True, exist_ok=True)
+    write_fit(fit, args.output)
+    if trials is not None:
         write_json(args.output / "trials.json", trials.to_json())
-        if not args.no_figures:
-            from pydpend.plots.damping import trials_figure
-            from pydpend.plots.style import save
+    if not args.no_figures:
+        from pydpend.plots.damping import save_figures
 
-            save(trials_figure(trials), args.output / "trials.png")
+        save_figures(fit, trials, args.output)
     if args.json:
         print(json.dumps(fit.to_json(), indent=1, allow_nan=False))
     else:
         for line in describe(fit):
             print(line)
     return 0 if fit.status == "converged" else 1
-
-
-def write_json(path: Path, content: dict[str, object]) -> None:
-    """One JSON file, whole or not at all."""
-    temporary = path.with_name(f".{path.name}.part")
-    temporary.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-    temporary.replace(path)
-
-
-def _write(fit: DampingFit, recordings: list[LinkAngles], folder: Path, figures: bool) -> None:
-    write_json(folder / "fit.json", fit.to_json())
-    rows = ["name,value,sigma,unit"]
-    for name, e in (*fit.coefficients.items(), *((f"{k}/psi", e) for k, e in fit.ratios.items())):
-        rows.append(f"{name},{e.value!r},{e.sigma!r},{e.unit}")
-    (folder / "coefficients.csv").write_text("\n".join(rows) + "\n", encoding="utf-8")
-    for k, curve in enumerate(fit.energy):
-        suffix = "" if len(recordings) == 1 else f"-{k + 1}"
-        head = ["time_s", "energy_j", "model_j", *(f"{n}_j" for n in fit.coefficients)]
-        table = [curve.t_s, curve.energy_j, curve.model_j, *curve.works_j.T]
-        lines = [",".join(head)]
-        lines += [",".join(f"{v:.9g}" for v in row) for row in zip(*table, strict=True)]
-        (folder / f"energy{suffix}.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    if figures:
-        from pydpend.damping import Maps
-        from pydpend.plots.damping import energy_figure, maps_figure, shares_figure
-        from pydpend.plots.style import save
-
-        for k in range(len(fit.energy)):
-            suffix = "" if len(recordings) == 1 else f"-{k + 1}"
-            save(energy_figure(fit, k), folder / f"energy{suffix}.png")
-        save(shares_figure(fit), folder / "shares.png")
-        if fit.maps is not None:
-            save(maps_figure(Maps.from_json(fit.maps)), folder / "maps.png")
 
 
 def describe(fit: DampingFit) -> list[str]:

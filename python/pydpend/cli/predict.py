@@ -9,7 +9,7 @@ import argparse
 import json
 from pathlib import Path
 
-from pydpend.cli.fit import add_angles_arguments, add_output_arguments, read, write_json
+from pydpend.cli.fit import add_angles_arguments, add_output_arguments, read
 
 HELP = "predict a recording from a fit to others"
 
@@ -26,7 +26,7 @@ def add_arguments(p: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Predicts and writes."""
-    from pydpend.damping.stored import load_fit
+    from pydpend.damping.stored import load_fit, write_json
     from pydpend.errors import FitError, fault
 
     stored = load_fit(args.fit)

@@ -1,4 +1,4 @@
-"""A fit read back from its folder, to predict with."""
+"""A fit written into its folder, and read back from it to predict with."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from pathlib import Path
 from pydpend.angles import LinkAngles
 from pydpend.damping.maps import Maps
 from pydpend.damping.prediction import WINDOWS_S, Prediction, predict
+from pydpend.damping.result import DampingFit
 from pydpend.damping.trajectory import prepare
 from pydpend.errors import FitError, fault
 from pydpend.model import Model
@@ -21,6 +22,11 @@ class StoredFit:
 
     parameters: dict[str, float]
     maps: Maps | None
+
+    @classmethod
+    def of(cls, fit: DampingFit) -> StoredFit:
+        """A fit just made, as if it had been written and read."""
+        return cls(dict(fit.parameters), None if fit.maps is None else Maps.from_json(fit.maps))
 
     def model(self) -> Model:
         """The fitted constants as a model."""
@@ -79,3 +85,31 @@ def load_fit(path: str | Path) -> StoredFit:
             )
         ) from problem
     return stored
+
+
+def write_json(path: Path, content: dict[str, object]) -> None:
+    """One JSON file, whole or not at all."""
+    temporary = path.with_name(f".{path.name}.part")
+    temporary.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    temporary.replace(path)
+
+
+def write_fit(fit: DampingFit, folder: Path) -> None:
+    """Writes ``fit.json``, ``coefficients.csv`` and an energy table per recording into a folder."""
+    write_json(folder / "fit.json", fit.to_json())
+    rows = ["name,value,sigma,unit"]
+    for name, e in (*fit.coefficients.items(), *((f"{k}/psi", e) for k, e in fit.ratios.items())):
+        rows.append(f"{name},{e.value!r},{e.sigma!r},{e.unit}")
+    (folder / "coefficients.csv").write_text("\n".join(rows) + "\n", encoding="utf-8")
+    for k, curve in enumerate(fit.energy):
+        head = ["time_s", "energy_j", "model_j", *(f"{n}_j" for n in fit.coefficients)]
+        table = [curve.t_s, curve.energy_j, curve.model_j, *curve.works_j.T]
+        lines = [",".join(head)]
+        lines += [",".join(f"{v:.9g}" for v in row) for row in zip(*table, strict=True)]
+        name = f"energy{recording_suffix(fit, k)}.csv"
+        (folder / name).write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def recording_suffix(fit: DampingFit, recording: int) -> str:
+    """What tells the files of one recording from another's: nothing if there is one, else ``-1``, ``-2``, ..."""
+    return "" if len(fit.inputs) == 1 else f"-{recording + 1}"

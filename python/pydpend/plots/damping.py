@@ -3,11 +3,14 @@ maps."""
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 from matplotlib.figure import Figure
 
 from pydpend.damping import DampingFit, Maps, Prediction
-from pydpend.plots.style import COLORS, new_figure, style
+from pydpend.damping.stored import recording_suffix
+from pydpend.plots.style import COLORS, new_figure, save, style
 from pydpend.trials import Trials
 
 
@@ -100,3 +103,14 @@ def maps_figure(maps: Maps) -> Figure:
                 axes.set_xlabel(f"{name} (deg)")
             row[0].set_ylabel(f"bias of phi{j + 1} (deg)")
     return figure
+
+
+def save_figures(fit: DampingFit, trials: Trials | None, folder: Path) -> None:
+    """Writes every figure that the fit has something for as PNG into a folder."""
+    for k in range(len(fit.energy)):
+        save(energy_figure(fit, k), folder / f"energy{recording_suffix(fit, k)}.png")
+    save(shares_figure(fit), folder / "shares.png")
+    if fit.maps is not None:
+        save(maps_figure(Maps.from_json(fit.maps)), folder / "maps.png")
+    if trials is not None:
+        save(trials_figure(trials), folder / "trials.png")

@@ -12,7 +12,9 @@ def with_sigma(value: float | None, sigma: float | None) -> str:
     if sigma is None or not sigma > 0:
         return f"{value:.5g}"
     exponent = int(np.floor(np.log10(max(abs(value), sigma))))
-    digits = max(0, exponent - int(np.floor(np.log10(sigma))) + 1)
+    if -3 <= exponent <= 4:
+        exponent = 0
+    digits = max(0, exponent + 1 - int(np.floor(np.log10(sigma))))
     scale = 10.0**exponent
     text = f"{value / scale:.{digits}f} ± {sigma / scale:.{digits}f}"
     return text if exponent == 0 else f"({text}) × 10^{exponent}"
