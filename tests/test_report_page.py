@@ -48,7 +48,7 @@ def mp4(tmp_path_factory: pytest.TempPathFactory) -> bytes:
 
 @pytest.fixture(scope="module")
 def html(mp4: bytes, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    t = np.arange(100_000) * (FRAMES * STEP / 100_000)
+    t = np.arange(100_000, dtype=np.float64) * (FRAMES * STEP / 100_000)
     y = np.sin(2 * np.pi * t)
     y[5000:6000] = np.nan
     page = p.Page(
@@ -61,7 +61,7 @@ def html(mp4: bytes, tmp_path_factory: pytest.TempPathFactory) -> Path:
                 "angles",
                 "Angles",
                 (
-                    p.Film("film", "g", mp4, np.arange(FRAMES) * STEP, RATE, "the film"),
+                    p.Film("film", "g", mp4, np.arange(FRAMES, dtype=np.float64) * STEP, RATE, "the film"),
                     p.Chart("one", "Angles", "g", t, (p.Series("phi1", y), p.Series("phi2", 2 * y, 1))),
                     p.Chart(
                         "two",
@@ -105,10 +105,10 @@ def opened(browser: Browser, html: Path) -> Iterator[Page]:
     page = browser.new_page(viewport={"width": 1100, "height": 900})
     page.on("console", lambda m: problems.append(m.text) if m.type in ("error", "warning") else None)
     page.on("pageerror", lambda e: problems.append(str(e)))
-    page.on("dialog", lambda d: (problems.append(f"dialog {d.message}"), d.dismiss())[1])
+    page.on("dialog", lambda d: problems.append(f"dialog {d.message}"))
     page.on(
         "request",
-        lambda r: problems.append(r.url) if not r.url.startswith(("file:", "data:", "blob:")) else None,
+        lambda r: None if r.url.startswith(("file:", "data:", "blob:")) else problems.append(r.url),
     )
     page.goto(html.as_uri())
     until(page, "window.pydpendReport?.ready === true")

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
-
 from pydpend.analyse import Options, analyse
 from pydpend.angles import read_angles
 
@@ -59,7 +58,11 @@ def rows() -> list[tuple[str, str, str]]:
     fit = json.loads((OUT / "fit" / "fit.json").read_text("utf-8"))
     for name, c in fit["coefficients"].items():
         found.append(
-            (f"{name} ({c['unit']})", f"{c['value']:.3e} +- {c['sigma']:.1e}", f"{truth['damping'].get(name, 0.0):.3e}")
+            (
+                f"{name} ({c['unit']})",
+                f"{c['value']:.3e} +- {c['sigma']:.1e}",
+                f"{truth['damping'].get(name, 0.0):.3e}",
+            )
         )
     return found
 

@@ -79,6 +79,9 @@ fn matrix<'py>(py: Python<'py>, m: &[f64], n: usize) -> PyResult<Bound<'py, PyAr
     m.to_pyarray(py).reshape([n, n])
 }
 
+/// Whole numbers and two tables of numbers with the same rows.
+type Tables<'py> = (Bound<'py, PyArray2<i64>>, Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>);
+
 /// Segments of about `length_s` over the spans of each recording, and a first guess of the state at each start.
 /// Returns integer rows `[recording, first, last, chained]`, times `[start_s, end_s]` and states.
 #[pyfunction]
@@ -89,7 +92,7 @@ pub fn shooting_segments<'py>(
     spans: Vec<[f64; 2]>,
     length_s: f64,
     chained: bool,
-) -> PyResult<(Bound<'py, PyArray2<i64>>, Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>)> {
+) -> PyResult<Tables<'py>> {
     let owned = recordings.iter().map(angles).collect::<PyResult<Vec<_>>>()?;
     let (mut whole, mut times, mut states) = (Vec::new(), Vec::new(), Vec::new());
     for (r, (a, span)) in owned.iter().zip(&spans).enumerate() {
@@ -234,7 +237,7 @@ pub fn shooting_trace<'py>(
     segment_states: PyReadonlyArray2<'py, f64>,
     model: HashMap<String, f64>,
     stretch: f64,
-) -> PyResult<(Bound<'py, PyArray2<i64>>, Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>)> {
+) -> PyResult<Tables<'py>> {
     let owned = recordings.iter().map(angles).collect::<PyResult<Vec<_>>>()?;
     let list = segments(&segment_rows, &segment_times);
     if list.iter().any(|s| s.recording >= owned.len() || s.last > owned[s.recording].t_s.len()) {

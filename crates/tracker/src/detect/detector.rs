@@ -186,7 +186,10 @@ impl Detector {
     }
 
     fn centre(&mut self, pixels: &Pixels<'_>, blob: &Blob, avoid: [[f64; 3]; 2]) -> Centre {
-        if let Some(table) = &self.table {
+        // A disc smeared over more than its radius is no disc any more.
+        if let Some(table) = &self.table
+            && blob.elongation() < 1.6
+        {
             let fit = disc_fit(table, &self.levels);
             if let Some(f) = self.window.fit(pixels, blob, &fit, avoid)
                 && f.rms < LARGEST_MISFIT * f.height.abs() + 2.0 * self.levels.noise.variance(f.base).sqrt()

@@ -202,11 +202,14 @@ fn a_parquet_file_cut_anywhere_or_changed_is_refused() {
     }
 }
 
+/// What spoils a table.
+type Spoil = Box<dyn Fn(&mut NodeTable)>;
+
 #[test]
 fn an_invalid_table_is_not_written() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("t.parquet");
-    let mut spoilt: Vec<(Box<dyn Fn(&mut NodeTable)>, &str)> = vec![
+    let mut spoilt: Vec<(Spoil, &str)> = vec![
         (Box::new(|t| t.rows.time_s[1] = 0.004), "row 3: time_s 0.004 comes after 0.004"),
         (Box::new(|t| t.rows.time_s[0] = f64::NAN), "row 0: time_s of frame 4 is NaN"),
         (Box::new(|t| t.rows.frame[0] = -1), "row 0: frame -1 is below 0"),

@@ -91,23 +91,23 @@ impl Header {
                 "Export the recording again; the header is not complete",
             );
         }
-        if let Some(kind) = &self.color_type {
-            if !["mono", "raw", "bayer"].contains(&kind.to_lowercase().as_str()) {
-                return fault(
-                    "color type",
-                    format!("{kind} is not read, only Mono, Raw and Bayer are"),
-                    "Export the recording as Raw or as AVI",
-                );
-            }
+        if let Some(kind) = &self.color_type
+            && !["mono", "raw", "bayer"].contains(&kind.to_lowercase().as_str())
+        {
+            return fault(
+                "color type",
+                format!("{kind} is not read, only Mono, Raw and Bayer are"),
+                "Export the recording as Raw or as AVI",
+            );
         }
-        if let Some(format) = &self.file_format {
-            if !format.to_lowercase().contains("mraw") {
-                return fault(
-                    "file format",
-                    format!("the pixels were saved as {format}, not as MRaw"),
-                    "Give the file or folder that holds the pictures",
-                );
-            }
+        if let Some(format) = &self.file_format
+            && !format.to_lowercase().contains("mraw")
+        {
+            return fault(
+                "file format",
+                format!("the pixels were saved as {format}, not as MRaw"),
+                "Give the file or folder that holds the pictures",
+            );
         }
         Ok(())
     }

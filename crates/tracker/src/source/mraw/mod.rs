@@ -161,7 +161,7 @@ impl MrawSource {
             PixelFormat::Gray8 => width,
             PixelFormat::Gray16 => 2 * width,
             // A row of packed pixels is a whole number of bytes or the frame is one run of bits.
-            _ if width * format.bits_per_pixel() as usize % 8 == 0 => {
+            _ if (width * format.bits_per_pixel() as usize).is_multiple_of(8) => {
                 width * format.bits_per_pixel() as usize / 8
             }
             _ => 0,
