@@ -1,5 +1,7 @@
 //! `tracker track` through the real binary: same bytes for any threads and after any death, and what it refuses.
 
+#![allow(clippy::unwrap_used, clippy::panic)] // a test may fail by panicking
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
