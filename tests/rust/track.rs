@@ -292,7 +292,7 @@ fn what_makes_no_sense_is_refused_with_what_to_do() {
         (vec![&input, "-o", &out, "--frames", "9000..9001"], "it ends before frame 9000"),
         (vec![&input, "-o", &out, "--frames", "x"], "expected A..B"),
         (vec![&input, "-o", &out, "--threshold", "dim"], "expected auto or a number"),
-        (vec![&input, "-o", &out, "--fps", "-3"], "fps"),
+        (vec![&input, "-o", &out, "--fps=-3"], "fps"),
         (vec!["-", "-o", &out, "--resume"], "standard input cannot be read again"),
         (vec![&input], "--output"),
     ] {
