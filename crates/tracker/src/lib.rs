@@ -17,6 +17,7 @@ pub mod film;
 pub mod frame;
 pub mod overlay;
 pub mod pipeline;
+pub mod residual;
 pub mod rig;
 pub mod score;
 pub mod source;

@@ -95,11 +95,18 @@ fn moving_bodies(sample: &mut Sample) -> Vec<Found> {
         }
         let mut changed = false;
         for f in &found {
-            for &t in &f.link.template {
-                let places: Vec<Vector2<f64>> = f.poses.iter().flatten().map(|p| place(p, t)).collect();
-                if let Some(still) = sample::still_place(&places) {
-                    changed |= sample.stands(still);
-                }
+            // A point near a joint hardly moves; a body stands still only if all of it does.
+            let still: Option<Vec<Vector2<f64>>> = f
+                .link
+                .template
+                .iter()
+                .map(|&t| {
+                    let places: Vec<Vector2<f64>> = f.poses.iter().flatten().map(|p| place(p, t)).collect();
+                    sample::still_place(&places)
+                })
+                .collect();
+            for place in still.into_iter().flatten() {
+                changed |= sample.stands(place);
             }
         }
         if !changed {

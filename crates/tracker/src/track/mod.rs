@@ -10,7 +10,6 @@ pub mod nearest;
 pub mod partly;
 pub mod predict;
 pub mod recording;
-pub mod residual;
 pub mod rigid;
 pub mod signature;
 pub mod tracker;

@@ -6,8 +6,8 @@ use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use tracker::residual::residuals;
 use tracker::table::read_table;
-use tracker::track::residual::residuals;
 
 /// Check a node table and sum it up
 #[derive(Debug, clap::Args)]

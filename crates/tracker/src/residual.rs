@@ -4,10 +4,10 @@
 
 use nalgebra::Vector2;
 
-use super::mechanism::Mechanism;
-use super::rigid::{Pair, fit_pose, place};
 use crate::rig::Rig;
 use crate::table::Rows;
+use crate::track::mechanism::Mechanism;
+use crate::track::rigid::{Pair, fit_pose, place};
 
 /// What a table says of one node's motion. `None` where too little was seen.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
