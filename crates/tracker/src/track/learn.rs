@@ -12,6 +12,10 @@ use super::tracker::{BodySeen, Habits};
 
 /// Samples kept of each node; beyond, every second one is dropped and only every second taken.
 const SAMPLES: usize = 1024;
+/// What stays within this stands still, px.
+const SAME_PLACE_PX: f64 = 3.0;
+/// Places of left-over detections kept.
+const PLACES: usize = 256;
 /// Nothing is known better than this, px: what a template cannot say of a real body (lens, bending).
 const LEAST_SLACK_PX: f64 = 0.02;
 
@@ -55,6 +59,8 @@ pub struct Lessons {
     joints: Vec<Shared>,
     frames: usize,
     left_over: usize,
+    /// Places of what is left over, and in how many frames.
+    places: Vec<(Vector2<f64>, usize)>,
 }
 
 impl Lessons {
@@ -66,6 +72,7 @@ impl Lessons {
             joints: vec![Shared::default(); joints],
             frames: 0,
             left_over: 0,
+            places: Vec::new(),
         }
     }
 
@@ -101,6 +108,18 @@ impl Lessons {
                     }
                 }
                 Holder::Body(..) => {}
+            }
+        }
+        let mut node = vec![false; sky.len()];
+        for d in seen.iter().flat_map(BodySeen::detections) {
+            node[d] = true;
+        }
+        for d in (0..sky.len()).filter(|&d| !node[d]) {
+            let at = sky.place(d);
+            match self.places.iter().position(|p| (p.0 - at).norm() < SAME_PLACE_PX) {
+                Some(k) => self.places[k].1 += 1,
+                None if self.places.len() < PLACES => self.places.push((at, 1)),
+                None => {}
             }
         }
         self.frames += 1;
@@ -150,7 +169,12 @@ impl Lessons {
             h.sigma_px = sigma_px;
         }
         if self.frames >= 20 {
-            habits.clutter = (self.left_over as f64 / self.frames as f64).max(0.05);
+            let standing: Vec<&(Vector2<f64>, usize)> =
+                self.places.iter().filter(|p| 3 * p.1 >= self.frames).collect();
+            let still: usize = standing.iter().map(|p| p.1).sum();
+            habits.standing = standing.iter().map(|p| p.0).collect();
+            let moving = self.left_over.saturating_sub(still);
+            habits.clutter = (moving as f64 / self.frames as f64).max(0.05);
         }
         habits.floor_px = LEAST_SLACK_PX;
     }

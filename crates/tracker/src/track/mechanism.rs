@@ -59,6 +59,8 @@ pub struct Mechanism {
     pub order: Vec<usize>,
     /// Number of nodes.
     pub nodes: usize,
+    /// Area of the image, px.
+    pub image_px: f64,
 }
 
 impl Mechanism {
@@ -92,7 +94,13 @@ impl Mechanism {
                 hinges.push(Hinge { joint: j, body, local, holder, sigma_px: slack_px.hypot(slack_px) });
             }
         }
-        let mut mechanism = Self { links, hinges, order: Vec::new(), nodes: rig.nodes.len() };
+        let mut mechanism = Self {
+            links,
+            hinges,
+            order: Vec::new(),
+            nodes: rig.nodes.len(),
+            image_px: f64::from(rig.image_px[0]) * f64::from(rig.image_px[1]),
+        };
         mechanism.order = mechanism.outwards();
         mechanism
     }

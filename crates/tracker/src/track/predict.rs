@@ -125,6 +125,10 @@ impl Motion {
 
     /// Adds the pose found at `time`. Returns by how much the prediction by one frame failed, if there was one.
     pub fn add(&mut self, time: f64, fit: &PoseFit) -> Option<Unrest> {
+        if self.newest() == Some(time) {
+            // The same frame again, as where two directions of time meet: the newer pose stands.
+            self.past.pop();
+        }
         let mut angle = fit.pose.rotation.angle();
         let origin = fit.pose.translation.vector;
         let mut missed = None;

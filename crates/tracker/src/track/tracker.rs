@@ -54,6 +54,10 @@ impl BodySeen {
 const REACH_SIGMA: f64 = 5.1;
 /// Greatest expected number of chance sightings for a body found where its motion carries it.
 const CHANCE_EXPECTED: f64 = 2e-3;
+/// The same for a single marker that hangs on nothing: all there is to go by is that nothing else is near.
+const CHANCE_SINGLE: f64 = 2e-2;
+/// Around a place where something stands, a single marker is not told from it, px.
+const STANDING_PX: f64 = 6.0;
 /// The same for a body found elsewhere.
 const CHANCE_ANYWHERE: f64 = 1e-5;
 /// Pairs of nodes from which a free body is sought.
@@ -82,8 +86,10 @@ pub struct Habits {
     pub floor: Vec<Unrest>,
     /// For each body how far it may go in a frame.
     pub first: Vec<Unrest>,
-    /// Detections per frame that are no node.
+    /// Detections per frame that are no node and do not stand still.
     pub clutter: f64,
+    /// Places where something stands that is no node, px.
+    pub standing: Vec<Vector2<f64>>,
     /// Added to every detection's uncertainty in square, px.
     pub floor_px: f64,
 }
@@ -106,9 +112,11 @@ impl Habits {
             if l.nodes.len() > 1 {
                 f.angle_rad = 4.0;
                 f.origin_px = 150.0;
+            } else {
+                f.origin_px = 40.0;
             }
         }
-        Self { floor: each(1.0), first, clutter: 0.5, floor_px }
+        Self { floor: each(1.0), first, clutter: 0.5, standing: Vec::new(), floor_px }
     }
 }
 
@@ -407,6 +415,16 @@ impl Engine {
         let forecast = self.forecast(b, time, anchors);
         // A body of one node that hangs on nothing has no angle to be lost.
         let single = n == 1 && anchors.is_empty();
+        let moving: Vec<bool>;
+        let free = if single {
+            // Nothing but its motion tells it from what stands still.
+            let stands =
+                |d: usize| self.habits.standing.iter().any(|p| (p - sky.place(d)).norm() < STANDING_PX);
+            moving = (0..sky.len()).map(|d| free[d] && !stands(d)).collect();
+            &moving
+        } else {
+            free
+        };
         if let Some(w) = forecast.filter(|w| single || w.angle_rad < std::f64::consts::PI) {
             // The usual case: every node near its expected place, and no other turn can look like it.
             let search = self.search(b, sky, free, anchors, Some(w));
@@ -419,7 +437,8 @@ impl Engine {
             {
                 return stands(s);
             }
-            match self.judge(b, search.run(), sky, free, anchors, Some(&w), CHANCE_EXPECTED, &mut open) {
+            let limit = if single { CHANCE_SINGLE } else { CHANCE_EXPECTED };
+            match self.judge(b, search.run(), sky, free, anchors, Some(&w), limit, &mut open) {
                 Ok(s) => return stands(s),
                 // What is open where it is expected is not looked for elsewhere.
                 Err(undecided) if single || (n == 1 && !undecided.is_empty()) => {
@@ -514,19 +533,18 @@ impl Engine {
             let k = s.support - base;
             return trials as f64 * choose(n.saturating_sub(base).max(k), k) * hit.powi(k as i32);
         }
+        if n == 1 && base == 2 {
+            let density = others.max(self.habits.clutter) / self.mechanism.image_px;
+            let gate = window.map_or(f64::INFINITY, |w| w.origin_px + radius);
+            return density * std::f64::consts::PI * gate * gate;
+        }
         match base {
             // One node on its circle about the anchor; half hidden it would not show, so it must be expected
             // within what it may be off.
             1 if n > 1 && turn * reach > LONE_GATE_PX => f64::INFINITY,
             1 => n as f64 * density * 4.0 * radius * reach * turn,
             // One or two nodes of a body that hangs on nothing.
-            _ if s.support == 1 => {
-                if n == 1 {
-                    density * std::f64::consts::PI * gate * gate
-                } else {
-                    f64::INFINITY
-                }
-            }
+            _ if s.support == 1 => f64::INFINITY,
             _ => {
                 let pairs = (n * (n - 1) / 2) as f64;
                 pairs * (density * std::f64::consts::PI * gate * gate) * density * 4.0 * radius * gate
