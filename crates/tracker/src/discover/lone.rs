@@ -18,6 +18,8 @@ const LEAST: usize = 6;
 #[derive(Debug, Clone)]
 struct Path {
     at: Vec<(usize, Vector2<f64>)>,
+    /// Areas and elongations of its detections.
+    shape: Vec<(f32, f32)>,
 }
 
 impl Path {
@@ -33,6 +35,17 @@ impl Path {
         })
     }
 
+    /// Whether its detections look alike and round, as a marker's do and a hand's do not.
+    fn is_marker(&self) -> bool {
+        let mut areas: Vec<f32> = self.shape.iter().map(|s| s.0).collect();
+        areas.sort_by(f32::total_cmp);
+        let mut long: Vec<f32> = self.shape.iter().map(|s| s.1).collect();
+        long.sort_by(f32::total_cmp);
+        let n = areas.len();
+        // Four fifths within a factor of 1.6 in area: blur and compression change it, not more.
+        areas[n - 1 - n / 10] < 1.6 * areas[n / 10] && long[n / 2] < 1.8
+    }
+
     fn travelled(&self) -> f64 {
         let first = self.at[0].1;
         self.at.iter().map(|p| (p.1 - first).norm()).fold(0.0, f64::max)
@@ -46,16 +59,16 @@ pub fn find_lone(store: &DetectionStore, sample: &Sample, standing: &[Vector2<f6
     let mut scratch = Vec::new();
     for i in 0..store.len().min(FRAMES) {
         store.read(i, &mut scratch);
-        let mut free: Vec<Vector2<f64>> = scratch
+        let mut free: Vec<(Vector2<f64>, (f32, f32))> = scratch
             .iter()
-            .map(|d| Vector2::new(d.x_px, d.y_px))
-            .filter(|p| standing.iter().all(|s| (s - p).norm() > 1.5))
+            .map(|d| (Vector2::new(d.x_px, d.y_px), (d.area_px, d.elongation)))
+            .filter(|(p, _)| standing.iter().all(|s| (s - p).norm() > super::sample::STILL_PX))
             .collect();
         // Nearest pairs first, each used once.
         let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
         for (k, path) in open.iter().enumerate() {
             let Some(guess) = path.guess(i) else { continue };
-            for (d, p) in free.iter().enumerate() {
+            for (d, (p, _)) in free.iter().enumerate() {
                 let gate = if path.at.len() == 1 { 40.0 } else { 15.0 };
                 let r = (p - guess).norm();
                 if r < gate {
@@ -70,7 +83,8 @@ pub fn find_lone(store: &DetectionStore, sample: &Sample, standing: &[Vector2<f6
             if !used[d] && !grown[k] {
                 used[d] = true;
                 grown[k] = true;
-                open[k].at.push((i, free[d]));
+                open[k].at.push((i, free[d].0));
+                open[k].shape.push(free[d].1);
             }
         }
         let mut still = Vec::new();
@@ -81,10 +95,10 @@ pub fn find_lone(store: &DetectionStore, sample: &Sample, standing: &[Vector2<f6
         open = still;
         let mut keep = used.iter();
         free.retain(|_| !keep.next().copied().unwrap_or(false));
-        open.extend(free.into_iter().map(|p| Path { at: vec![(i, p)] }));
+        open.extend(free.into_iter().map(|(p, s)| Path { at: vec![(i, p)], shape: vec![s] }));
     }
     done.append(&mut open);
-    done.retain(|p| p.at.len() >= LEAST && p.travelled() > 10.0);
+    done.retain(|p| p.at.len() >= LEAST && p.travelled() > 10.0 && p.is_marker());
     done.sort_by_key(|p| std::cmp::Reverse(p.at.len()));
     // Paths that overlap in time are different markers; one that fits none beside it may be any of them.
     let mut kept: Vec<Path> = Vec::new();

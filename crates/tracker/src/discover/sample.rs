@@ -15,7 +15,7 @@ const KEPT: usize = 400;
 /// Below this a place has not changed, px.
 const SAME_PLACE_PX: f64 = 1.5;
 /// Within this of its middle a marker does not move, px: what comes and goes in front of it shifts it so far.
-const STILL_PX: f64 = 6.0;
+pub const STILL_PX: f64 = 6.0;
 /// Part of the kept frames in which a standing point is seen at least.
 const STANDING_PART: f64 = 0.6;
 

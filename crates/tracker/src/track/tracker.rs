@@ -54,8 +54,9 @@ impl BodySeen {
 const REACH_SIGMA: f64 = 5.1;
 /// Greatest expected number of chance sightings for a body found where its motion carries it.
 const CHANCE_EXPECTED: f64 = 2e-3;
-/// The same for a single marker that hangs on nothing: all there is to go by is that nothing else is near.
-const CHANCE_SINGLE: f64 = 2e-2;
+/// The same for a single marker that hangs on nothing: all there is to go by is that nothing else is near. Taken
+/// for something else only where it is hidden as well.
+const CHANCE_SINGLE: f64 = 0.1;
 /// Around a place where something stands, a single marker is not told from it, px.
 const STANDING_PX: f64 = 6.0;
 /// The same for a body found elsewhere.
