@@ -179,7 +179,7 @@ def encoder(r: Recording, options: Options, here: Path) -> str:
     from pydpend.angles import read_angles
     from pydpend.encoder import calibrate, compare, encoder_angles, read_calibration, read_encoder, read_holds
     from pydpend.plots.encoder import calibration_figure, comparison_figure
-    from pydpend.plots.style import save
+    from pydpend.plots.style import inline_svg, save
 
     film = read_angles(here / "angles.parquet", name=r.name)
     signal = read_encoder(str(r.encoder), column=options.encoder_column)
@@ -188,7 +188,7 @@ def encoder(r: Recording, options: Options, here: Path) -> str:
         path = Path(options.calibration)
         line = calibrate(read_holds([path])) if path.is_dir() else read_calibration(path)
         line.write(here / "encoder.json")
-        save(calibration_figure(line), here / "calibration.svg")
+        write_whole(here / "calibration.svg", inline_svg(calibration_figure(line)))
     found = compare(film, encoder_angles(signal, line))
     write_whole(here / "comparison.json", found.to_json())
     pq.write_table(pa.table(found.to_columns()), here / "comparison.parquet")

@@ -83,6 +83,8 @@ def inline_svg(figure: Figure) -> str:
     figure.patch.set_alpha(0.0)
     out = io.StringIO()
     with matplotlib.rc_context(_SETTINGS):
-        figure.savefig(out, format="svg", metadata={"Date": None}, transparent=True)
+        figure.savefig(
+            out, format="svg", metadata=dict.fromkeys(("Creator", "Date", "Format", "Type")), transparent=True
+        )
     svg = out.getvalue()
     return svg[svg.index("<svg") :].replace(_INK, "currentColor")
