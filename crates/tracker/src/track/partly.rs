@@ -11,6 +11,10 @@ use crate::store::FrameStamp;
 /// Frames that wait for what comes after them, at most.
 const LONGEST: usize = 64;
 
+/// A run of so many frames in which the marker went so far is no chance, px.
+const RUN: usize = 3;
+const RUN_PX: f64 = 8.0;
+
 /// One frame's nodes and, for each, whether only a part of it is seen.
 #[derive(Debug, Clone)]
 struct Held {
@@ -61,9 +65,22 @@ impl Partly {
         }
     }
 
+    /// Ends a run that touched no frame in which the node is whole. One that went along with the body is believed
+    /// all the same: glints do not last, and what stands still is soon farther off than half a marker.
     fn give_up(&mut self, node: usize) {
+        let run: Vec<(f64, f64)> = self
+            .held
+            .iter()
+            .filter(|h| h.doubt[node])
+            .map(|h| (h.row[node].x_px, h.row[node].y_px))
+            .collect();
+        let far = match (run.first(), run.last()) {
+            (Some(a), Some(b)) => (a.0 - b.0).hypot(a.1 - b.1),
+            _ => 0.0,
+        };
+        let believed = run.len() >= RUN && far > RUN_PX;
         for h in &mut self.held {
-            if std::mem::take(&mut h.doubt[node]) {
+            if std::mem::take(&mut h.doubt[node]) && !believed {
                 h.row[node] = Observation::MISSING;
             }
         }
@@ -110,12 +127,38 @@ mod tests {
     }
 
     #[test]
+    fn a_run_that_goes_along_with_the_body_is_believed() {
+        for (step_px, seen) in [(5.0, true), (1.0, false)] {
+            let mut partly = Partly::default();
+            for i in 0..6_u32 {
+                let mut row = vec![Observation::MISSING];
+                if (1..5).contains(&i) {
+                    row[0] = Observation {
+                        x_px: step_px * f64::from(i),
+                        y_px: 0.0,
+                        sigma_px: 1.0,
+                        area_px: 60.0,
+                        status: Status::Seen,
+                    };
+                }
+                let stamp = FrameStamp { index: u64::from(i), ticks: i64::from(i), decoded: true };
+                partly.push(stamp, row, &[true]);
+            }
+            let rows: Vec<bool> = std::iter::from_fn(|| partly.pop(true))
+                .map(|(_, row)| row[0].status == Status::Seen)
+                .collect();
+            assert_eq!(rows, [false, seen, seen, seen, seen, false]);
+        }
+    }
+
+    #[test]
     fn a_part_is_believed_where_it_touches_the_whole() {
         assert_eq!(believed("xxpp..pxx"), "xxxx..xxx");
         assert_eq!(believed("x.p.x"), "x...x");
         assert_eq!(believed("pp"), "..");
         assert_eq!(believed("..pppx"), "..xxxx");
         // A run too long to wait for is given up.
+        // Here nothing moves.
         let long = format!(".{}x", "p".repeat(80));
         assert_eq!(believed(&long).len(), 82);
         assert!(believed(&long).starts_with(".."));
