@@ -46,6 +46,18 @@ check: build
 	.venv/bin/mypy
 	MYPYPATH=python .venv/bin/stubtest pydpend._tracker
 
+# Long: the eight scenes by twenty seeds, then the estimators' sweeps.
+validate: build
+	cargo run $(CARGO_FLAGS) --example validate -- --seeds 100..120
+	for sweep in angles default physics; do $(PY) -m tests.validate_$$sweep || exit 1; done
+	for part in energy inertias ratios slow all; do $(PY) -m tests.validate_damping $$part || exit 1; done
+
+bench: build
+	cargo bench --workspace --locked
+
+fixtures: build
+	$(PY) fixtures/make.py
+
 format: .make/venv
 	cargo fmt --all
 	.venv/bin/ruff check --fix .

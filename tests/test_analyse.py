@@ -25,6 +25,7 @@ def options() -> Options:
         encoder=str(DEMO / "encoder.csv"),
         calibration=str(DEMO / "calibration"),
         zero=str(DEMO / "hanging.mp4"),
+        start_s=0.6,
     )
 
 
