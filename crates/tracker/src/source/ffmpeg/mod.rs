@@ -27,7 +27,11 @@ use crate::frame::{Bytes, Ending, Frame, FrameSource, RateOrigin, SourceInfo, Ti
 
 /// FFmpeg's words for an error code.
 fn message(code: i32) -> String {
-    ffmpeg_next::Error::from(code).to_string()
+    // The binding knows FFmpeg's words only once it has been started; starting it again does nothing more.
+    match ffmpeg_next::init() {
+        Ok(()) => ffmpeg_next::Error::from(code).to_string(),
+        Err(e) => format!("FFmpeg's error {code}; {e}"),
+    }
 }
 
 /// FFmpeg's name of a codec.
