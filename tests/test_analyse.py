@@ -48,6 +48,8 @@ def test_angles_are_the_truths(run: Path) -> None:
     # 0.02-0.03 deg. A lost turn or a swapped marker would be degrees.
     assert (np.degrees(np.sqrt(np.nanmean(error**2, axis=0))) < 0.05).all()
     assert np.nanmax(np.abs(np.degrees(error))) < 0.5
+    assert np.isfinite(angles.phi_rad[-500:]).mean() > 0.9
+    assert np.isfinite(angles.phi_rad).mean() > 0.95
 
 
 def test_the_encoders_clock_and_gain_are_the_truths(run: Path) -> None:

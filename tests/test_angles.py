@@ -307,3 +307,18 @@ def test_one_link_and_bad_tables() -> None:
         angles(nodes, bodies=("upper", "middle"))
     with pytest.raises(AnglesError, match="not known"):
         angles(nodes, "best")  # type: ignore[arg-type]
+
+
+def test_single_frames_between_short_gaps_lose_no_turn() -> None:
+    # Seen in one frame of three for a while, as when the links cross: no run is long enough for a rate of its own.
+    from pydpend.angles.unwrap import unwrap
+
+    t, phi = tumbling(3000, 5)
+    truth = phi[:, 1]
+    seen = np.ones(t.size, dtype=bool)
+    seen[1000:1060] = np.arange(60) % 3 == 0
+    wrapped = np.where(seen, np.angle(np.exp(1j * truth)), np.nan)
+    found, lost = unwrap(t, wrapped)
+    assert lost == []
+    error = (found - truth)[seen]
+    assert np.abs(error - error[0]).max() < 1e-9

@@ -17,6 +17,10 @@ from pydpend.angles.table import Floats
 RATE_SAMPLES = 8
 """Rates beside a gap come from a straight line or parabola through up to this many frames."""
 
+RATE_REACH = 4
+"""The frames before a gap may lie this many times as far back as they would without gaps: a link seen in single
+frames between short gaps still has a rate."""
+
 _BLOCK_S = 0.02
 """Accelerations are judged from mean rates over this long, s: shorter ones are mostly noise."""
 
@@ -55,14 +59,13 @@ def unwrap(t_s: Floats, wrapped_rad: Floats) -> tuple[Floats, list[Gap]]:
     if breaks.size:
         acceleration = _largest_acceleration(t, angle, breaks, step)
         edges = np.concatenate([[0], breaks + 1, [t.size]])
+        counted = 0  # from here on every turn is counted
         for k, last in enumerate(breaks):
-            first, start, stop = last + 1, edges[k], edges[k + 2]
+            first, stop = last + 1, edges[k + 2]
             gap = float(t[first] - t[last])
-            before = _rate(
-                t[max(start, last - RATE_SAMPLES + 1) : last + 1],
-                angle[max(start, last - RATE_SAMPLES + 1) : last + 1],
-                True,
-            )
+            near = int(np.searchsorted(t, t[last] - RATE_REACH * RATE_SAMPLES * step))
+            start = max(counted, near, last - RATE_SAMPLES + 1)
+            before = _rate(t[start : last + 1], angle[start : last + 1], True)
             after = _rate(
                 t[first : min(stop, first + RATE_SAMPLES)],
                 angle[first : min(stop, first + RATE_SAMPLES)],
@@ -77,6 +80,7 @@ def unwrap(t_s: Floats, wrapped_rad: Floats) -> tuple[Floats, list[Gap]]:
             limit = _longest(rates, acceleration)
             if gap > limit:
                 lost.append(Gap(int(rows[last]), int(rows[first]), gap, limit))
+                counted = int(first)
     phi[rows] = angle
     return phi, lost
 
