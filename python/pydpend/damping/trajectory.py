@@ -53,7 +53,11 @@ def prepare(
     """Finds the free decay and the noise. Raises FitError where there is no decay to fit."""
     if angles.links != 2:
         raise FitError(
-            fault(angles.name, "the angles are of one link", "Fit them as a single pendulum (pinned=True)")
+            fault(
+                angles.name,
+                "the angles are of one link",
+                "Damping is fitted to the angles of both links; one link alone is not fitted yet",
+            )
         )
     decay = find_decay(angles, model, start_s, stop_s)
     level = noise(angles.t_s, angles.phi_rad, angles.sigma_rad, (decay.start_s, decay.stop_s))
