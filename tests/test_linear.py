@@ -157,5 +157,7 @@ def test_figures_and_animation(tmp_path: Path) -> None:
     assert np.size(physics.section(found).axes[0].lines[0].get_xdata()) == len(found.t_s) > 1
     physics.animate(run, model, tmp_path / "p.gif", fps=5)
     assert (tmp_path / "p.gif").read_bytes()[:3] == b"GIF"
+    physics.animate(run, model, tmp_path / "p.mp4", fps=5)
+    assert (tmp_path / "p.mp4").read_bytes()[4:8] == b"ftyp"
     with pytest.raises(SimulationError, match="is not a film"):
         physics.animate(run, model, tmp_path / "p.avi")
