@@ -18,7 +18,8 @@ fn field(name: &str) -> PyResult<Field> {
     Field::named(name).ok_or_else(|| PyKeyError::new_err(format!("no parameter is called {name}")))
 }
 
-fn parameters(values: &HashMap<String, f64>) -> PyResult<Parameters<f64>> {
+/// A model's numbers by their names. Raises KeyError for one that is missing or not known.
+pub(crate) fn parameters(values: &HashMap<String, f64>) -> PyResult<Parameters<f64>> {
     let fixed = |name: &str| {
         values.get(name).copied().ok_or_else(|| PyKeyError::new_err(format!("the model lacks {name}")))
     };

@@ -2,40 +2,19 @@
 
 use std::collections::HashMap;
 
+use dynamics::TERMS;
 use dynamics::contact::Friction;
 use dynamics::ensemble::{Case, ensemble};
 use dynamics::lyapunov::{Growth, growth_rates};
 use dynamics::motion::Contact;
 use dynamics::section::{Section, poincare};
 use dynamics::simulate::{Ending, Failure, Run, Settings};
-use dynamics::{Field, Fixed, Parameters, TERMS};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
-use pyo3::exceptions::{PyKeyError, PyValueError};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-fn parameters(values: &HashMap<String, f64>) -> PyResult<Parameters<f64>> {
-    let fixed = |name: &str| {
-        values.get(name).copied().ok_or_else(|| PyKeyError::new_err(format!("the model lacks {name}")))
-    };
-    const FIXED: [&str; 6] = ["m1", "m2", "l1", "g", "lower_inner", "lower_outer"];
-    let mut out = Parameters::zero(Fixed {
-        m1_kg: fixed(FIXED[0])?,
-        m2_kg: fixed(FIXED[1])?,
-        l1_m: fixed(FIXED[2])?,
-        g_m_s2: fixed(FIXED[3])?,
-        lower_inner_m: fixed(FIXED[4])?,
-        lower_outer_m: fixed(FIXED[5])?,
-    });
-    for (name, value) in values {
-        if !FIXED.contains(&name.as_str()) {
-            let field = Field::named(name)
-                .ok_or_else(|| PyKeyError::new_err(format!("no parameter is called {name}")))?;
-            out.set(field, *value);
-        }
-    }
-    Ok(out)
-}
+use crate::dynamics::parameters;
 
 fn settings(tolerance: f64, width_rad_s: Option<f64>, pinned: bool) -> Settings {
     Settings { tolerance, friction: width_rad_s.map_or(Friction::Exact, Friction::Smooth), pinned }
