@@ -6,9 +6,11 @@ import contextlib
 import os
 import signal
 import threading
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import matplotlib.image
 import numpy as np
 import pydpend as dp
 import pytest
@@ -140,11 +142,53 @@ def test_ctrl_c_stops_a_film_without_an_end(tmp_path: Path) -> None:
 def test_setup_finds_two_links_and_info_knows_the_film(film: Path, tmp_path: Path) -> None:
     known = dp.info(film)
     assert (known["width"], known["height"], known["rate_hz"]) == (W, H, 500.0)
-    found, warnings = dp.setup(film, tmp_path / "rig.toml", progress=False)
-    assert len(found.nodes) == 6
-    assert len(found.bodies) == 2
-    assert isinstance(warnings, list)
-    assert Rig.read(tmp_path / "rig.toml") == found
+    found = dp.setup(film, tmp_path / "rig.toml", picture=tmp_path / "rig.png", progress=False)
+    assert len(found.rig.nodes) == 6
+    assert len(found.rig.bodies) == 2
+    assert isinstance(found.warnings, list)
+    assert Rig.read(tmp_path / "rig.toml") == found.rig
+    # What is written is what is returned, in matplotlib's order of colours, and there is colour on a gray ground.
+    assert found.picture.shape == (H, W, 3)
+    assert np.ptp(found.picture.astype(int), axis=2).max() > 50
+    written = matplotlib.image.imread(tmp_path / "rig.png")
+    np.testing.assert_array_equal(np.rint(written[..., :3] * 255), found.picture)
+    with pytest.raises(dp.FilmError, match=r"\.xyz"):
+        dp.setup(film, picture=tmp_path / "rig.xyz", progress=False)
+
+
+def test_an_overlay_has_the_frames_asked_for_at_its_width(film: Path, tmp_path: Path) -> None:
+    nodes = dp.track(film, rig(), progress=False, frames=(20, 120))
+    calls: list[tuple[str, int, int | None]] = []
+    whole = dp.overlay(
+        film, nodes, tmp_path / "whole.mp4", progress=lambda *call: calls.append(call), play_fps=25
+    )
+    assert calls[-1][0] == "drawing"
+    np.testing.assert_array_equal(whole.frame, np.arange(20, 120))
+    np.testing.assert_allclose(whole.t_s, np.arange(20, 120) / 500)
+    known = dp.info(whole.path)
+    assert (known["width"], known["height"], known["rate_hz"]) == (W, H, 25.0)
+    small = dp.overlay(film, nodes, tmp_path / "small.mp4", every=8, width=100, progress=False)
+    np.testing.assert_array_equal(small.frame, np.arange(20, 120, 8))
+    known = dp.info(small.path)
+    assert (known["width"], known["height"], known["declared_frames"]) == (100, 60, 13)
+    with pytest.raises(dp.FilmError, match="it is there already"):
+        dp.overlay(film, nodes, tmp_path / "small.mp4", progress=False)
+    wrong: list[tuple[dict[str, Any], str]] = [
+        ({"every": 0}, "every: it is out of range"),
+        ({"every": -1}, "every: -1 is out of range"),
+        ({"width": 99}, "width: it is out of range. Give an even number"),
+        ({"quality": 52}, "quality"),
+        ({"play_fps": 0}, "play_fps"),
+    ]
+    for keywords, match in wrong:
+        with pytest.raises(dp.ArgumentError, match=match):
+            dp.overlay(film, nodes, tmp_path / "new.mp4", progress=False, **keywords)
+    other = replace(nodes, rig=replace(nodes.rig, image_px=(W, H + 1)))
+    with pytest.raises(dp.TableError, match="200 x 120 px, the table is of 200 x 121 px"):
+        dp.overlay(film, other, tmp_path / "new.mp4", progress=False)
+    later = replace(nodes, frame=nodes.frame + 1000)
+    with pytest.raises(dp.TableError, match="none of the table's frames"):
+        dp.overlay(film, later, tmp_path / "none.mp4", progress=False)
 
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16])

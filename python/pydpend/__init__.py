@@ -44,7 +44,7 @@ from pydpend.nodes import Nodes, Rig, read_nodes
 from pydpend.scoring import Score, score
 from pydpend.simulate import Simulation, simulate, simulate_many
 from pydpend.states import LinkStates, savitzky_golay, states
-from pydpend.tracking import NodeRow, Tracker, detect, info, setup, track
+from pydpend.tracking import NodeRow, OverlayFilm, Setup, Tracker, detect, info, overlay, setup, track
 
 __all__ = [
     "AnglesError",
@@ -66,11 +66,13 @@ __all__ = [
     "ModelError",
     "NodeRow",
     "Nodes",
+    "OverlayFilm",
     "Prediction",
     "PydpendError",
     "Rig",
     "RigError",
     "Score",
+    "Setup",
     "Simulation",
     "SimulationError",
     "SourceError",
@@ -93,6 +95,7 @@ __all__ = [
     "info",
     "lyapunov",
     "modes",
+    "overlay",
     "poincare",
     "published",
     "read_angles",

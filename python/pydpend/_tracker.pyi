@@ -30,6 +30,7 @@ __all__ = [
     "follow_motion",
     "info",
     "learn_noise",
+    "overlay_film",
     "poincare_section",
     "read_meta",
     "read_rig",
@@ -65,9 +66,29 @@ def track(
     """Columns, warnings, and the exception that stopped the run, if one did. `rig` is JSON."""
 
 def setup(
-    input: str, frames: Frames, detect: DetectArguments, open: OpenArguments, progress: Callback
-) -> tuple[str, list[str]]:
-    """The rig as JSON, and warnings."""
+    input: str,
+    frames: Frames,
+    detect: DetectArguments,
+    open: OpenArguments,
+    picture: str | None,
+    progress: Callback,
+) -> tuple[str, list[str], NDArray[np.uint8]]:
+    """The rig as JSON, warnings, and the reference frame with the rig drawn, (H, W, 3), red, green, blue."""
+
+def overlay_film(
+    input: str,
+    held: HeldColumns,
+    meta: str,
+    output: str,
+    open: OpenArguments,
+    every: int,
+    width: int | None,
+    play_fps: int,
+    quality: int,
+    replace: bool,
+    progress: Callback,
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Of each of the film's K pictures the frame, (K,), and its time in the recording in s, (K,). `width` is in px."""
 
 def info(input: str, open: OpenArguments) -> str:
     """What is known of a recording before it is read through, as JSON."""

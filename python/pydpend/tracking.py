@@ -10,7 +10,7 @@ import os
 import sys
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from pydpend import _tracker
 from pydpend.crossing import Found
 from pydpend.errors import ArgumentError, fault
-from pydpend.nodes import Nodes, Rig, nodes_of
+from pydpend.nodes import Nodes, Rig, nodes_of, read_nodes
 
 Path: TypeAlias = str | os.PathLike[str]
 Progress: TypeAlias = Callable[[str, int, int | None], object] | bool | None
@@ -71,6 +71,13 @@ def _threads(threads: int | None) -> int:
             fault("threads", f"{threads} is out of range", "Give 1 or more, or None for one a core")
         )
     return int(threads)
+
+
+def _count(name: str, value: int) -> int:
+    """A number as the compiled half takes it; it knows the limits."""
+    if not isinstance(value, (int, np.integer)) or not 0 <= value < 1 << 31:
+        raise ArgumentError(fault(name, f"{value!r} is out of range", "Give a whole number"))
+    return int(value)
 
 
 def _rig(rig: Rig | Path | None) -> str | None:
@@ -186,10 +193,25 @@ def track(
     return nodes
 
 
+class Setup(NamedTuple):
+    """What `setup` found.
+
+    Attributes:
+        rig: nodes, bodies, joints and the reference frame.
+        warnings: what to know of the rig and the recording, a sentence each.
+        picture: the reference frame with the rig and all other detections drawn, (H, W, 3) uint8, red, green, blue.
+    """
+
+    rig: Rig
+    warnings: list[str]
+    picture: NDArray[np.uint8]
+
+
 def setup(
     path: Path,
     output: Path | None = None,
     *,
+    picture: Path | None = None,
     fps: float | None = None,
     frames: tuple[int, int | None] | range | None = None,
     threads: int | None = None,
@@ -197,27 +219,28 @@ def setup(
     threshold: float | None = None,
     polarity: Polarity = "auto",
     decoder: Decoder = "auto",
-) -> tuple[Rig, list[str]]:
+) -> Setup:
     """Finds markers, bodies and joints of a recording.
 
     Args:
         path: the recording; it is read through.
         output: a rig file to write, to be looked at and edited.
+        picture: an image file to write, for example .png: the reference frame with all that was found.
         fps, frames, threads, progress, threshold, polarity, decoder: as in `track`.
-
-    Returns:
-        The rig, and what to know about it, a sentence each.
 
     Raises:
         SourceError, DetectError, RigError, ArgumentError: as `track`.
+        FilmError: if the picture cannot be written.
+        KeyboardInterrupt: on Ctrl-C, within a second; nothing is written then.
     """
     callback, close = _callback(progress)
     try:
-        text, warnings = _tracker.setup(
+        text, warnings, drawn = _tracker.setup(
             os.fspath(path),
             _frames(frames),
             (threshold, polarity, "weighted"),
             (fps, decoder, False, _threads(threads)),
+            None if picture is None else os.fspath(picture),
             callback,
         )
     finally:
@@ -225,7 +248,83 @@ def setup(
     rig = Rig.from_json(text)
     if output is not None:
         rig.write(output)
-    return rig, warnings
+    return Setup(rig, warnings, drawn)
+
+
+@dataclass(frozen=True, eq=False)
+class OverlayFilm:
+    """A film of K pictures with nodes drawn.
+
+    Attributes:
+        path: the file, H.264.
+        frame: each picture's frame in the recording, (K,).
+        t_s: each picture's time in the recording in s, (K,).
+        play_fps: pictures a second at which it plays: picture k is at ``k / play_fps`` s of the film.
+    """
+
+    path: str
+    frame: NDArray[np.int64]
+    t_s: NDArray[np.float64]
+    play_fps: int
+
+
+def overlay(
+    recording: Path,
+    nodes: Nodes | Path,
+    output: Path,
+    *,
+    every: int = 1,
+    width: int | None = None,
+    play_fps: int = 30,
+    quality: int = 20,
+    force: bool = False,
+    progress: Progress = None,
+    decoder: Decoder = "auto",
+    allow_protocol: bool = False,
+) -> OverlayFilm:
+    """Draws nodes, names, bodies, trails and gaps into their recording.
+
+    Args:
+        recording: the recording that the nodes come from.
+        nodes: its nodes, or a table of them. Frames that they do not have are left out.
+        output: the film, H.264, for example .mp4.
+        every: draw each such frame only, from the first of the nodes; trails go through the frames between.
+        width: of the film in px, even; the height is in proportion. None is the recording's.
+        play_fps: pictures a second at which it plays.
+        quality: x264's rate factor, 0 (best, largest) to 51.
+        force: replace `output` if it is there already.
+        progress, decoder, allow_protocol: as in `track`.
+
+    Returns:
+        The film's file and which frames and times its pictures are of.
+
+    Raises:
+        SourceError: if the recording cannot be read.
+        TableError: if the nodes are not valid or not of this recording.
+        FilmError: if `output` is there already or cannot be written.
+        ArgumentError: if an argument makes no sense.
+        KeyboardInterrupt: on Ctrl-C, within a second; what was drawn is a whole film.
+    """
+    if not isinstance(nodes, Nodes):
+        nodes = read_nodes(nodes)
+    callback, close = _callback(progress)
+    try:
+        frame, t_s = _tracker.overlay_film(
+            os.fspath(recording),
+            nodes._columns(),
+            nodes._meta_json(),
+            os.fspath(output),
+            (None, decoder, allow_protocol, 0),
+            _count("every", every),
+            None if width is None else _count("width", width),
+            _count("play_fps", play_fps),
+            _count("quality", quality),
+            force,
+            callback,
+        )
+    finally:
+        close()
+    return OverlayFilm(os.fspath(output), frame, t_s, play_fps)
 
 
 def info(path: Path, *, fps: float | None = None, decoder: Decoder = "auto") -> dict[str, Any]:

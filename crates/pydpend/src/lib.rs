@@ -30,7 +30,7 @@ mod _tracker {
     #[pymodule_export]
     use super::tables::{arrow_reader, check_table, read_meta, read_rig, read_table, rig_toml, write_table};
     #[pymodule_export]
-    use super::track::{info, setup, track};
+    use super::track::{info, overlay_film, setup, track};
 
     #[pymodule_export]
     const VERSION: &str = env!("CARGO_PKG_VERSION");

@@ -63,7 +63,7 @@ pub fn read_meta(py: Python<'_>, path: PathBuf) -> PyResult<String> {
 }
 
 /// Columns that Python holds.
-type Held<'py> = (
+pub type Held<'py> = (
     PyReadonlyArray1<'py, i64>,
     PyReadonlyArray1<'py, f64>,
     PyReadonlyArray3<'py, f64>,
@@ -96,7 +96,8 @@ fn rows_of(py: Python<'_>, held: &Held<'_>, nodes: usize) -> PyResult<Rows> {
     })
 }
 
-fn table_of(py: Python<'_>, held: &Held<'_>, meta: &str) -> PyResult<NodeTable> {
+/// Columns and metadata as a table; shapes are checked, values are not.
+pub fn table_of(py: Python<'_>, held: &Held<'_>, meta: &str) -> PyResult<NodeTable> {
     let meta = TableMeta::from_json(meta, "nodes.meta").map_err(|e| raise(py, e))?;
     let rows = rows_of(py, held, meta.rig.nodes.len())?;
     Ok(NodeTable { meta, rows })

@@ -1,17 +1,19 @@
-//! Whole recordings: `track`, `setup`, `info`.
+//! Whole recordings: `track`, `setup`, `overlay`, `info`.
 
 use std::path::PathBuf;
 
+use numpy::{IntoPyArray, PyArray1, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use serde_json::json;
 use tracker::error::Error;
+use tracker::overlay::{self, FilmSettings};
 use tracker::pipeline::{self, Existing, RunSettings};
 use tracker::source;
 use tracker::table::SourceFacts;
 
 use crate::errors::{argument, raise};
 use crate::settings::{DetectArguments, OpenArguments, detect_settings, open_options, rig};
-use crate::tables::{Columns, columns, rig_json};
+use crate::tables::{Columns, Held, columns, rig_json, table_of};
 use crate::watch::Watch;
 
 /// Frames from the first up to but not with the last; `None` is to the end.
@@ -71,24 +73,64 @@ pub fn track<'py>(
     }
 }
 
-/// Finds the rig of a recording: its JSON, and warnings.
+/// A rig as JSON, warnings, and the reference frame with the rig drawn, (H, W, 3).
+type Found<'py> = (String, Vec<String>, Bound<'py, PyArray3<u8>>);
+
+/// Finds the rig of a recording; the picture is also written if a file is given.
 #[pyfunction]
-pub fn setup(
-    py: Python<'_>,
+pub fn setup<'py>(
+    py: Python<'py>,
     input: String,
     frames: Frames,
     detect: DetectArguments,
     open: OpenArguments,
+    picture: Option<PathBuf>,
     progress: Option<Py<PyAny>>,
-) -> PyResult<(String, Vec<String>)> {
+) -> PyResult<Found<'py>> {
     let settings = settings(py, input, None, frames, &detect, &open)?;
     let mut watch = Watch::new(progress);
-    let outcome = py.detach(|| pipeline::find_rig(&settings, &mut watch));
-    match (outcome, watch.into_error()) {
-        (Ok(found), None) => Ok((rig_json(&found.rig).map_err(|e| raise(py, e))?, found.warnings)),
-        (Ok(_) | Err(Error::Interrupted), Some(stopped)) => Err(stopped),
-        (Err(error), _) => Err(raise(py, error)),
-    }
+    let outcome = py.detach(|| {
+        let found = tracker::setup::find(&settings, &mut watch)?;
+        if let Some(path) = &picture {
+            overlay::save(&found.picture, path)?;
+        }
+        Ok((rig_json(&found.rig)?, found.warnings, overlay::rgb(&found.picture)?, found.rig.image_px))
+    });
+    let (rig, warnings, samples, [w, h]) = watch.done(py, outcome)?;
+    let picture = samples.into_pyarray(py).reshape([h as usize, w as usize, 3])?;
+    Ok((rig, warnings, picture))
+}
+
+/// Frames and times in s, (K,).
+type Filmed<'py> = (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<f64>>);
+
+/// Draws nodes into their recording: of each picture of the film the frame and the time in s, (K,).
+#[pyfunction]
+#[expect(clippy::too_many_arguments, reason = "the options of one call of Python's")]
+pub fn overlay_film<'py>(
+    py: Python<'py>,
+    input: String,
+    held: Held<'_>,
+    meta: &str,
+    output: PathBuf,
+    open: OpenArguments,
+    every: usize,
+    width: Option<u32>,
+    play_fps: u32,
+    quality: u32,
+    replace: bool,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Filmed<'py>> {
+    let table = table_of(py, &held, meta)?;
+    let open = open_options(py, &open)?;
+    let settings = FilmSettings { play_fps, quality, every, width, replace };
+    let mut watch = Watch::new(progress);
+    let outcome = py.detach(|| {
+        table.check("nodes")?;
+        overlay::film(&input, &open, &table, &output, &settings, &mut watch)
+    });
+    let filmed = watch.done(py, outcome)?;
+    Ok((filmed.frame.into_pyarray(py), filmed.time_s.into_pyarray(py)))
 }
 
 /// What is known of a recording before it is read through, as JSON.

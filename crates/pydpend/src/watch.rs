@@ -5,7 +5,10 @@
 use std::time::{Duration, Instant};
 
 use pyo3::prelude::*;
+use tracker::error::Error;
 use tracker::pipeline::{Observer, Stage};
+
+use crate::errors::raise;
 
 /// Between two calls into Python.
 const EVERY: Duration = Duration::from_millis(100);
@@ -32,6 +35,15 @@ impl Watch {
     /// The exception that stopped the run, if one did.
     pub fn into_error(self) -> Option<PyErr> {
         self.stopped.map(|(_, error)| error)
+    }
+
+    /// What came of work that is all or nothing: the exception that stopped it comes before any other.
+    pub fn done<T>(self, py: Python<'_>, outcome: Result<T, Error>) -> PyResult<T> {
+        match (outcome, self.into_error()) {
+            (Ok(value), None) => Ok(value),
+            (Ok(_) | Err(Error::Interrupted), Some(stopped)) => Err(stopped),
+            (Err(error), _) => Err(raise(py, error)),
+        }
     }
 
     /// Calls into Python and remembers the first exception that comes back.

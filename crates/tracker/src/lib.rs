@@ -20,6 +20,7 @@ pub mod pipeline;
 pub mod residual;
 pub mod rig;
 pub mod score;
+pub mod setup;
 pub mod source;
 pub mod store;
 pub mod table;

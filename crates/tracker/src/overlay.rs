@@ -1,26 +1,27 @@
-//! The recording with nodes, names, bodies, trails and gaps drawn into it, as pictures.
+//! The recording with nodes, names, bodies, trails and gaps drawn into it, as pictures and as a film.
 //!
 //! Owns: [`Overlay`], [`still`], [`film`]. Must not: track: it draws what a table says.
 //!
 //! Every stroke has a dark rim, so that it is read on bright and on dark ground.
+
+mod film;
+
+pub use film::{FilmSettings, Filmed, film};
 
 use std::collections::VecDeque;
 use std::path::Path;
 use std::sync::Arc;
 
 use nalgebra::{Isometry2, Vector2};
-use opencv::core::{Mat, Point, Scalar, Vector};
+use opencv::core::{Mat, Point, Scalar, Size, Vector};
 use opencv::prelude::*;
 use opencv::{imgcodecs, imgproc};
 
 use crate::detect::{DetectSettings, Detection, Detector, Levels};
 use crate::error::{Error, Fault, Place, Result};
-use crate::film::encode::{Codec, VideoSettings, VideoWriter};
-use crate::frame::{Frame, PixelFormat, TimeBase};
-use crate::pipeline::{Observer, Stage};
+use crate::frame::{Frame, PixelFormat};
 use crate::rig::Rig;
 use crate::source::{self, OpenOptions};
-use crate::table::NodeTable;
 use crate::track::mechanism::{Holder, Mechanism};
 use crate::track::predict::{Motion, Unrest, hung_at};
 use crate::track::rigid::{Pair, fit_pose, place};
@@ -50,18 +51,36 @@ pub struct Overlay {
     mechanism: Mechanism,
     motions: Vec<Motion>,
     trails: Vec<VecDeque<Vector2<f64>>>,
+    /// Width and height of the pictures, px.
+    size: [i32; 2],
+    /// Pixels of the picture for one of the recording.
+    zoom: f64,
+    /// Size of marks in the picture: 1 in one of 1280 px.
+    mark: f64,
+    /// The same in pixels of the recording.
     scale: f64,
 }
 
 impl Overlay {
-    /// For a checked rig.
+    /// For a checked rig; pictures of the recording's size.
     pub fn new(rig: &Rig) -> Self {
+        Self::of_width(rig, rig.image_px[0])
+    }
+
+    /// For a checked rig; pictures of so many pixels' width, and in proportion.
+    pub fn of_width(rig: &Rig, width: u32) -> Self {
         let mechanism = Mechanism::new(rig, 0.3);
+        let [w, h] = rig.image_px.map(f64::from);
+        let zoom = f64::from(width) / w;
+        // Marks as large in a picture of 4000 px as in one of 1280 px.
+        let mark = (w.max(h) * zoom / 1280.0).clamp(0.4, 4.0);
         Self {
             motions: vec![Motion::default(); mechanism.links.len()],
             trails: vec![VecDeque::new(); rig.nodes.len()],
-            // Marks as large in a picture of 4000 px as in one of 1280 px.
-            scale: (f64::from(rig.image_px[0].max(rig.image_px[1])) / 1280.0).clamp(0.4, 4.0),
+            size: [width as i32, ((h * zoom).round() as i32).max(1)],
+            zoom,
+            mark,
+            scale: mark / zoom,
             rig: rig.clone(),
             mechanism,
         }
@@ -106,14 +125,8 @@ impl Overlay {
         out
     }
 
-    /// One frame with everything drawn: 8-bit blue, green, red. `row` is in the order of the rig's nodes.
-    ///
-    /// # Errors
-    /// [`Error::Film`] if the frame is not of the rig's size or drawing fails.
-    pub fn draw(&mut self, frame: &Frame, time_s: Option<f64>, row: &[Observation]) -> Result<Mat> {
-        let mut picture = colour(frame)?;
-        let poses = self.poses(frame.index as f64, row);
-        let bodies = self.rig.node_bodies();
+    /// Takes a frame's places over without a picture of it: motion and trails go on. Poses of the bodies.
+    pub fn follow(&mut self, frame: u64, row: &[Observation]) -> Vec<Option<Isometry2<f64>>> {
         for (trail, o) in self.trails.iter_mut().zip(row) {
             if o.x_px.is_finite() {
                 trail.push_back(Vector2::new(o.x_px, o.y_px));
@@ -122,6 +135,17 @@ impl Overlay {
                 trail.pop_front();
             }
         }
+        self.poses(frame as f64, row)
+    }
+
+    /// One frame with everything drawn: 8-bit blue, green, red. `row` is in the order of the rig's nodes.
+    ///
+    /// # Errors
+    /// [`Error::Film`] if the frame is not of the rig's size or drawing fails.
+    pub fn draw(&mut self, frame: &Frame, time_s: Option<f64>, row: &[Observation]) -> Result<Mat> {
+        let poses = self.follow(frame.index, row);
+        let mut picture = colour(frame, self.size)?;
+        let bodies = self.rig.node_bodies();
         let s = self.scale;
         for (k, trail) in self.trails.iter().enumerate() {
             let points: Vec<Vector2<f64>> = trail.iter().copied().collect();
@@ -196,8 +220,8 @@ impl Overlay {
         body: usize,
         thick: f64,
     ) -> Result<()> {
-        let (Some(a), Some(b)) = (fine(a), fine(b)) else { return Ok(()) };
-        let w = (thick * self.scale).round().max(1.0) as i32;
+        let (Some(a), Some(b)) = (self.fine(a), self.fine(b)) else { return Ok(()) };
+        let w = (thick * self.mark).round().max(1.0) as i32;
         for (colour, width) in [([20.0; 3], w + 2), (colour_of(body), w)] {
             imgproc::line(picture, a, b, scalar(colour), width, imgproc::LINE_AA, SHIFT).map_err(failed)?;
         }
@@ -212,9 +236,9 @@ impl Overlay {
         colour: [f64; 3],
         thick: f64,
     ) -> Result<()> {
-        let Some(at) = fine(at) else { return Ok(()) };
-        let r = (radius * f64::from(1 << SHIFT)).round() as i32;
-        let w = (thick * self.scale).round().max(1.0) as i32;
+        let Some(at) = self.fine(at) else { return Ok(()) };
+        let r = (radius * self.zoom * f64::from(1 << SHIFT)).round() as i32;
+        let w = (thick * self.mark).round().max(1.0) as i32;
         for (colour, width) in [([20.0; 3], w + 2), (colour, w)] {
             imgproc::circle(picture, at, r, scalar(colour), width, imgproc::LINE_AA, SHIFT)
                 .map_err(failed)?;
@@ -223,18 +247,24 @@ impl Overlay {
     }
 
     fn write(&self, picture: &mut Mat, text: &str, at: Vector2<f64>, colour: [f64; 3]) -> Result<()> {
-        if fine(at).is_none() {
-            return Ok(());
-        }
-        let at = Point::new(at.x.round() as i32, at.y.round() as i32);
-        let size = 0.5 * self.scale;
-        let w = self.scale.round().max(1.0) as i32;
+        let Some(at) = self.fine(at) else { return Ok(()) };
+        let at = Point::new(at.x >> SHIFT, at.y >> SHIFT);
+        // Smaller letters cannot be read.
+        let size = (0.5 * self.mark).max(0.35);
+        let w = self.mark.round().max(1.0) as i32;
         for (colour, width) in [([20.0; 3], w + 2), (colour, w)] {
             let font = imgproc::FONT_HERSHEY_SIMPLEX;
             imgproc::put_text(picture, text, at, font, size, scalar(colour), width, imgproc::LINE_AA, false)
                 .map_err(failed)?;
         }
         Ok(())
+    }
+
+    /// A place of the recording in OpenCV's fixed-point pixels of the picture; `None` far outside it.
+    fn fine(&self, p: Vector2<f64>) -> Option<Point> {
+        let k = f64::from(1 << SHIFT);
+        let [x, y] = [p.x, p.y].map(|v| (v + 0.5) * self.zoom - 0.5);
+        (x.abs() < 1e5 && y.abs() < 1e5).then(|| Point::new((x * k).round() as i32, (y * k).round() as i32))
     }
 }
 
@@ -246,23 +276,23 @@ fn scalar(c: [f64; 3]) -> Scalar {
     Scalar::new(c[0], c[1], c[2], 255.0)
 }
 
-/// A place in OpenCV's fixed-point pixels; `None` far outside any picture.
-fn fine(p: Vector2<f64>) -> Option<Point> {
-    let k = f64::from(1 << SHIFT);
-    (p.x.abs() < 1e5 && p.y.abs() < 1e5)
-        .then(|| Point::new((p.x * k).round() as i32, (p.y * k).round() as i32))
-}
-
-/// The frame's brightness as an 8-bit picture of three channels; black where it could not be decoded. Deep
+/// The frame's brightness as an 8-bit picture of three channels, `size` px; black where it could not be decoded. Deep
 /// recordings are shown by their upper 8 bits.
-fn colour(frame: &Frame) -> Result<Mat> {
+fn colour(frame: &Frame, size: [i32; 2]) -> Result<Mat> {
     let (w, h) = (frame.width as usize, frame.height as usize);
     let gray = gray8(frame)?;
     let mat = Mat::from_slice(&gray).map_err(failed)?;
     let mat = mat.reshape(1, h as i32).map_err(failed)?;
     debug_assert_eq!(mat.cols() as usize, w);
     let mut out = Mat::default();
-    imgproc::cvt_color_def(&mat, &mut out, imgproc::COLOR_GRAY2BGR).map_err(failed)?;
+    if size == [mat.cols(), mat.rows()] {
+        imgproc::cvt_color_def(&mat, &mut out, imgproc::COLOR_GRAY2BGR).map_err(failed)?;
+        return Ok(out);
+    }
+    let how = if size[0] < mat.cols() { imgproc::INTER_AREA } else { imgproc::INTER_LINEAR };
+    let mut scaled = Mat::default();
+    imgproc::resize(&mat, &mut scaled, Size::new(size[0], size[1]), 0.0, 0.0, how).map_err(failed)?;
+    imgproc::cvt_color_def(&scaled, &mut out, imgproc::COLOR_GRAY2BGR).map_err(failed)?;
     Ok(out)
 }
 
@@ -311,6 +341,16 @@ fn gray8(frame: &Frame) -> Result<Vec<u8>> {
     Ok(out)
 }
 
+/// Samples red, green, blue, pixel by pixel and row by row.
+///
+/// # Errors
+/// [`Error::Film`] if OpenCV fails.
+pub fn rgb(picture: &Mat) -> Result<Vec<u8>> {
+    let mut out = Mat::default();
+    imgproc::cvt_color_def(picture, &mut out, imgproc::COLOR_BGR2RGB).map_err(failed)?;
+    Ok(out.data_bytes().map_err(failed)?.to_vec())
+}
+
 /// Writes a picture; its kind is known by the ending of `path`.
 ///
 /// # Errors
@@ -351,106 +391,6 @@ pub fn still(frame: &Frame, rig: &Rig, detections: &[Detection]) -> Result<Mat> 
         }
     }
     Ok(picture)
-}
-
-/// The picture as planes of brightness and half-size colour (I420, full range), for an encoder. The last row and
-/// column are left out where there is no even number of them.
-///
-/// # Errors
-/// [`Error::Film`] if OpenCV fails.
-pub fn planes(picture: &Mat) -> Result<Vec<u8>> {
-    let (w, h) = (picture.cols() & !1, picture.rows() & !1);
-    let even = picture.roi(opencv::core::Rect::new(0, 0, w, h)).map_err(failed)?.clone_pointee();
-    let mut out = Mat::default();
-    imgproc::cvt_color_def(&even, &mut out, imgproc::COLOR_BGR2YUV_I420).map_err(failed)?;
-    let mut planes = out.data_bytes().map_err(failed)?.to_vec();
-    // OpenCV gives television levels (16 to 235, colour 16 to 240); the film says full range.
-    let (luma, chroma) = planes.split_at_mut((w * h) as usize);
-    let stretch = |v: f64| v.round().clamp(0.0, 255.0) as u8;
-    let of_luma: Vec<u8> = (0..256).map(|v| stretch((f64::from(v) - 16.0) * 255.0 / 219.0)).collect();
-    let of_chroma: Vec<u8> =
-        (0..256).map(|v| stretch((f64::from(v) - 128.0) * 255.0 / 224.0 + 128.0)).collect();
-    luma.iter_mut().for_each(|v| *v = of_luma[usize::from(*v)]);
-    chroma.iter_mut().for_each(|v| *v = of_chroma[usize::from(*v)]);
-    Ok(planes)
-}
-
-/// How the film with the drawings is written.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct FilmSettings {
-    /// Frames a second at which it plays.
-    pub play_fps: u32,
-    /// x264's constant rate factor.
-    pub quality: u32,
-}
-
-impl Default for FilmSettings {
-    fn default() -> Self {
-        Self { play_fps: 30, quality: 20 }
-    }
-}
-
-/// Writes the recording with its table drawn into it. Frames that the table does not have are left out.
-///
-/// # Errors
-/// [`Error::Source`] if the recording cannot be read, [`Error::Table`] if it is not the table's,
-/// [`Error::Film`] if the film cannot be written, [`Error::Interrupted`] if the observer asks to stop.
-pub fn film(
-    input: &str,
-    open: &OpenOptions,
-    table: &NodeTable,
-    output: &Path,
-    settings: &FilmSettings,
-    observer: &mut dyn Observer,
-) -> Result<()> {
-    let rig = &table.meta.rig;
-    let n = rig.nodes.len();
-    let mut source = source::open(input, open)?;
-    let [w, h] = rig.image_px;
-    let info = source.info();
-    if [info.width, info.height] != [w, h] {
-        return Err(Error::Table(
-            Fault::new(input, format!("{} x {} px, the table is of {w} x {h} px", info.width, info.height))
-                .advice("Give the recording that the table was made from"),
-        ));
-    }
-    let mut writer = VideoWriter::create(
-        output,
-        &VideoSettings {
-            width: w & !1,
-            height: h & !1,
-            depth_bits: 8,
-            time_base: TimeBase { numerator: 1, denominator: u64::from(settings.play_fps.max(1)) },
-            codec: Codec::H264,
-            quality: Some(settings.quality),
-            speed: Some("veryfast".into()),
-            gray_only: false,
-        },
-    )?;
-    observer.stage(Stage::Track, Some(table.frames() as u64));
-    let mut overlay = Overlay::new(rig);
-    let mut t = 0;
-    while let Some(frame) = source.next_frame()? {
-        while t < table.frames() && (table.rows.frame[t] as u64) < frame.index {
-            t += 1;
-        }
-        if t == table.frames() {
-            break;
-        }
-        if table.rows.frame[t] as u64 != frame.index {
-            continue;
-        }
-        let row: Vec<Observation> =
-            (0..n).map(|k| table.rows.observation(t, k, n).unwrap_or(Observation::MISSING)).collect();
-        let picture = overlay.draw(&frame, Some(table.rows.time_s[t]), &row)?;
-        writer.write_i420(&planes(&picture)?)?;
-        observer.progress(t as u64);
-        if observer.interrupted() {
-            writer.finish()?;
-            return Err(Error::Interrupted);
-        }
-    }
-    writer.finish()
 }
 
 /// A frame of a recording and what is detected in it.
@@ -520,6 +460,26 @@ mod tests {
                 }
             }
             assert!(far > 90, "ground {ground}: at most {far} from it");
+        }
+    }
+
+    #[test]
+    fn marks_stand_at_their_places_in_a_scaled_picture() {
+        for width in [64_u32, 128, 256] {
+            let mut row = vec![Observation::MISSING; 2];
+            row[1] = Observation { x_px: 90.0, y_px: 70.0, status: Status::Seen, ..row[1] };
+            let picture = Overlay::of_width(&rig(), width).draw(&frame(128), None, &row).unwrap();
+            assert_eq!((picture.cols(), picture.rows()), (width as i32, width as i32 * 96 / 128));
+            // Above and below the marker there is its ring and nothing else.
+            let zoom = f64::from(width) / 128.0;
+            let (cx, cy) = (90.5 * zoom - 0.5, 70.5 * zoom - 0.5);
+            let drawn = |y: i32| {
+                let p = picture.at_2d::<opencv::core::Vec3b>(y, cx.round() as i32).unwrap();
+                p.0.iter().any(|&c| c.abs_diff(128) > 20)
+            };
+            let ys: Vec<i32> = (15..picture.rows()).filter(|&y| drawn(y)).collect();
+            let middle = f64::from(ys[0] + ys[ys.len() - 1]) / 2.0;
+            assert!((middle - cy).abs() <= 1.0, "{width}: {middle} instead of {cy}");
         }
     }
 

@@ -119,28 +119,6 @@ pub fn run(settings: &RunSettings, observer: &mut dyn Observer) -> Result<RunSum
     outcome
 }
 
-/// Finds the rig of a recording, which is read through for it; the output and the rig of `settings` are not used.
-///
-/// # Errors
-/// The error of the part that failed; [`Error::Interrupted`] if the run was stopped.
-pub fn find_rig(settings: &RunSettings, observer: &mut dyn Observer) -> Result<Discovery> {
-    let settings = RunSettings { output: None, rig: None, ..settings.clone() };
-    check(&settings)?;
-    observer.stage(Stage::Open, None);
-    let mut source = source::open(&settings.input, &settings.open)?;
-    let mut run = Run::begin(&settings, source.as_mut(), observer)?;
-    let ending = run.detect(source, observer)?;
-    if ending.is_none() {
-        return Err(Error::Interrupted);
-    }
-    if run.store.is_empty() {
-        return Err(run.no_frames(ending));
-    }
-    let mut found = run.find(observer)?;
-    found.warnings.splice(0..0, run.warnings);
-    Ok(found)
-}
-
 /// What can be refused before anything is read.
 fn check(settings: &RunSettings) -> Result<()> {
     if let Some(frames) = &settings.frames

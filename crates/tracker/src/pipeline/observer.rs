@@ -15,6 +15,8 @@ pub enum Stage {
     Rig,
     /// Following the markers and writing the table.
     Track,
+    /// Drawing the table into the recording.
+    Draw,
 }
 
 impl Stage {
@@ -26,6 +28,7 @@ impl Stage {
             Stage::Detect => "detecting",
             Stage::Rig => "finding the rig",
             Stage::Track => "tracking",
+            Stage::Draw => "drawing",
         }
     }
 }

@@ -5,7 +5,6 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use tracker::error::{Error, Fault};
 use tracker::overlay::{self, FilmSettings};
 use tracker::source::OpenOptions;
 use tracker::table::read_table;
@@ -28,6 +27,12 @@ pub struct Args {
     /// Quality as x264's constant rate factor; smaller is better and larger
     #[arg(long, default_value_t = 20, value_name = "CRF")]
     quality: u32,
+    /// Draw each N-th frame only
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    every: usize,
+    /// Width of the film, even; the recording's if not given
+    #[arg(long, value_name = "PX")]
+    width: Option<u32>,
     /// Replace the film if it is there already
     #[arg(long)]
     force: bool,
@@ -38,16 +43,15 @@ pub struct Args {
 
 /// Runs it.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    if args.output.exists() && !args.force {
-        return Err(Error::Film(
-            Fault::new(args.output.display(), "it is there already")
-                .advice("Choose another name, or replace it with --force"),
-        )
-        .into());
-    }
     let table = read_table(&args.nodes)?;
     let mut watch = Watch::new(args.quiet)?;
-    let settings = FilmSettings { play_fps: args.play_fps, quality: args.quality };
+    let settings = FilmSettings {
+        play_fps: args.play_fps,
+        quality: args.quality,
+        every: args.every,
+        width: args.width,
+        replace: args.force,
+    };
     overlay::film(&args.input, &OpenOptions::default(), &table, &args.output, &settings, &mut watch)?;
     watch.finish();
     Ok(ExitCode::SUCCESS)

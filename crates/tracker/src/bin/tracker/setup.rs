@@ -6,11 +6,10 @@ use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use tracker::discover::advice::advise;
 use tracker::error::{Error, Fault};
-use tracker::overlay;
-use tracker::pipeline::{Existing, RunSettings, run as run_pipeline};
+use tracker::pipeline::RunSettings;
 use tracker::source::OpenOptions;
+use tracker::{overlay, setup};
 
 use crate::watch::Watch;
 
@@ -48,47 +47,25 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             .into());
         }
     }
-    if args.input == "-" {
-        return Err(Error::Argument(
-            Fault::new("input", "standard input cannot be read again for the picture").advice("Give a file"),
-        )
-        .into());
-    }
     let settings = RunSettings {
-        input: args.input.clone(),
-        output: None,
-        existing: Existing::Refuse,
-        collect: true,
+        input: args.input,
         open: OpenOptions { fps: args.fps, ..OpenOptions::default() },
         ..RunSettings::default()
     };
     let mut watch = Watch::new(args.quiet)?;
-    let summary = run_pipeline(&settings, &mut watch)?;
+    let found = setup::find(&settings, &mut watch)?;
     watch.finish();
-    let rig = summary.meta.rig.clone();
-    let mut warnings = summary.warnings.clone();
-    if let Some(table) = &summary.table {
-        warnings.extend(advise(&rig, &table.rows, summary.meta.source.rate_hz));
-    }
-    let index = rig.reference_frame.unwrap_or(0);
-    let (frame, detections) = overlay::frame_at(&args.input, &settings.open, &settings.detect, index)?;
-    let saturated = detections.iter().filter(|d| d.flags.has(tracker::detect::Flags::SATURATED)).count();
-    if saturated > 0 {
-        warnings.push(format!(
-            "{saturated} of {} markers are saturated in the reference frame: their centres are less exact. Less \
-             light or a shorter exposure helps",
-            detections.len()
-        ));
-    }
-    overlay::save(&overlay::still(&frame, &rig, &detections)?, &picture)?;
+    let rig = found.rig;
+    overlay::save(&found.picture, &picture)?;
     std::fs::write(&args.output, rig.to_toml()?).map_err(|e| {
         Error::Rig(Fault::new(args.output.display(), format!("the rig file cannot be written ({e})")))
     })?;
-    for warning in &warnings {
+    for warning in &found.warnings {
         eprintln!("tracker: note: {warning}");
     }
     if !args.quiet {
         let mut out = std::io::stdout();
+        let index = rig.reference_frame.unwrap_or(0);
         writeln!(out, "{}: {} nodes, reference frame {index}", args.output.display(), rig.nodes.len())?;
         for body in &rig.bodies {
             let nodes: Vec<&str> =

@@ -1,0 +1,65 @@
+//! A recording in, its rig out, with an annotated picture and advice.
+//!
+//! Owns: [`find`], [`Setup`]. Must not: find markers, bodies or places itself, or write files.
+
+use opencv::core::Mat;
+
+use crate::detect::Flags;
+use crate::discover::advice::advise;
+use crate::error::{Error, Fault, Result};
+use crate::overlay;
+use crate::pipeline::{self, Existing, Observer, RunSettings};
+use crate::rig::Rig;
+use crate::table::RunEnding;
+
+/// What a recording shows.
+#[derive(Debug)]
+pub struct Setup {
+    /// Nodes, bodies, joints and the reference frame.
+    pub rig: Rig,
+    /// What to know of the rig and the recording, a sentence each.
+    pub warnings: Vec<String>,
+    /// The reference frame with the rig and all other detections drawn, 8-bit blue, green, red.
+    pub picture: Mat,
+}
+
+/// Finds the rig of a recording, which is read through for it and once more up to the reference frame. The output and
+/// the rig of `settings` are not used.
+///
+/// # Errors
+/// The error of the part that failed; [`Error::Interrupted`] if the observer asks to stop.
+pub fn find(settings: &RunSettings, observer: &mut dyn Observer) -> Result<Setup> {
+    if settings.input == "-" {
+        return Err(Error::Argument(
+            Fault::new("input", "standard input cannot be read again for the picture").advice("Give a file"),
+        ));
+    }
+    let settings = RunSettings {
+        output: None,
+        existing: Existing::Refuse,
+        collect: true,
+        rig: None,
+        ..settings.clone()
+    };
+    let summary = pipeline::run(&settings, observer)?;
+    if summary.meta.ending == RunEnding::Interrupted {
+        return Err(Error::Interrupted);
+    }
+    let mut warnings = summary.warnings;
+    let rig = summary.meta.rig;
+    if let Some(table) = &summary.table {
+        warnings.extend(advise(&rig, &table.rows, summary.meta.source.rate_hz));
+    }
+    let index = rig.reference_frame.unwrap_or(0);
+    let (frame, detections) = overlay::frame_at(&settings.input, &settings.open, &settings.detect, index)?;
+    let saturated = detections.iter().filter(|d| d.flags.has(Flags::SATURATED)).count();
+    if saturated > 0 {
+        warnings.push(format!(
+            "{saturated} of {} markers are saturated in the reference frame: their centres are less exact. Less \
+             light or a shorter exposure helps",
+            detections.len()
+        ));
+    }
+    let picture = overlay::still(&frame, &rig, &detections)?;
+    Ok(Setup { rig, warnings, picture })
+}
