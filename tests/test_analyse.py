@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
+import signal
+import subprocess
+import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,33 +18,14 @@ from pydpend.analyse.folder import RunFolder
 from pydpend.angles import read_angles
 from pydpend.cli import main
 from pydpend.errors import PydpendError
+from pydpend.nodes import read_nodes
 from pydpend.report import report_page
 
 DEMO = Path(__file__).parent.parent / "fixtures" / "demo"
 
 
-@pytest.fixture(scope="module")
-def options() -> Options:
-    return Options(
-        inputs=(str(DEMO / "drop.mp4"),),
-        encoder=str(DEMO / "encoder.csv"),
-        calibration=str(DEMO / "calibration"),
-        zero=str(DEMO / "hanging.mp4"),
-        start_s=0.6,
-    )
-
-
-@pytest.fixture(scope="module")
-def run(options: Options, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("run") / "demo"
-    outcome = analyse(options, folder)
-    assert outcome.status == "done", outcome.stages
-    assert set(outcome.stages.values()) == {"done"}
-    return folder
-
-
-def test_angles_are_the_truths(run: Path) -> None:
-    angles = read_angles(run / "drop" / "angles.parquet")
+def test_angles_are_the_truths(demo_run: Path) -> None:
+    angles = read_angles(demo_run / "drop" / "angles.parquet")
     motion = pq.read_table(DEMO / "motion.parquet")
     truth = np.column_stack([motion["phi1_rad"].to_numpy(), motion["phi2_rad"].to_numpy()])
     error = angles.phi_rad - truth
@@ -52,8 +38,8 @@ def test_angles_are_the_truths(run: Path) -> None:
     assert np.isfinite(angles.phi_rad).mean() > 0.95
 
 
-def test_the_encoders_clock_and_gain_are_the_truths(run: Path) -> None:
-    found = json.loads((run / "drop" / "comparison.json").read_text("utf-8"))
+def test_the_encoders_clock_and_gain_are_the_truths(demo_run: Path) -> None:
+    found = json.loads((demo_run / "drop" / "comparison.json").read_text("utf-8"))
     truth = json.loads((DEMO / "truth.json").read_text("utf-8"))["encoder"]
     off = found["clocks"]["offset_s"] + truth["clock_offset_s"]
     assert abs(off) < 4 * found["clocks"]["offset_sigma_s"]
@@ -62,8 +48,8 @@ def test_the_encoders_clock_and_gain_are_the_truths(run: Path) -> None:
     assert found["rms_deg"] == pytest.approx(2.5e-3 / 0.65 * 360, rel=0.05)
 
 
-def test_damping_is_the_truths(run: Path) -> None:
-    fit = json.loads((run / "fit" / "fit.json").read_text("utf-8"))
+def test_damping_is_the_truths(demo_run: Path) -> None:
+    fit = json.loads((demo_run / "fit" / "fit.json").read_text("utf-8"))
     truth = json.loads((DEMO / "truth.json").read_text("utf-8"))["damping"]
     assert fit["status"] == "converged"
     for name, c in fit["coefficients"].items():
@@ -74,24 +60,100 @@ def test_damping_is_the_truths(run: Path) -> None:
 
 
 def test_a_second_run_keeps_everything_and_a_change_only_what_it_does_not_touch(
-    run: Path, options: Options
+    demo_run: Path, demo_options: Options
 ) -> None:
-    assert set(analyse(options, run).stages.values()) == {"kept"}
-    from dataclasses import replace
-
-    changed = analyse(replace(options, laws="paper"), run)
+    assert set(analyse(demo_options, demo_run).stages.values()) == {"kept"}
+    changed = analyse(replace(demo_options, laws="paper"), demo_run)
     assert {k: v for k, v in changed.stages.items() if v != "kept"} == {"fit": "done"}
-    (run / "drop" / "comparison.json").unlink()
-    again = analyse(replace(options, laws="paper"), run)
+    (demo_run / "drop" / "comparison.json").unlink()
+    again = analyse(replace(demo_options, laws="paper"), demo_run)
     assert {k: v for k, v in again.stages.items() if v != "kept"} == {"drop/encoder": "done"}
-    assert analyse(options, run).stages["fit"] == "done"
+    assert analyse(demo_options, demo_run).stages["fit"] == "done"
 
 
-def test_the_page_has_every_part(run: Path) -> None:
-    page = report_page(run)
+def test_another_frame_rate_is_tracked_anew(demo_run: Path, tmp_path: Path) -> None:
+    rig = str(demo_run / "drop" / "zero_rig.toml")
+    film = Options(inputs=(str(DEMO / "hanging.mp4"),), rig=rig, overlay=False)
+    analyse(film, tmp_path / "run")
+    first = read_nodes(tmp_path / "run" / "hanging" / "nodes.parquet")
+    assert analyse(replace(film, fps=250.0), tmp_path / "run").stages["hanging/track"] == "done"
+    second = read_nodes(tmp_path / "run" / "hanging" / "nodes.parquet")
+    assert second.t_s[-1] == pytest.approx(4 * first.t_s[-1])
+
+
+def command(options: Options, folder: Path) -> list[str]:
+    config = folder.with_suffix(".toml")
+    config.write_text(write_config(options), encoding="utf-8")
+    return [
+        str(Path(sys.executable).with_name("pydpend")),
+        "analyse",
+        "--config",
+        str(config),
+        "-o",
+        str(folder),
+    ]
+
+
+def stopped_in(words: list[str], stage: int, how: signal.Signals) -> tuple[int, str]:
+    """Starts the command, sends the signal as soon as it says that it is in the stage; exit status and words."""
+    with subprocess.Popen(words, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True) as process:
+        assert process.stderr is not None
+        said = ""
+        for line in process.stderr:
+            said += line
+            if line.startswith(f"[{stage}/") and line.endswith("...\n"):
+                process.send_signal(how)
+        return process.wait(), said
+
+
+def assert_whole(folder: Path) -> None:
+    """Every file that the record names is there, as long as it says, and can be read."""
+    record = json.loads((folder / "run.json").read_text("utf-8"))
+    for stage in record["stages"].values():
+        for name, size in stage["files"].items():
+            path = folder / name
+            assert path.stat().st_size == size, name
+            if path.suffix == ".parquet":
+                pq.read_table(path)
+            elif path.suffix == ".json":
+                json.loads(path.read_text("utf-8"))
+    known = {name for stage in record["stages"].values() for name in stage["files"]}
+    for path in folder.rglob("*"):
+        name = path.relative_to(folder).as_posix()
+        # Besides what is recorded: what the tracker goes on with, and the stage that was stopped.
+        if path.is_file() and name not in known | {"run.json", "report.html", "README.txt"}:
+            assert name.startswith(("unfinished/", "drop/nodes.parquet")), name
+
+
+def test_stopped_in_every_stage_and_gone_on_with(
+    demo_run: Path, demo_options: Options, tmp_path: Path
+) -> None:
+    folder = tmp_path / "demo"
+    words = command(demo_options, folder)
+    count = len(json.loads((demo_run / "run.json").read_text("utf-8"))["stages"])
+    for stage in range(1, count + 2):
+        # The first does the stage before this one, which was stopped twice; the second keeps that too.
+        for how, status, kept in (
+            (signal.SIGKILL, -signal.SIGKILL, max(0, stage - 2)),
+            (signal.SIGINT, 130, stage - 1),
+        ):
+            code, said = stopped_in(words, stage, how)
+            assert code == status, said
+            assert "Traceback" not in said
+            assert said.count(": kept") == kept, said
+            assert_whole(folder)
+    done = subprocess.run(words, stderr=subprocess.PIPE, text=True, check=True)
+    assert done.stderr.count(": kept") == count
+    for name in ("drop/nodes.parquet", "drop/angles.parquet", "drop/comparison.json", "fit/fit.json"):
+        once, again = (hashlib.sha256((at / name).read_bytes()).hexdigest() for at in (demo_run, folder))
+        assert once == again, name
+
+
+def test_the_page_has_every_part(demo_run: Path) -> None:
+    page = report_page(demo_run)
     ids = {s.id for s in page.sections}
     assert {"answer", "r0-angles", "r0-nodes", "r0-encoder", "damping", "identifiability", "reproduce"} <= ids
-    html = (run / "report.html").read_text("utf-8")
+    html = (demo_run / "report.html").read_text("utf-8")
     assert "http://" not in html.replace("http://www.w3.org", "")
     assert len(html) < 25e6
 
@@ -112,10 +174,10 @@ def test_a_stage_that_cannot_be_done_says_why_and_the_rest_is_there(tmp_path: Pa
     assert any(w.startswith("fit: ") for w in report_page(tmp_path / "run").warnings)
 
 
-def test_config_there_and_back(tmp_path: Path, options: Options) -> None:
+def test_config_there_and_back(tmp_path: Path, demo_options: Options) -> None:
     path = tmp_path / "run.toml"
-    path.write_text(write_config(options), encoding="utf-8")
-    assert read_config(path) == options
+    path.write_text(write_config(demo_options), encoding="utf-8")
+    assert read_config(path) == demo_options
     path.write_text("inputz = []\n", encoding="utf-8")
     with pytest.raises(PydpendError, match="inputz is not an option"):
         read_config(path)

@@ -10,16 +10,11 @@ import numpy as np
 import pyarrow.parquet as pq
 from pydpend.analyse import Options, analyse
 from pydpend.angles import read_angles
+from pydpend.cli.analyse import teller
 
 ROOT = Path(__file__).resolve().parent.parent
 DEMO = ROOT / "fixtures" / "demo"
 OUT = ROOT / "out" / "demo"
-
-
-def tell(number: int, of: int, title: str, what: str) -> None:
-    """Progress on stderr."""
-    if what != "start":
-        print(f"[{number}/{of}] {title}: {what}", file=sys.stderr, flush=True)
 
 
 def rows() -> list[tuple[str, str, str]]:
@@ -80,7 +75,7 @@ def main() -> int:
         # A clamp lets go at 0.2 s, cleaner than a hand does: less of the start need be left out than by itself.
         start_s=0.6,
     )
-    outcome = analyse(options, OUT, tell)
+    outcome = analyse(options, OUT, teller())
     table = rows()
     width = [max(len(r[i]) for r in [*table, ("result", "found", "truth")]) for i in range(3)]
     for r in [("result", "found", "truth"), *table]:

@@ -2,6 +2,7 @@
 
 A stage holds if the hash of what it was made from (inputs, options, the program's version, the stages before it)
 is the same and the files that it wrote are there unchanged in size. ``run.json`` is written whole and renamed.
+A stage writes into `UNFINISHED`; what it made is moved to its place when it is whole.
 """
 
 from __future__ import annotations
@@ -15,7 +16,11 @@ from typing import Any
 
 from pydpend.errors import PydpendError, fault
 
-RUN_SCHEMA = 1
+RUN_SCHEMA = 2
+"""A folder of an older schema is done again, one of a newer is refused."""
+
+UNFINISHED = "unfinished"
+"""Folder in the run folder where a stage writes until it is done."""
 
 
 class RunFolderError(PydpendError):
@@ -27,14 +32,36 @@ def digest(value: Any) -> str:
     return hashlib.sha256(json.dumps(value, sort_keys=True, default=str).encode()).hexdigest()
 
 
-def file_digest(path: Path) -> str:
-    """SHA-256 of a file, or of the names and digests of the files in a folder."""
-    if path.is_dir():
-        return digest(
-            {p.relative_to(path).as_posix(): file_digest(p) for p in sorted(path.rglob("*")) if p.is_file()}
-        )
-    with path.open("rb") as f:
-        return hashlib.file_digest(f, "sha256").hexdigest()
+@dataclass
+class Digests:
+    """SHA-256 of input files. One whose size and time of change are known already is not read again."""
+
+    known: dict[str, list[Any]] = field(default_factory=dict)
+    """Absolute path: size in bytes, time of change in ns, SHA-256."""
+
+    def of(self, path: Path) -> str:
+        """SHA-256 of a file, or of the names and digests of the files in a folder."""
+        if path.is_dir():
+            inside = sorted(p for p in path.rglob("*") if p.is_file())
+            return digest({p.relative_to(path).as_posix(): self.of(p) for p in inside})
+        name, state = str(path.absolute()), path.stat()
+        known = self.known.get(name)
+        if known is None or known[:2] != [state.st_size, state.st_mtime_ns]:
+            with path.open("rb") as f:
+                known = [
+                    state.st_size,
+                    state.st_mtime_ns,
+                    hashlib.file_digest(f, "sha256").hexdigest(),
+                ]
+            self.known[name] = known
+        return str(known[2])
+
+    def option(self, name: str | None) -> str | None:
+        """What stands for an option that may be a file: its digest if it is one, else its words."""
+        if name is None:
+            return None
+        path = Path(name)
+        return self.of(path) if path.exists() else name
 
 
 def write_whole(path: Path, text: str) -> None:
@@ -51,6 +78,8 @@ class RunFolder:
     path: Path
     stages: dict[str, dict[str, Any]] = field(default_factory=dict)
     facts: dict[str, Any] = field(default_factory=dict)
+    begun: dict[str, str] = field(default_factory=dict)
+    """Keys of stages that write in place and were begun: only with the same key can they be gone on with."""
 
     @classmethod
     def open(cls, path: Path) -> RunFolder:
@@ -68,11 +97,13 @@ class RunFolder:
             return cls(path)
         try:
             raw = json.loads(record.read_text("utf-8"))
-            if raw["schema"] != RUN_SCHEMA:
+            if raw["schema"] > RUN_SCHEMA:
                 raise RunFolderError(
                     fault(str(record), f"schema {raw['schema']} is not known", "Use a new folder")
                 )
-            return cls(path, stages=dict(raw["stages"]), facts=dict(raw["facts"]))
+            if raw["schema"] < RUN_SCHEMA:
+                return cls(path)
+            return cls(path, stages=dict(raw["stages"]), facts=dict(raw["facts"]), begun=dict(raw["begun"]))
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise RunFolderError(
                 fault(
@@ -84,7 +115,13 @@ class RunFolder:
 
     def save(self) -> None:
         """Writes ``run.json``."""
-        text = json.dumps({"schema": RUN_SCHEMA, "facts": self.facts, "stages": self.stages}, indent=1)
+        content = {
+            "schema": RUN_SCHEMA,
+            "facts": self.facts,
+            "stages": self.stages,
+            "begun": self.begun,
+        }
+        text = json.dumps(content, indent=1)
         try:
             write_whole(self.path / "run.json", text + "\n")
         except OSError as error:
@@ -100,10 +137,37 @@ class RunFolder:
             for name, size in done["files"].items()
         )
 
-    def done(self, stage: str, key: str, files: list[str], message: str) -> None:
+    def begin(self, stage: str, key: str) -> bool:
+        """Records that a stage writes in place from now on; whether what an earlier run left can be gone on with."""
+        same = self.begun.get(stage) == key
+        self.stages.pop(stage, None)
+        self.begun[stage] = key
+        self.save()
+        return same
+
+    def take(self, stage: str, unfinished: Path, into: Path) -> list[str]:
+        """Moves what a stage made to its place and returns the names. From here on the former result is gone."""
+        former = self.stages.pop(stage, {"files": {}})["files"]
+        self.save()
+        names = []
+        for source in sorted(p for p in unfinished.rglob("*") if p.is_file()):
+            target = into / source.relative_to(unfinished)
+            target.parent.mkdir(parents=True, exist_ok=True)
+            os.replace(source, target)
+            names.append(target.relative_to(self.path).as_posix())
+        for name in set(former) - set(names):
+            (self.path / name).unlink(missing_ok=True)
+        return names
+
+    def done(self, stage: str, key: str, files: list[str], message: str, seconds: float) -> None:
         """Records a stage and saves."""
         sizes = {name: (self.path / name).stat().st_size for name in files}
-        self.stages[stage] = {"key": key, "files": sizes, "message": message}
+        self.stages[stage] = {
+            "key": key,
+            "files": sizes,
+            "message": message,
+            "seconds": round(seconds, 2),
+        }
         self.save()
 
     def forget(self, wanted: set[str]) -> None:

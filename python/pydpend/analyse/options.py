@@ -54,18 +54,27 @@ class Options:
     """Which columns of angles tables are which, e.g. ``time_s=t_s,phi1_rad=theta1_rad,phi2_rad=theta2_rad``."""
     hanging_deg: float = 0.0
     """What angles tables call hanging down."""
+    overlay: bool = True
+    """Draw what was found into the film, for the page. It takes about as long as tracking."""
     threads: int | None = None
     """Threads for tracking; all cores if not given. Changes no result."""
 
     def __post_init__(self) -> None:
         if self.method not in ("trajectory", "energy"):
-            raise OptionsError(fault("method", f"{self.method!r} is not known", "Give trajectory or energy"))
+            raise OptionsError(
+                fault("--method", f"{self.method!r} is not known", "Give trajectory or energy")
+            )
         if self.fps is not None and not self.fps > 0:
-            raise OptionsError(fault("fps", f"{self.fps} is not above 0"))
+            raise OptionsError(fault("--fps", f"{self.fps} is not above 0"))
         if self.threads is not None and self.threads < 1:
-            raise OptionsError(fault("threads", f"{self.threads} is below 1"))
+            raise OptionsError(fault("--threads", f"{self.threads} is below 1"))
         if self.start_s is not None and self.stop_s is not None and not self.start_s < self.stop_s:
-            raise OptionsError(fault("start_s", f"{self.start_s} s is not before stop_s, {self.stop_s} s"))
+            raise OptionsError(fault("--start", f"{self.start_s} s is not before --stop, {self.stop_s} s"))
+
+
+def flag_of(field: str) -> str:
+    """The flag of ``pydpend analyse`` for a field: ``start_s`` is ``--start``."""
+    return "--" + field.removesuffix("_s").removesuffix("_deg").replace("_", "-")
 
 
 def read_config(path: str | Path) -> Options:

@@ -10,7 +10,7 @@ from typing import Any
 import pyarrow.parquet as pq
 from pyarrow import ArrowException
 
-from pydpend.analyse.folder import file_digest
+from pydpend.analyse.folder import UNFINISHED, Digests
 from pydpend.analyse.options import Options
 from pydpend.errors import PydpendError, fault
 
@@ -32,11 +32,11 @@ class Recording:
         return asdict(self)
 
 
-def recordings(options: Options) -> tuple[Recording, ...]:
+def recordings(options: Options, digests: Digests) -> tuple[Recording, ...]:
     """Each input with its kind, found from what is in it."""
     if not options.inputs:
         raise PydpendError(
-            fault("inputs", "there is nothing to analyse", "Name a film, a node table or angles")
+            fault("INPUTS", "there is nothing to analyse", "Name a film, a node table or angles")
         )
     names: set[str] = set()
     out = []
@@ -47,7 +47,7 @@ def recordings(options: Options) -> tuple[Recording, ...]:
         stem = re.sub(r"[^A-Za-z0-9._-]+", "_", path.stem or path.name).strip("._") or "recording"
         name = stem
         count = 1
-        while name in names or name in ("fit", "figures"):
+        while name in names or name in ("fit", UNFINISHED):
             count += 1
             name = f"{stem}_{count}"
         names.add(name)
@@ -57,7 +57,7 @@ def recordings(options: Options) -> tuple[Recording, ...]:
                 label=path.name,
                 path=str(path),
                 kind=kind_of(path),
-                digest=file_digest(path),
+                digest=digests.of(path),
                 encoder=options.encoder if i == 0 else None,
             )
         )

@@ -6,31 +6,41 @@ cannot be read at all end the run.
 
 from __future__ import annotations
 
+import shutil
+import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from pydpend.analyse import stages
-from pydpend.analyse.folder import RunFolder, digest, write_whole
+from pydpend.analyse import provenance, stages
+from pydpend.analyse.folder import UNFINISHED, Digests, RunFolder, digest, write_whole
 from pydpend.analyse.options import Options
 from pydpend.analyse.recordings import Recording, recordings
 from pydpend.errors import PydpendError
 
 Progress = Callable[[int, int, str, str], None]
-"""Called as ``progress(stage number from 1, stages, title, "start" | "kept" | "done" | "not done: why")``."""
+"""Called as ``progress(stage number from 1, stages, title, what)``, ``what`` being ``start``, how far it is
+(``40 %``), ``kept``, ``done`` or ``not done: why``."""
 
 
 @dataclass(frozen=True)
 class Stage:
-    """One step. ``key`` is what it was made from; ``needs`` are stages that must have worked."""
+    """One step. ``key`` is what it is made from; of the stages it ``needs`` one at least must have worked.
+
+    ``action`` writes into the folder it is given, calls what it is given besides with how far it is, and returns a
+    sentence. Its files belong into ``into``, relative to the run folder. With ``in_place``, their names, it writes
+    there at once, because an interrupted one is gone on with; it is told whether it can be.
+    """
 
     name: str
     title: str
     key: str
-    files: tuple[str, ...]
     needs: tuple[str, ...]
-    action: Callable[[], str]
+    into: str
+    action: Callable[[Path, stages.Tell, bool], str]
+    in_place: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -42,6 +52,8 @@ class Outcome:
     message: str
     stages: dict[str, str]
     """For each stage ``done``, ``kept`` or ``not done: why``."""
+    seconds: dict[str, float]
+    """How long each stage took when it was done, the report included."""
 
     def to_json(self) -> dict[str, Any]:
         """As plain values."""
@@ -50,102 +62,109 @@ class Outcome:
             "status": self.status,
             "message": self.message,
             "stages": self.stages,
+            "seconds": self.seconds,
             "report": str(self.folder / "report.html"),
         }
 
 
-def plan(options: Options, folder: Path) -> list[Stage]:
+def plan(options: Options, folder: Path, digests: Digests | None = None) -> list[Stage]:
     """The stages that these options ask for, in order. Reads the inputs' bytes to know them again, no more."""
-    found = recordings(options)
+    known = Digests() if digests is None else digests
+    found = recordings(options, known)
     out: list[Stage] = []
-    version = stages.version()
 
     def add(
         name: str,
         title: str,
-        files: tuple[str, ...],
         needs: tuple[str, ...],
+        into: str,
         parts: Any,
-        action: Callable[[], str],
+        action: Callable[[Path, stages.Tell, bool], str],
+        in_place: tuple[str, ...] = (),
     ) -> None:
         before = {s.name: s.key for s in out if s.name in needs}
-        out.append(Stage(name, title, digest([name, version, parts, before]), files, needs, action))
+        key = digest([name, stages.version(), parts, before])
+        out.append(Stage(name, title, key, needs, into, action, in_place))
 
     for r in found:
-        _plan_recording(r, options, folder, add)
+        _plan_recording(r, options, folder / r.name, known, add)
     ready = tuple(f"{r.name}/angles" for r in found)
+    decay = [
+        options.model,
+        known.option(options.model),
+        options.laws,
+        options.start_s,
+        options.stop_s,
+        options.angle_maps,
+    ]
     add(
         "fit",
         "Damping fit",
-        ("fit/fit.json",),
         ready,
-        [
-            options.model,
-            stages.file_key(options.model),
-            options.method,
-            options.laws,
-            options.start_s,
-            options.stop_s,
-            options.angle_maps,
-        ],
-        lambda: stages.fit(found, options, folder),
+        "fit",
+        [*decay, options.method],
+        lambda into, tell, resume: stages.fit(found, options, folder, into, tell),
     )
     if len(found) > 1:
         add(
             "prediction",
             "Prediction of each recording from the others",
-            ("prediction.json",),
             ready,
-            [
-                options.model,
-                stages.file_key(options.model),
-                options.laws,
-                options.start_s,
-                options.stop_s,
-                options.angle_maps,
-            ],
-            lambda: stages.prediction(found, options, folder),
+            "",
+            decay,
+            lambda into, tell, resume: stages.prediction(found, options, folder, into, tell),
         )
     return out
 
 
-def _plan_recording(r: Recording, options: Options, folder: Path, add: Callable[..., None]) -> None:
-    here = folder / r.name
+def _plan_recording(
+    r: Recording, options: Options, here: Path, known: Digests, add: Callable[..., None]
+) -> None:
     needs: tuple[str, ...] = ()
     if r.kind == "film":
         add(
             f"{r.name}/track",
             f"Tracking {r.label}",
-            (f"{r.name}/nodes.parquet",),
             (),
-            [r.digest, stages.file_key(options.rig), options.fps],
-            lambda: stages.track(r, options, here),
+            r.name,
+            [r.digest, known.option(options.rig), options.fps],
+            lambda into, tell, resume: stages.track(r, options, into, tell, resume),
+            ("nodes.parquet",),
         )
         needs = (f"{r.name}/track",)
+    if r.kind != "angles":
+        add(
+            f"{r.name}/markers",
+            f"Markers of {r.label} against their rigid bodies",
+            needs,
+            r.name,
+            [r.digest],
+            lambda into, tell, resume: stages.markers(r, here, into),
+        )
     add(
         f"{r.name}/angles",
         f"Angles of {r.label}",
-        (f"{r.name}/angles.parquet", f"{r.name}/angles.json"),
         needs,
+        r.name,
         [
             r.digest,
             options.columns,
             options.hanging_deg,
             options.estimator,
             options.zero,
-            stages.file_key(options.zero),
+            known.option(options.zero),
             options.link_length_m,
         ],
-        lambda: stages.angles(r, options, here),
+        lambda into, tell, resume: stages.angles(r, options, here, into),
     )
     if r.encoder is not None:
         add(
             f"{r.name}/encoder",
             f"Encoder beside {r.label}",
-            (f"{r.name}/comparison.json", f"{r.name}/comparison.parquet"),
             (f"{r.name}/angles",),
-            [stages.file_key(options.encoder), stages.file_key(options.calibration), options.encoder_column],
-            lambda: stages.encoder(r, options, here),
+            r.name,
+            [known.option(options.encoder), known.option(options.calibration), options.encoder_column],
+            lambda into, tell, resume: stages.encoder(r, options, here, into),
         )
 
 
@@ -156,53 +175,77 @@ def analyse(options: Options, folder: str | Path, progress: Progress | None = No
     interrupted run (`KeyboardInterrupt` passes through) keeps what it finished; the same call goes on from there.
     """
     path = Path(folder)
-    todo = plan(options, path)
-    run = RunFolder.open(path)
+    run = RunFolder.open(path) if (path / "run.json").exists() else None
+    digests = Digests({} if run is None else dict(run.facts.get("digests", {})))
+    todo = plan(options, path, digests)
+    if run is None:
+        run = RunFolder.open(path)
     run.forget({s.name for s in todo})
     run.facts = {
         "version": stages.version(),
+        "versions": provenance.versions(),
         "options": asdict(options),
-        "recordings": [r.facts() for r in recordings(options)],
-        "command": stages.command(options, path),
+        "recordings": [r.facts() for r in recordings(options, digests)],
+        "inputs": provenance.inputs(options, digests),
+        "command": provenance.command(options, path),
+        "digests": digests.known,
     }
     run.save()
     said: dict[str, str] = {}
+    of = len(todo) + 1
     tell = progress or (lambda number, of, title, what: None)
     for number, stage in enumerate(todo, 1):
-        failed = [n for n in stage.needs if said.get(n, "").startswith("not done")]
+        failed = [n for n in stage.needs if said[n].startswith("not done")]
         if failed and len(failed) == len(stage.needs):
             said[stage.name] = f"not done: it needs {' and '.join(failed)}"
             run.stages.pop(stage.name, None)
-            tell(number, len(todo) + 1, stage.title, said[stage.name])
-            continue
-        if run.holds(stage.name, stage.key):
+        elif run.holds(stage.name, stage.key):
             said[stage.name] = "kept"
-            tell(number, len(todo) + 1, stage.title, "kept")
-            continue
-        tell(number, len(todo) + 1, stage.title, "start")
-        run.stages.pop(stage.name, None)
-        try:
-            message = stage.action()
-        except PydpendError as error:
-            said[stage.name] = f"not done: {error}"
-            if stage.name.endswith("/track"):
-                raise
         else:
-            run.done(stage.name, stage.key, list(stage.files), message)
-            said[stage.name] = "done"
-        tell(number, len(todo) + 1, stage.title, said[stage.name])
+            tell(number, of, stage.title, "start")
+            said[stage.name] = _do(run, stage, partial(tell, number, of, stage.title))
+        tell(number, of, stage.title, said[stage.name])
     run.facts["not_done"] = {
         n: s.removeprefix("not done: ") for n, s in said.items() if s.startswith("not done")
     }
     run.save()
-    tell(len(todo) + 1, len(todo) + 1, "Report", "start")
+    tell(of, of, "Report", "start")
+    begun = time.monotonic()
     stages.report(path)
-    write_whole(path / "README.txt", stages.readme(run))
-    tell(len(todo) + 1, len(todo) + 1, "Report", "done")
+    write_whole(path / "README.txt", provenance.readme(run))
+    seconds = {name: float(done["seconds"]) for name, done in run.stages.items()}
+    seconds["report"] = round(time.monotonic() - begun, 2)
+    tell(of, of, "Report", "done")
     missing = [s for s in said.values() if s.startswith("not done")]
     return Outcome(
         path,
         "partly" if missing else "done",
         f"{len(missing)} of {len(said)} stages could not be done" if missing else "every stage is done",
         said,
+        seconds,
     )
+
+
+def _do(run: RunFolder, stage: Stage, tell: stages.Tell) -> str:
+    """Does one stage and records it. A film that cannot be tracked ends the run."""
+    target = run.path / stage.into
+    work = target if stage.in_place else run.path / UNFINISHED
+    shutil.rmtree(run.path / UNFINISHED, ignore_errors=True)
+    work.mkdir(parents=True, exist_ok=True)
+    resume = run.begin(stage.name, stage.key) if stage.in_place else False
+    begun = time.monotonic()
+    try:
+        message = stage.action(work, tell, resume)
+    except PydpendError as error:
+        run.stages.pop(stage.name, None)
+        if stage.name.endswith("/track"):
+            run.save()
+            raise
+        return f"not done: {error}"
+    if stage.in_place:
+        files = [(target / name).relative_to(run.path).as_posix() for name in stage.in_place]
+    else:
+        files = run.take(stage.name, work, target)
+        shutil.rmtree(work, ignore_errors=True)
+    run.done(stage.name, stage.key, files, message, time.monotonic() - begun)
+    return "done"

@@ -1,18 +1,18 @@
-"""What each stage of a run does: calls the public functions and writes what they give into the run folder.
+"""What each stage of a run does: calls the public functions and writes what they give into a folder.
 
-Nothing is computed here. Every function returns one sentence for ``run.json``.
+Nothing is computed here. ``here`` is the recording's folder with what earlier stages made, ``into`` the folder to
+write to. Every function returns one sentence for ``run.json``.
 """
 
 from __future__ import annotations
 
 import json
 import math
-import shlex
-from dataclasses import fields
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pydpend.analyse.folder import RunFolder, file_digest, write_whole
+from pydpend.analyse.folder import write_whole
 from pydpend.analyse.options import Options
 from pydpend.errors import PydpendError, fault
 
@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     from pydpend.model import Model
     from pydpend.nodes import Nodes
 
+Tell = Callable[[str], None]
+"""Called with how far a stage is, in words."""
+
 
 def version() -> str:
     """The program's version."""
@@ -30,49 +33,66 @@ def version() -> str:
     return _tracker.VERSION
 
 
-def file_key(name: str | None) -> str | None:
-    """What stands for an option that may be a file: its bytes if it is one, else its words."""
-    if name is None:
-        return None
-    path = Path(name)
-    return file_digest(path) if path.exists() else name
-
-
-def command(options: Options, folder: Path) -> str:
-    """The command line that does this run again."""
-    words = ["pydpend", "analyse", *options.inputs, "-o", str(folder)]
-    default = Options()
-    for f in fields(Options):
-        value = getattr(options, f.name)
-        if f.name == "inputs" or value == getattr(default, f.name):
-            continue
-        flag = "--" + f.name.removesuffix("_s").removesuffix("_deg").replace("_", "-")
-        if isinstance(value, bool):
-            words.append(flag if value else flag.replace("--", "--no-", 1))
-        else:
-            words += [flag, str(value)]
-    return shlex.join(words)
-
-
 def _write_json(path: Path, value: Any) -> None:
     write_whole(path, json.dumps(value, indent=1, allow_nan=False) + "\n")
 
 
-def track(r: Recording, options: Options, here: Path) -> str:
-    """Film to ``nodes.parquet``. An interrupted one is gone on with."""
+def _share(tell: Tell) -> Callable[[str, int, int | None], None]:
+    """The tracker's progress in words."""
+
+    def progress(stage: str, done: int, total: int | None) -> None:
+        tell(f"{stage} {100 * done / total:.0f} %" if total else f"{stage}, {done} frames")
+
+    return progress
+
+
+def track(r: Recording, options: Options, into: Path, tell: Tell, resume: bool) -> str:
+    """Film to ``nodes.parquet``; ``resume``: go on with what an interrupted run of the same left."""
     from pydpend.tracking import track as track_film
 
-    here.mkdir(parents=True, exist_ok=True)
     nodes = track_film(
         r.path,
         options.rig,
         fps=options.fps,
         threads=options.threads,
-        output=here / "nodes.parquet",
-        resume=True,
+        output=into / "nodes.parquet",
+        resume=resume,
         force=True,
+        progress=_share(tell),
     )
     return f"{nodes.frame.size} frames, {len(nodes.rig.nodes)} nodes"
+
+
+def markers(r: Recording, here: Path, into: Path) -> str:
+    """How well each node was seen and how well it fits its body: ``residuals.parquet``, ``markers.json``."""
+    import numpy as np
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    from pydpend.angles import misfits
+
+    nodes = _nodes(here, r)
+    off = misfits(nodes)
+    # Columns are numbered, because a node may be called anything; their names are in markers.json.
+    columns = {"time_s": nodes.t_s} | {f"node{i}_px": off[:, i] for i in range(off.shape[1])}
+    pq.write_table(pa.table(columns), into / "residuals.parquet")
+    known = np.isfinite(off)
+    rows = [
+        {
+            "node": node.name,
+            "body": node.body,
+            "seen": float(nodes.seen[:, i].mean()),
+            "residual_rms_px": float(np.sqrt(np.mean(off[known[:, i], i] ** 2)))
+            if known[:, i].any()
+            else None,
+            "residual_largest_px": float(off[known[:, i], i].max()) if known[:, i].any() else None,
+        }
+        for i, node in enumerate(nodes.rig.nodes)
+    ]
+    _write_json(into / "markers.json", {"nodes": rows})
+    if not known.any():
+        return "no body shows two nodes at once, so none can be compared with its shape"
+    return f"RMS distance of a marker from its body's shape {math.sqrt(np.nanmean(off**2)):.4f} px"
 
 
 def _nodes(here: Path, r: Recording) -> Nodes:
@@ -81,7 +101,7 @@ def _nodes(here: Path, r: Recording) -> Nodes:
     return read_nodes(here / "nodes.parquet" if r.kind == "film" else r.path)
 
 
-def _hanging(options: Options, here: Path) -> Any:
+def _hanging(options: Options, here: Path, into: Path) -> Any:
     """The ``zero`` of `angles.angles`, tracking a reference film if one is named."""
     from pydpend.analyse.recordings import kind_of
     from pydpend.nodes import read_nodes
@@ -96,25 +116,26 @@ def _hanging(options: Options, here: Path) -> Any:
         from pydpend.tracking import track as track_film
 
         # The same rig, so that the markers have the same names.
-        rig = here / "zero_rig.toml"
+        rig = into / "zero_rig.toml"
         rig.write_text(read_nodes(here / "nodes.parquet").rig.to_toml(), encoding="utf-8")
-        return track_film(path, rig, fps=options.fps, output=here / "zero.parquet", force=True)
+        return track_film(path, rig, fps=options.fps, output=into / "zero.parquet", progress=False)
     try:
         return [math.radians(float(word)) for word in zero.split(",")]
     except ValueError:
         raise PydpendError(
             fault(
-                "zero", f"{zero!r} is no file and no degrees", "Give rest, reference_frame, 180,180 or a film"
+                "--zero",
+                f"{zero!r} is no file and no degrees",
+                "Give rest, reference_frame, 180,180 or a film",
             )
         ) from None
 
 
-def angles(r: Recording, options: Options, here: Path) -> str:
+def angles(r: Recording, options: Options, here: Path, into: Path) -> str:
     """Nodes, or anyone's angles, to ``angles.parquet``."""
     from pydpend.angles import angles as estimate
     from pydpend.angles import read_angles, write_angles
 
-    here.mkdir(parents=True, exist_ok=True)
     if r.kind == "angles":
         columns = None
         if options.columns is not None:
@@ -128,13 +149,13 @@ def angles(r: Recording, options: Options, here: Path) -> str:
         found = estimate(
             _nodes(here, r),
             method,
-            zero=_hanging(options, here),
+            zero=_hanging(options, here, into),
             link_length_m=options.link_length_m,
             gaps="stop",
             name=r.name,
         )
-    write_angles(found, here / "angles.parquet")
-    _write_json(here / "angles.json", _plain(found.meta))
+    write_angles(found, into / "angles.parquet")
+    _write_json(into / "angles.json", _plain(found.meta))
     return f"{found.links} link{'s' if found.links > 1 else ''}, {found.t_s.size} instants"
 
 
@@ -171,7 +192,7 @@ def _model(options: Options) -> Model:
     return Model.from_toml(options.model)
 
 
-def encoder(r: Recording, options: Options, here: Path) -> str:
+def encoder(r: Recording, options: Options, here: Path, into: Path) -> str:
     """Calibrates the encoder and compares the film's phi1 with it."""
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -187,16 +208,16 @@ def encoder(r: Recording, options: Options, here: Path) -> str:
     if options.calibration is not None:
         path = Path(options.calibration)
         line = calibrate(read_holds([path])) if path.is_dir() else read_calibration(path)
-        line.write(here / "encoder.json")
-        write_whole(here / "calibration.svg", inline_svg(calibration_figure(line)))
+        line.write(into / "encoder.json")
+        write_whole(into / "calibration.svg", inline_svg(calibration_figure(line)))
     found = compare(film, encoder_angles(signal, line))
-    write_whole(here / "comparison.json", found.to_json())
-    pq.write_table(pa.table(found.to_columns()), here / "comparison.parquet")
-    save(comparison_figure(found), here / "comparison.png")
+    write_whole(into / "comparison.json", found.to_json())
+    pq.write_table(pa.table(found.to_columns()), into / "comparison.parquet")
+    save(comparison_figure(found), into / "comparison.png")
     return f"RMS difference {math.degrees(found.rms_rad):.4f} deg"
 
 
-def fit(found: tuple[Recording, ...], options: Options, folder: Path) -> str:
+def fit(found: tuple[Recording, ...], options: Options, folder: Path, into: Path, tell: Tell) -> str:
     """Damping of all recordings together, and of each if there are several."""
     import warnings
 
@@ -217,19 +238,25 @@ def fit(found: tuple[Recording, ...], options: Options, folder: Path) -> str:
         "stop_s": options.stop_s,
         "angle_maps": options.angle_maps,
     }
-    fitted = fit_damping(recordings, model, predict=False, **settings)
-    into = folder / "fit"
-    into.mkdir(exist_ok=True)
+    fitted = fit_damping(recordings, model, progress=_steps(tell), **settings)
     trials = None
     if len(recordings) > 1:
-        trials = summary([fit_damping(a, model, **settings) for a in recordings], fitted)
+        each = []
+        for k, one in enumerate(recordings):
+            tell(f"recording {k + 1} alone")
+            each.append(fit_damping(one, model, **settings))
+        trials = summary(each, fitted)
         _write_json(into / "trials.json", trials.to_json())
     write_fit(fitted, into)
     save_figures(fitted, trials, into)
     return fitted.message
 
 
-def prediction(found: tuple[Recording, ...], options: Options, folder: Path) -> str:
+def _steps(tell: Tell) -> Callable[[int, int, float], None]:
+    return lambda step, most, chi2: tell(f"step {step}, chi-square {chi2:.4g}")
+
+
+def prediction(found: tuple[Recording, ...], options: Options, folder: Path, into: Path, tell: Tell) -> str:
     """Each recording predicted from a fit of the others."""
     from pydpend.damping import fit_damping
     from pydpend.damping.stored import StoredFit
@@ -238,6 +265,7 @@ def prediction(found: tuple[Recording, ...], options: Options, folder: Path) -> 
     model = _model(options)
     out = {}
     for i, one in enumerate(recordings):
+        tell(f"{i + 1} of {len(recordings)}")
         others = recordings[:i] + recordings[i + 1 :]
         fitted = fit_damping(
             others,
@@ -249,7 +277,7 @@ def prediction(found: tuple[Recording, ...], options: Options, folder: Path) -> 
         )
         stored = StoredFit.of(fitted)
         out[one.name] = stored.predict(one, start_s=options.start_s, stop_s=options.stop_s).to_json()
-    _write_json(folder / "prediction.json", out)
+    _write_json(into / "prediction.json", out)
     return f"{len(out)} recordings predicted"
 
 
@@ -258,28 +286,3 @@ def report(folder: Path) -> None:
     from pydpend.report import write_report
 
     write_report(folder)
-
-
-def readme(run: RunFolder) -> str:
-    """What lies in the folder, for a person who opens it in ten years."""
-    lines = [
-        f"A run of pydpend {run.facts['version']}.",
-        "",
-        "Made by:",
-        f"  {run.facts['command']}",
-        "",
-        "report.html     the page for people: warnings, results, film, plots",
-        "run.json        inputs with SHA-256, options, and what each stage was made from",
-        "",
-        "Stages:",
-    ]
-    for name, done in run.stages.items():
-        lines.append(f"  {name}: {done['message']}")
-        lines += [f"      {file}" for file in done["files"]]
-    lines += [f"  {name}: not done: {why}" for name, why in run.facts.get("not_done", {}).items()]
-    lines += [
-        "",
-        "Angles are in rad, counter-clockwise positive, zero hanging down; other units are in the names.",
-        "",
-    ]
-    return "\n".join(lines)

@@ -10,6 +10,7 @@ from __future__ import annotations
 from pydpend.angles.estimate import angles, find_linkage
 from pydpend.angles.files import read_angles, write_angles
 from pydpend.angles.linkage import Linkage, Shape
+from pydpend.angles.misfit import misfits
 from pydpend.angles.pairwise import PairAngles, pair_angles
 from pydpend.angles.pose import Pose, fit_pose
 from pydpend.angles.table import LinkAngles
@@ -26,6 +27,7 @@ __all__ = [
     "find_linkage",
     "find_rest",
     "fit_pose",
+    "misfits",
     "pair_angles",
     "read_angles",
     "write_angles",

@@ -12,6 +12,8 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+import time
+from collections.abc import Callable
 from dataclasses import fields, replace
 from pathlib import Path
 
@@ -20,7 +22,7 @@ HELP = "film, nodes or angles in, a run folder with a report out"
 
 def add_arguments(p: argparse.ArgumentParser) -> None:
     """One flag for each field of `Options`, and how to run."""
-    from pydpend.analyse.options import Options, option_docs
+    from pydpend.analyse.options import Options, flag_of, option_docs
 
     docs = option_docs()
     p.add_argument("inputs", nargs="*", metavar="RECORDING|NODES|ANGLES", help=docs["inputs"])
@@ -33,7 +35,7 @@ def add_arguments(p: argparse.ArgumentParser) -> None:
     for f in fields(Options):
         if f.name == "inputs":
             continue
-        flag = "--" + f.name.removesuffix("_s").removesuffix("_deg").replace("_", "-")
+        flag = flag_of(f.name)
         text = docs[f.name].replace("``", "").replace("%", "%%")
         kind = str(f.type)
         if kind == "bool":
@@ -72,15 +74,38 @@ def run(args: argparse.Namespace) -> int:
                 print(f"{states[s.name]:6} {s.title}")
         return 0
 
-    def tell(number: int, of: int, title: str, what: str) -> None:
-        if not args.quiet and what != "start":
-            print(f"[{number}/{of}] {title}: {what}", file=sys.stderr, flush=True)
-        elif not args.quiet and sys.stderr.isatty():
-            print(f"[{number}/{of}] {title} ...", end="\r", file=sys.stderr, flush=True)
-
-    outcome = analyse(options, folder, tell)
+    outcome = analyse(options, folder, None if args.quiet else teller())
     if args.json:
         print(json.dumps(outcome.to_json(), indent=1))
     else:
         print(f"{outcome.message}; report: {outcome.folder / 'report.html'}")
     return 0 if outcome.status == "done" else 1
+
+
+def teller() -> Callable[[int, int, str, str], None]:
+    """Progress on stderr: on a terminal one line that moves, else a line as each stage starts and ends."""
+    moving = sys.stderr.isatty()
+    begun = time.monotonic()
+
+    def tell(number: int, of: int, title: str, what: str) -> None:
+        nonlocal begun
+        head = f"[{number}/{of}] {title}"
+        if what == "start":
+            begun = time.monotonic()
+            print(f"{head} ...", end="\r" if moving else "\n", file=sys.stderr, flush=True)
+        elif what in ("done", "kept") or what.startswith("not done"):
+            wipe = "\x1b[K" if moving else ""
+            took = f" ({time.monotonic() - begun:.1f} s)" if what == "done" else ""
+            print(f"{wipe}{head}: {what}{took}", file=sys.stderr, flush=True)
+        elif moving:
+            print(f"\x1b[K{head}: {what}{_left(what, begun)}", end="\r", file=sys.stderr, flush=True)
+
+    return tell
+
+
+def _left(what: str, begun: float) -> str:
+    """Remaining time, where the words end in a percentage."""
+    number = what.removesuffix(" %").rpartition(" ")[2]
+    if not what.endswith(" %") or not number.isdigit() or int(number) == 0:
+        return ""
+    return f", {(time.monotonic() - begun) * (100 - int(number)) / int(number):.0f} s left"

@@ -165,7 +165,7 @@ def solve(
     if zeros:
         names += tuple(f"zero{j}[{r}]" for r in range(len(tracks)) for j in (1, 2))
     return Solution(
-        {**parameters, **{k: v for k, v in out["parameters"].items() if k in parameters or v != 0.0}},
+        {**parameters, **{k: v for k, v in sorted(out["parameters"].items()) if k in parameters or v != 0.0}},
         out["zeros_rad"],
         replace(segments, states=out["states"]),
         names,

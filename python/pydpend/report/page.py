@@ -129,7 +129,11 @@ class Chart:
 
 @dataclass(frozen=True)
 class StatusMap:
-    """What was known of each node over time. ``runs[n]``: (status code, from s, to s)."""
+    """What was known of each node over time. ``runs[n]``: (status code, from s, to s).
+
+    ``residual_px[n]``: distance of the node from its place in the body's shape at ``t_s``; drawn in the node's row,
+    which is ``full_px`` high.
+    """
 
     id: str
     title: str
@@ -137,6 +141,8 @@ class StatusMap:
     t_s: NDArray[np.float64]
     nodes: tuple[str, ...]
     runs: tuple[tuple[tuple[int, float, float], ...], ...]
+    residual_px: tuple[NDArray[np.float64], ...] = ()
+    full_px: float = 1.0
     height: int = 240
     key: tuple[tuple[str, str], ...] = (
         ("seen", "--s2"),
@@ -170,18 +176,22 @@ class Page:
 
 
 class _Arrays:
-    """Collects arrays as base64 of little-endian float32; the same array is kept once."""
+    """Collects arrays as base64 of little-endian floats, times in double precision; the same array is kept once.
+
+    A name starts with ``d`` (float64) or ``a`` (float32).
+    """
 
     def __init__(self) -> None:
         self.encoded: dict[str, str] = {}
-        self._names: dict[bytes, str] = {}
+        self._names: dict[tuple[str, bytes], str] = {}
 
-    def add(self, values: NDArray[np.float64]) -> str:
-        raw = np.ascontiguousarray(values, dtype="<f4").tobytes()
-        if raw not in self._names:
-            self._names[raw] = f"a{len(self._names)}"
-            self.encoded[self._names[raw]] = base64.b64encode(raw).decode("ascii")
-        return self._names[raw]
+    def add(self, values: NDArray[np.float64], kind: str = "a") -> str:
+        raw = np.ascontiguousarray(values, dtype="<f8" if kind == "d" else "<f4").tobytes()
+        key = (kind, raw)
+        if key not in self._names:
+            self._names[key] = f"{kind}{len(self._names)}"
+            self.encoded[self._names[key]] = base64.b64encode(raw).decode("ascii")
+        return self._names[key]
 
 
 def _chart_data(chart: Chart | StatusMap, arrays: _Arrays) -> dict[str, Any]:
@@ -195,11 +205,14 @@ def _chart_data(chart: Chart | StatusMap, arrays: _Arrays) -> dict[str, Any]:
         edges = np.array([chart.t_s[0], chart.t_s[-1]])
         return data | {
             "kind": "status",
-            "x": arrays.add(edges),
+            "x": arrays.add(edges, "d"),
             "x_label": "time (s)",
             "y_label": "",
             "nodes": list(chart.nodes),
             "runs": chart.runs,
+            "t": arrays.add(chart.t_s, "d"),
+            "residual": [arrays.add(r) for r in chart.residual_px],
+            "full": chart.full_px,
             "series": [{"label": "", "y": arrays.add(np.full(2, np.nan))}],
         }
     series = []
@@ -214,7 +227,7 @@ def _chart_data(chart: Chart | StatusMap, arrays: _Arrays) -> dict[str, Any]:
         series.append(entry)
     return data | {
         "kind": "lines",
-        "x": arrays.add(chart.x),
+        "x": arrays.add(chart.x, "d"),
         "x_label": chart.x_label,
         "y_label": chart.y_label,
         "series": series,
@@ -227,7 +240,7 @@ def render(page: Page) -> str:
     blocks = [b for s in page.sections for b in s.blocks]
     charts = [_chart_data(b, arrays) for b in blocks if isinstance(b, (Chart, StatusMap))]
     films = [
-        {"id": b.id, "group": b.group, "times": arrays.add(b.times_s), "rate_hz": b.rate_hz}
+        {"id": b.id, "group": b.group, "times": arrays.add(b.times_s, "d"), "rate_hz": b.rate_hz}
         for b in blocks
         if isinstance(b, Film)
     ]

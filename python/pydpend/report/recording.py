@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from pydpend.angles import LinkAngles, read_angles
 from pydpend.nodes import Nodes, read_nodes
-from pydpend.report.page import Block, Chart, Figure, Film, Reset, Section, Series, StatusMap, Table
+from pydpend.report.page import Block, Chart, Figure, Film, Reset, Section, Series, StatusMap, Table, Text
 from pydpend.report.words import with_sigma
 
 
@@ -23,6 +23,8 @@ class Part:
 
     label: str
     nodes: Nodes | None = None
+    residual_px: NDArray[np.float64] | None = None
+    """(T, N): distance of each node from its place in its body's shape."""
     angles: LinkAngles | None = None
     meta: dict[str, Any] = field(default_factory=dict)
     film: tuple[bytes, dict[str, Any]] | None = None
@@ -93,12 +95,14 @@ class Part:
         assert self.nodes is not None
         n = self.nodes
         names = tuple(node.name for node in n.rig.nodes)
+        residual = np.full((1, len(names)), np.nan) if self.residual_px is None else self.residual_px
         runs = tuple(_runs(n.t_s, n.status[:, i]) for i in range(len(names)))
         rows = []
         for i, node in enumerate(n.rig.nodes):
             seen = np.isin(n.status[:, i], (1, 2))
             lengths = _gaps(seen)
             sigma = n.sigma_px[seen, i]
+            off = residual[np.isfinite(residual[:, i]), i]
             rows.append(
                 (
                     node.name,
@@ -108,8 +112,18 @@ class Part:
                     str(max(lengths, default=0)),
                     str(int((n.status[:, i] == 3).sum())),
                     f"{np.nanmedian(sigma):.4f}" if sigma.size else "–",
+                    f"{np.sqrt(np.mean(off**2)):.4f}" if off.size else "–",
+                    f"{off.max():.3f}" if off.size else "–",
                 )
             )
+        known = bool(np.isfinite(residual).any())
+        full = float(np.nanpercentile(residual, 99.9)) if known else 1.0
+        told = (
+            f"The black curve in each row is the distance of the marker from its place in its body's shape; the row "
+            f"is {full:.2g} px high, larger ones are cut off."
+            if known
+            else "No body shows two markers at once, so there is no shape to compare them with."
+        )
         return [
             StatusMap(
                 f"{id_}-status",
@@ -118,8 +132,11 @@ class Part:
                 n.t_s,
                 names,
                 runs,
-                height=40 + 22 * len(names),
+                tuple(residual.T) if known else (),
+                full,
+                height=60 + 26 * len(names),
             ),
+            Text(told, quiet=True),
             Table(
                 (
                     "node",
@@ -129,9 +146,11 @@ class Part:
                     "longest gap (frames)",
                     "ambiguous (frames)",
                     "median sigma (px)",
+                    "RMS to shape (px)",
+                    "largest (px)",
                 ),
                 tuple(rows),
-                numbers=frozenset({2, 3, 4, 5, 6}),
+                numbers=frozenset(range(2, 9)),
             ),
         ]
 
@@ -233,6 +252,9 @@ def read(folder: Path, facts: dict[str, Any], stages: set[str]) -> Part:
         ending = nodes.meta.get("ending")
         if isinstance(ending, dict) and ending.get("early"):
             part.warnings.append(f"{part.label}: the recording ended early: {ending['early']}")
+    if f"{name}/markers" in stages and part.nodes is not None:
+        columns = _columns(here / "residuals.parquet")
+        part.residual_px = np.column_stack([columns[f"node{i}_px"] for i in range(len(part.nodes.rig.nodes))])
     if f"{name}/angles" in stages:
         part.angles = read_angles(here / "angles.parquet", name=part.label)
         part.meta = json.loads((here / "angles.json").read_text("utf-8"))

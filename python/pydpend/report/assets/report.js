@@ -6,17 +6,28 @@
   const STATUS = { missing: "--line", seen: "--s2", reacquired: "--s0", ambiguous: "--s1" };
   const STATUS_BY_CODE = ["missing", "seen", "reacquired", "ambiguous"];
 
-  // Arrays are base64 of little-endian float32; NaN is a gap, which uPlot calls null.
+  // Arrays are base64 of little-endian float32, or float64 where the name starts with "d".
   const cache = new Map();
-  function array(key) {
+  function numbers(key) {
     if (!cache.has(key)) {
       const raw = atob(data.arrays[key]);
       const bytes = new Uint8Array(raw.length);
       for (let i = 0; i < raw.length; i++) bytes[i] = raw.charCodeAt(i);
-      cache.set(key, Array.from(new Float32Array(bytes.buffer), (v) => (Number.isNaN(v) ? null : v)));
+      cache.set(key, key[0] === "d" ? new Float64Array(bytes.buffer) : new Float32Array(bytes.buffer));
     }
     return cache.get(key);
   }
+  // NaN is a gap, which uPlot calls null.
+  const plain = new Map();
+  function array(key) {
+    if (!plain.has(key)) plain.set(key, Array.from(numbers(key), (v) => (Number.isNaN(v) ? null : v)));
+    return plain.get(key);
+  }
+  const firstAt = (times, time) => {
+    let lo = 0, hi = times.length;
+    while (lo < hi) { const mid = (lo + hi) >> 1; if (times[mid] < time) lo = mid + 1; else hi = mid; }
+    return lo;
+  };
 
   // Charts of one group share their time range and their cursor.
   const groups = new Map();
@@ -59,6 +70,8 @@
     return (u) => {
       const { ctx } = u, nodes = spec.nodes;
       const top = u.bbox.top, height = u.bbox.height / nodes.length;
+      const t = numbers(spec.t), { min, max } = u.scales.x;
+      const first = Math.max(0, firstAt(t, min) - 1), last = Math.min(t.length, firstAt(t, max) + 1);
       ctx.save();
       ctx.beginPath();
       ctx.rect(u.bbox.left, u.bbox.top, u.bbox.width, u.bbox.height);
@@ -70,9 +83,25 @@
           ctx.fillStyle = css(STATUS[STATUS_BY_CODE[code]]);
           ctx.fillRect(x0, top + n * height + height * 0.12, x1 - x0, height * 0.76);
         }
+        if (spec.residual.length) residual(u, numbers(spec.residual[n]), t, first, last, top + (n + 0.88) * height, 0.76 * height / spec.full);
       }
       ctx.restore();
     };
+  }
+
+  // One bar a pixel column, as high as the largest residual in it.
+  function residual(u, values, t, first, last, base, scale) {
+    const { ctx } = u, roof = 0.76 * u.bbox.height / u.scales.y.max;
+    const to = u.bbox.left + u.bbox.width, perS = u.bbox.width / (u.scales.x.max - u.scales.x.min);
+    ctx.fillStyle = css("--ink");
+    let column = -1, most = 0;
+    const bar = () => { if (column >= u.bbox.left && column <= to) ctx.fillRect(column, base - Math.min(roof, most * scale), 1, Math.min(roof, most * scale)); };
+    for (let i = first; i < last; i++) {
+      const x = Math.round(u.bbox.left + (t[i] - u.scales.x.min) * perS);
+      if (x !== column) { bar(); column = x; most = 0; }
+      if (values[i] > most) most = values[i];
+    }
+    bar();
   }
 
   function options(spec, width, g) {

@@ -1,0 +1,123 @@
+"""What a run folder says of itself: from what, with what and by which command it was made."""
+
+from __future__ import annotations
+
+import platform
+import shlex
+from dataclasses import fields
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from pydpend.analyse.folder import Digests, RunFolder
+from pydpend.analyse.options import Options, flag_of
+
+FILES = ("rig", "encoder", "calibration", "model", "zero")
+"""Options that may name a file or a folder."""
+
+
+def inputs(options: Options, digests: Digests) -> list[dict[str, str]]:
+    """Every file or folder that the run reads: what it was given as, its path, its SHA-256."""
+    named = [("input", name) for name in options.inputs]
+    named += [(flag_of(o), str(getattr(options, o))) for o in FILES if getattr(options, o) is not None]
+    return [
+        {"given_as": given, "path": name, "sha256": digests.of(Path(name))}
+        for given, name in named
+        if Path(name).exists()
+    ]
+
+
+def versions() -> dict[str, str]:
+    """Of pydpend, Python and the libraries that compute."""
+    from pydpend import _tracker
+
+    found = {"pydpend": _tracker.VERSION, "python": platform.python_version()}
+    for name in ("numpy", "scipy", "pyarrow", "matplotlib", "npTDMS"):
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "not known"
+    return found
+
+
+def command(options: Options, folder: Path) -> str:
+    """The command line that does this run again."""
+    words = ["pydpend", "analyse", *options.inputs, "-o", str(folder)]
+    default = Options()
+    for f in fields(Options):
+        value = getattr(options, f.name)
+        if f.name == "inputs" or value == getattr(default, f.name):
+            continue
+        flag = flag_of(f.name)
+        if isinstance(value, bool):
+            words.append(flag if value else flag.replace("--", "--no-", 1))
+        elif str(value).startswith("-"):
+            words.append(f"{flag}={value}")
+        else:
+            words += [flag, str(value)]
+    return shlex.join(words)
+
+
+ABOUT = {
+    "nodes.parquet": "node table: where each marker is in each frame",
+    "residuals.parquet": "distance of each marker from where its rigid body puts it, px",
+    "markers.json": "each marker summed up: seen, gaps, residual",
+    "angles.parquet": "angles of the links and their standard uncertainties, rad",
+    "angles.json": "how the angles were had: bodies, joints, scale, zero",
+    "zero.parquet": "node table of the film that hangs still",
+    "zero_rig.toml": "the rig it was tracked with",
+    "encoder.json": "calibration of the encoder",
+    "calibration.svg": "calibration line and its residuals (Fig. 10)",
+    "comparison.json": "film against encoder, numbers",
+    "comparison.parquet": "film and encoder at the encoder's times, rad",
+    "comparison.png": "film against encoder (Fig. 15)",
+    "overlay.mp4": "the film with nodes, names and bodies drawn in",
+    "overlay.json": "times of its frames in the recording",
+    "fit.json": "damping coefficients, uncertainties, shares, identifiability",
+    "coefficients.csv": "the coefficients as a table",
+    "shares.png": "where the energy goes",
+    "trials.json": "the coefficients of each recording and their mean",
+    "trials.png": "the same, drawn (Fig. 20)",
+    "maps.png": "angle-dependent bias of the tracking",
+    "prediction.json": "each recording predicted from the others",
+}
+
+
+def about(name: str) -> str:
+    """What a file of a run folder is."""
+    last = name.rsplit("/", 1)[-1]
+    if last.startswith("energy"):
+        return "energy of the motion and what each law takes out" + (
+            " (Fig. 19)" if last.endswith(".png") else ", J"
+        )
+    return ABOUT.get(last, "")
+
+
+def readme(run: RunFolder) -> str:
+    """What lies in the folder, for a person who opens it in ten years."""
+    facts: dict[str, Any] = run.facts
+    lines = [
+        f"A run of pydpend {facts['version']}.",
+        "",
+        "Made by:",
+        f"  {facts['command']}",
+        "with " + ", ".join(f"{name} {number}" for name, number in facts["versions"].items()),
+        "",
+        "From (SHA-256):",
+        *(f"  {i['sha256']}  {i['path']} ({i['given_as']})" for i in facts["inputs"]),
+        "",
+        "report.html  the page for people: warnings, results, film, plots; needs no network",
+        "run.json     inputs with SHA-256, options, versions, and what each stage was made from",
+        "",
+    ]
+    for name, done in run.stages.items():
+        lines.append(f"{name}: {done['message']}")
+        lines += [f"  {file:32} {about(file)}".rstrip() for file in done["files"]]
+    lines += [f"{name}: not done: {why}" for name, why in facts.get("not_done", {}).items()]
+    lines += [
+        "",
+        "Angles are in rad, counter-clockwise positive, zero hanging down; other units are in the names.",
+        "Figures alone: pydpend plot FIGURE FOLDER -o figure.pdf",
+        "",
+    ]
+    return "\n".join(lines)
