@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import importlib
 import os
+import signal
 import sys
 
 from pydpend.errors import PydpendError
@@ -44,10 +45,27 @@ def parser() -> argparse.ArgumentParser:
     return top
 
 
+def _look_up_numpy() -> None:
+    """Lets the compiled half find NumPy's C interface with Ctrl-C held back: interrupted there, it would panic."""
+    held = {signal.SIGINT}
+    signal.pthread_sigmask(signal.SIG_BLOCK, held)
+    try:
+        import numpy as np
+
+        from pydpend import _tracker
+        from pydpend.coefficients import parameters
+        from pydpend.model import derived
+
+        _tracker.unit_powers(parameters(derived("A")), np.zeros((0, 4)), np.zeros((0, 2)))
+    finally:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, held)
+
+
 def main(argv: list[str] | None = None) -> int:
     """Runs one command and returns its exit status."""
     args = parser().parse_args(argv)
     try:
+        _look_up_numpy()
         status: int = args.run(args)
         sys.stdout.flush()
         return status
