@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pydpend.angles.markers import BodyMarkers
-from pydpend.angles.pose import PRIOR_DOF, Pose, evenly, rotate
+from pydpend.angles.pose import Pose, evenly, rotate
+from pydpend.angles.scale import pooled_scale2
 from pydpend.angles.table import Floats
 from pydpend.errors import AnglesError, fault
 
@@ -185,6 +186,14 @@ def information(w: Floats, slopes: Floats) -> Floats:
     return out
 
 
+def remaining(w: Floats, slopes: Floats, inverse: Floats) -> tuple[Floats, Floats]:
+    """What a fit of the angles leaves of each marker's variance, as a part of it, (T, N, 2, 2), and ``slopes @
+    inverse`` (T, N, 2, L), with ``inverse`` (T, L, L) that of :func:`information`.
+    """
+    spread = np.matmul(slopes, inverse[:, None])
+    return np.eye(2) - np.matmul(spread, np.swapaxes(slopes, 2, 3)) * w[..., None, None], spread
+
+
 def fit_shape(markers: list[BodyMarkers], shape: Shape, theta: Floats) -> tuple[Linkage, Floats]:
     """Fits shape and angles together to all given frames (weights 0 leave a marker out).
 
@@ -235,9 +244,8 @@ def fit_shape(markers: list[BodyMarkers], shape: Shape, theta: Floats) -> tuple[
         shape = _moved(shape, step, k1, k2)
         if np.abs(step).max() < 1e-5:
             break
-    seen = int(np.count_nonzero(frames.w))
-    dof = 2 * seen - links * theta.shape[0] - (size - links)
-    scale2 = (chi2 + PRIOR_DOF) / (max(dof, 0) + PRIOR_DOF)
+    dof = 2 * int(np.count_nonzero(frames.w)) - links * theta.shape[0] - (size - links)
+    scale2 = _scale2(shape, frames, theta, size - links, dof)
     covariance = inverse * scale2
     pick = [0, 1] + ([2 + 2 * k1, 3 + 2 * k1] if k2 else [])
     small = covariance[np.ix_(pick, pick)]
@@ -256,6 +264,21 @@ def fit_shape(markers: list[BodyMarkers], shape: Shape, theta: Floats) -> tuple[
         along = shape.elbow_px / length
         sigma = float(np.sqrt(along @ small[2:, 2:] @ along))
     return Linkage(shape, small, length, sigma, float(np.sqrt(scale2)), chi2, dof), theta
+
+
+def _scale2(shape: Shape, frames: Frames, theta: Floats, parameters: int, dof: int) -> float:
+    """The sigmas' squared scale as the joints feel it: each residual counts with its marker's share of the weight."""
+    scatter, freedom = np.zeros(theta.shape[0]), np.zeros(theta.shape[0])
+    for start in range(0, theta.shape[0], _CHUNK):
+        rows = slice(start, min(start + _CHUNK, theta.shape[0]))
+        part = frames.at(rows)
+        places, slopes = predicted(shape, theta[rows])
+        inverse = np.asarray(np.linalg.inv(regular(information(part.w, slopes))))
+        left, _ = remaining(part.w, slopes, inverse)
+        share = part.w * (np.count_nonzero(part.w, axis=1) / part.w.sum(axis=1))[:, None]
+        scatter[rows] = (share * part.w * ((part.xy - places) ** 2).sum(axis=2)).sum(axis=1)
+        freedom[rows] = (share * np.einsum("tkdd->tk", left)).sum(axis=1)
+    return pooled_scale2(scatter, freedom, parameters, dof + parameters)
 
 
 def _shape_slopes(theta: Floats, k1: int, k2: int, size: int) -> Floats:

@@ -17,8 +17,10 @@ from pydpend.angles.linkage import (
     information,
     predicted,
     regular,
+    remaining,
 )
-from pydpend.angles.pose import REJECT_D2, Pose, evenly, inflation, rotate
+from pydpend.angles.pose import Pose, evenly, rotate
+from pydpend.angles.scale import hidden_factor, inflation, partly_hidden, pooled_scale2, reject_limit
 from pydpend.angles.table import Floats
 
 _STEPS = 6
@@ -35,7 +37,8 @@ class LinkageAngles:
     """Angles of both links in T frames by the linkage; NaN where they cannot be had.
 
     ``theta_rad``, ``sigma_rad`` (T, L); ``used`` (T, N): markers used, the upper link's first; ``chi2``,
-    ``dof`` (T,) of the residuals with the stated sigmas.
+    ``dof`` (T,) of the residuals with the stated sigmas. ``sigma_scale`` (L,): factor by which the residuals make
+    the stated sigmas larger, as each angle feels it; it is in ``sigma_rad``.
     """
 
     linkage: Linkage
@@ -44,6 +47,7 @@ class LinkageAngles:
     used: NDArray[np.bool_]
     chi2: Floats
     dof: NDArray[np.int64]
+    sigma_scale: Floats
 
 
 def fit_linkage(upper: Pose, lower: Pose | None) -> LinkageAngles:
@@ -81,14 +85,14 @@ def checked_sigma(linked: LinkageAngles, poses: list[Pose]) -> tuple[Floats, lis
             continue
         difference = apart[known] - np.median(apart[known])
         rigid2 = pose.sigma_rad[known] ** 2
-        own2 = (sigma[known, k] / linked.linkage.sigma_scale * alone) ** 2
+        own2 = (sigma[known, k] / linked.sigma_scale[k] * alone) ** 2
         # Frames that stand out have a half-hidden marker, which spoils the rigid angle, not the linkage's.
         usual = np.abs(difference) < 4 * 1.4826 * np.median(np.abs(difference))
         variance = float((difference[usual] ** 2).mean())
         bias2 = variance - float((rigid2 - own2)[usual].mean())
         if bias2 > 4 * variance * np.sqrt(2 / np.count_nonzero(usual)):
             before = float(np.sqrt(np.median(sigma[known, k] ** 2)))
-            sigma[:, k] = np.sqrt((sigma[:, k] / linked.linkage.sigma_scale * alone) ** 2 + bias2)
+            sigma[:, k] = np.sqrt((sigma[:, k] / linked.sigma_scale[k] * alone) ** 2 + bias2)
             notes.append(
                 f"phi{k + 1} by the linkage is off by {np.degrees(np.sqrt(bias2)):.2g} deg beyond its noise of "
                 f"{np.degrees(before):.2g} deg (the camera moves, a joint has play or the lens distorts); its sigma "
@@ -138,34 +142,59 @@ def _all_frames(linkage: Linkage, frames: Frames, start: Floats) -> LinkageAngle
     theta, sigma = np.full((total, links), np.nan), np.full((total, links), np.nan)
     used = np.zeros(frames.w.shape, dtype=bool)
     chi2, dof = np.zeros(total), np.zeros(total, dtype=np.int64)
-    limit = REJECT_D2 * linkage.sigma_scale**2
+    scatter, freedom = np.zeros((total, links)), np.zeros((total, links))
+    k1 = linkage.shape.upper_px.shape[0]
+    hidden = partly_hidden(frames.w[:, :k1])
+    if links == 2:
+        hidden |= partly_hidden(frames.w[:, k1:])
+    limit = reject_limit(hidden) * linkage.sigma_scale**2
     for first in range(0, total, _CHUNK):
         rows = np.arange(first, min(first + _CHUNK, total))
         part = Frames(frames.xy[rows], frames.w[rows].copy())
         angle = start[rows]
         active = np.arange(rows.size)
         while active.size:
-            angle[active], d2, c, f, s = _solve(linkage.shape, part.at(active), angle[active])
-            sigma[rows[active]], chi2[rows[active]], dof[rows[active]] = s, c, f
+            found = _solve(linkage.shape, part.at(active), angle[active])
+            angle[active], d2, now = found.theta, found.d2, rows[active]
+            sigma[now], chi2[now], dof[now] = found.sigma, found.chi2, found.dof
+            scatter[now], freedom[now] = found.scatter, found.freedom
             worst = d2.max(axis=1)
-            bad = worst > limit
+            bad = worst > limit[now]
             active, d2, worst = active[bad], d2[bad], worst[bad]
             drop = d2 >= _TIE * worst[:, None]
             part.w[active] = np.where(drop, 0.0, part.w[active])
             angle[active] = np.where(np.isnan(angle[active]), start[rows[active]], angle[active])
         theta[rows], used[rows] = angle, part.w > 0
-    scale = linkage.sigma_scale * inflation(chi2 / linkage.sigma_scale**2, dof)
-    sigma *= scale[:, None]
-    theta = np.where(np.isfinite(sigma), theta, np.nan)
-    return LinkageAngles(linkage, theta, sigma, used, chi2, dof)
+    parameters = 2 * (1 + frames.w.shape[1] + (links - 1)) - links
+    seen = np.isfinite(sigma)
+    scale = np.empty(links)
+    for a in range(links):
+        whole, part = seen[:, a] & ~hidden, seen[:, a] & hidden
+        scale2 = pooled_scale2(scatter[whole, a], freedom[whole, a], parameters, float(dof[seen[:, a]].sum()))
+        factor = hidden_factor(scatter[:, a], freedom[:, a], part, scale2)
+        scale[a] = np.sqrt(scale2)
+        each = scale[a] * np.where(hidden, factor, 1.0)
+        sigma[:, a] *= each * inflation(chi2 / each**2, dof)
+    theta = np.where(seen, theta, np.nan)
+    return LinkageAngles(linkage, theta, sigma, used, chi2, dof, scale)
 
 
-def _solve(
-    shape: Shape, frames: Frames, theta: Floats
-) -> tuple[Floats, Floats, Floats, NDArray[np.int64], Floats]:
-    """Angles (T, L), normalised misfits (T, N), chi2 and dof (T,), and standard errors (T, L) of some
-    frames.
+@dataclass(frozen=True, eq=False)
+class _Solved:
+    """Angles (T, L) of some frames, normalised misfits d2 (T, N), chi2 and dof (T,), standard errors (T, L), and what
+    :func:`~pydpend.angles.pose.pooled_scale2` is made of, for each angle (T, L).
     """
+
+    theta: Floats
+    d2: Floats
+    chi2: Floats
+    dof: NDArray[np.int64]
+    sigma: Floats
+    scatter: Floats
+    freedom: Floats
+
+
+def _solve(shape: Shape, frames: Frames, theta: Floats) -> _Solved:
     links = theta.shape[1]
     theta = np.where(np.isnan(theta), 0.0, theta)
     k1 = shape.upper_px.shape[0]
@@ -182,11 +211,8 @@ def _solve(
     places, slopes = predicted(shape, theta)
     residual = np.where((frames.w > 0)[..., None], frames.xy - places, 0.0)
     v = regular(information(frames.w, slopes))
-    inverse = np.linalg.inv(v)
-    # Variance of a residual: that of the marker less what the fit takes up.
-    spread = np.matmul(slopes, inverse[:, None])
-    taken = np.matmul(spread, np.swapaxes(slopes, 2, 3)) * frames.w[..., None, None]
-    left = np.eye(2) - taken
+    inverse = np.asarray(np.linalg.inv(v))
+    left, spread = remaining(frames.w, slopes, inverse)
     determinant = left[..., 0, 0] * left[..., 1, 1] - left[..., 0, 1] * left[..., 1, 0]
     trace = left[..., 0, 0] + left[..., 1, 1]
     rx, ry = residual[..., 0], residual[..., 1]
@@ -204,4 +230,9 @@ def _solve(
     dof = np.maximum(2 * count - known.sum(axis=1), 0)
     variance = np.einsum("taa->ta", inverse)
     sigma = np.where(known, np.sqrt(variance), np.nan)
-    return theta, d2, chi2, dof, sigma
+    # What a centre's error does to each angle is w (slopes inverse) times it: only that part of a residual counts.
+    share = (frames.w * count[:, None])[..., None] / variance[:, None]
+    felt = np.einsum("tkda,tkd->tka", spread, residual)
+    scatter = (share * frames.w[..., None] * felt**2).sum(axis=1)
+    freedom = (share * np.einsum("tkda,tkde,tkea->tka", spread, left, spread)).sum(axis=1)
+    return _Solved(theta, d2, chi2, dof, sigma, scatter, freedom)

@@ -18,17 +18,9 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from pydpend.angles.markers import BodyMarkers
+from pydpend.angles.scale import hidden_factor, inflation, partly_hidden, pooled_scale2, reject_limit
 from pydpend.angles.table import Floats
 from pydpend.errors import AnglesError, fault
-
-REJECT_D2 = float(stats.chi2.isf(1e-6, 2))
-"""A marker is left out if its squared normalised residual is above this: one in a million by chance."""
-
-INFLATE_P = 1e-4
-"""Below this probability of a frame's chi-square its standard error is scaled up by sqrt(chi2 / dof)."""
-
-PRIOR_DOF = 20.0
-"""The stated sigmas count as much as this many degrees of freedom when the residuals rescale them."""
 
 TEMPLATE_FRAMES = 10_000
 """The template is learned from at most this many frames, evenly spread: its noise is then 1 % of a marker's."""
@@ -62,6 +54,9 @@ class Pose:
 class Fitted:
     """One closed-form solution for all frames: angle, centre, information on the angle, residuals, d2 (T,
     K).
+
+    ``scatter`` over ``freedom`` (T, 2), along and across the turn, is the squared scale of the sigmas as the angle
+    feels it: see :func:`pooled_scale2`.
     """
 
     theta: Floats
@@ -70,6 +65,8 @@ class Fitted:
     chi2: Floats
     count: NDArray[np.int64]
     d2: Floats
+    scatter: Floats
+    freedom: Floats
 
 
 def rotate(theta: Floats, vectors: Floats) -> Floats:
@@ -103,10 +100,13 @@ def solve(xy: Floats, w: Floats, template: Floats) -> Fitted:
     left_radial = 1.0 - w / total[:, None]
     left_tangential = left_radial - w * arm2 / np.where(information > 0, information, 1.0)[:, None]
     d2 = _part(w, radial, left_radial) + _part(w, tangential, left_tangential)
+    share = w * arm2 * (count / np.where(information > 0, information, 1.0))[:, None]
+    scatter = np.stack([(share * w * r**2).sum(axis=1) for r in (tangential, radial)], axis=1)
+    freedom = np.stack([(share * f).sum(axis=1) for f in (left_tangential, left_radial)], axis=1)
     good = (count >= 2) & (information > 0)
     theta = np.where(good, theta, np.nan)
     centre = np.where(good[:, None], mean - rotate(theta, origin), np.nan)
-    return Fitted(theta, centre, np.where(good, information, np.nan), chi2, count, d2)
+    return Fitted(theta, centre, np.where(good, information, np.nan), chi2, count, d2, scatter, freedom)
 
 
 def _part(w: Floats, residual: Floats, left: Floats) -> Floats:
@@ -138,23 +138,27 @@ def fit_pose(markers: BodyMarkers) -> Pose:
     used, doubtful, fitted = _reject(markers, template, scale2)
     dof = np.maximum(2 * fitted.count - 3, 0)
     good = np.isfinite(fitted.theta) & ~doubtful
-    free = float(dof[good].sum()) - (2 * template.shape[0] - 3)
-    chi2 = float(fitted.chi2[good & (dof > 0)].sum())
-    scale2 = (chi2 + PRIOR_DOF) / (max(free, 0.0) + PRIOR_DOF)
-    sigma = np.sqrt(scale2 / fitted.information) * inflation(fitted.chi2 / scale2, dof)
+    told = good & (dof > 0)
+    # A moving marker's centre errs more along its way than across it, and the way along is what turns the body. Two
+    # markers have no freedom there: then their distance must do.
+    along = fitted.freedom[told, 0].sum() > 0.01 * fitted.freedom[told].sum()
+    scatter = fitted.scatter[:, 0] if along else fitted.scatter.sum(axis=1)
+    freedom = fitted.freedom[:, 0] if along else fitted.freedom.sum(axis=1)
+    parameters = 2 * template.shape[0] - 3
+    scale2 = pooled_scale2(scatter[told], freedom[told], parameters, float(dof[told].sum()))
+    hidden = partly_hidden(w)
+    whole2 = pooled_scale2(
+        scatter[told & ~hidden], freedom[told & ~hidden], parameters, float(dof[told].sum())
+    )
+    factor = hidden_factor(scatter, freedom, hidden & told, whole2)
+    each2 = np.where(hidden, factor**2, 1.0) * whole2
+    sigma = np.sqrt(each2 / fitted.information) * inflation(fitted.chi2 / each2, dof)
     theta = np.where(good, fitted.theta, np.nan)
     centre = np.where(good[:, None], fitted.centre, np.nan)
     sigma = np.where(good, sigma, np.nan)
     return Pose(
         markers, theta, centre, sigma, template, used, fitted.chi2, dof, float(np.sqrt(scale2)), doubtful
     )
-
-
-def inflation(chi2: Floats, dof: NDArray[np.int64]) -> Floats:
-    """Factor on a frame's standard error: 1, or sqrt(chi2 / dof) where chance cannot explain chi2."""
-    limit = np.asarray(stats.chi2.isf(INFLATE_P, np.arange(1, max(int(dof.max(initial=1)), 1) + 1)))
-    some = np.maximum(dof, 1)
-    return np.where((dof > 0) & (chi2 > limit[some - 1]), np.sqrt(chi2 / some), 1.0)
 
 
 def _template(markers: BodyMarkers) -> tuple[Floats, float]:
@@ -221,10 +225,10 @@ def _reject(
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_], Fitted]:
     """Leaves out, one by one, the marker that fits worst, as long as it fits too badly."""
     used = markers.seen.copy()
-    limit = REJECT_D2 * max(scale2, 1e-12)
+    limit = reject_limit(partly_hidden(markers.weight)) * max(scale2, 1e-12)
     full = solve(markers.xy_px, markers.weight, template)
     doubtful = np.zeros(used.shape[0], dtype=bool)
-    frames = np.flatnonzero((full.d2 > limit).any(axis=1))
+    frames = np.flatnonzero((full.d2 > limit[:, None]).any(axis=1))
     d2 = full.d2[frames]
     while frames.size:
         count = np.count_nonzero(used[frames], axis=1)
@@ -242,7 +246,7 @@ def _reject(
         used[rest, np.argmax(d2[~three], axis=1)] = False
         frames = rest
         again = solve(markers.xy_px[frames], np.where(used[frames], markers.weight[frames], 0.0), template)
-        bad = (again.d2 > limit).any(axis=1)
+        bad = (again.d2 > limit[frames, None]).any(axis=1)
         frames, d2 = frames[bad], again.d2[bad]
     changed = np.flatnonzero((used != markers.seen).any(axis=1))
     if changed.size:
@@ -272,7 +276,7 @@ def _one_of_three(
         theta[:, j], worst[:, j] = fitted.theta, fitted.d2.max(axis=1)
         variance[:, j] = scale2 / fitted.information
     best = np.argmin(worst, axis=1)
-    fits = worst <= REJECT_D2 * scale2
+    fits = worst <= reject_limit(np.zeros(1, dtype=bool)) * scale2
     apart = np.abs(np.angle(np.exp(1j * (theta - theta[rows, best][:, None]))))
     differs = apart > 5.0 * np.sqrt(variance + variance[rows, best][:, None])
     return index[rows, best], ~fits.any(axis=1) | (fits & differs).any(axis=1)
