@@ -76,7 +76,7 @@ def test_linkage_gains_what_the_levers_promise() -> None:
 
 
 @pytest.mark.parametrize("stated", [0.4, 2.5])
-@pytest.mark.parametrize("method", ["rigid", "linkage"])
+@pytest.mark.parametrize("method", ["rigid", "linkage", "pairwise"])
 def test_residuals_put_wrong_stated_sigmas_right(method: Method, stated: float) -> None:
     t, phi = tumbling(4000, 4)
     found = angles(rig.film(t, phi, 4, stated=stated), method, zero="reference_frame")
@@ -84,6 +84,30 @@ def test_residuals_put_wrong_stated_sigmas_right(method: Method, stated: float) 
     # 4000 frames: 1.1 % scatter of the standard deviation.
     np.testing.assert_allclose(((error - error.mean(axis=0)) / found.sigma_rad).std(axis=0), 1.0, atol=0.05)
     assert found.meta["bodies"][0]["sigma_scale"] == pytest.approx(1 / stated, rel=0.05)
+
+
+@pytest.mark.parametrize("method", ["rigid", "linkage"])
+def test_markers_of_no_weight_say_nothing_about_the_others(method: Method) -> None:
+    # Half hidden markers are stated at 1.3 px though most are right to 0.05: they hardly move an angle, and their small
+    # residuals must not make the others look better than they are. Centres of moving markers err more along their way.
+    t, phi = tumbling(6000, 21)
+    rng = np.random.default_rng(21)
+    unsure = np.zeros((t.size, 9), dtype=bool)
+    unsure[rng.random(t.size) < 0.3, 4:6] = True
+    nodes = rig.film(t, phi, 21)
+    way = np.gradient(rig.places(phi), axis=0)
+    way /= np.hypot(way[..., 0], way[..., 1])[..., None]
+    along = 0.04 * rng.standard_normal((t.size, 9))
+    nodes = dataclasses.replace(
+        nodes,
+        xy_px=nodes.xy_px + along[..., None] * way,
+        sigma_px=np.where(unsure, 1.3, nodes.sigma_px).astype(np.float32),
+    )
+    found = angles(nodes, method, zero="reference_frame")
+    error = found.phi_rad - phi
+    pull = ((error - error.mean(axis=0)) / found.sigma_rad).std(axis=0)
+    # 6000 frames: 0.9 % scatter of the standard deviation, as much again of the scale; the issue asks for 5 %.
+    np.testing.assert_allclose(pull, 1.0, atol=0.05)
 
 
 def test_pivot_and_link_length_of_ten_seconds() -> None:
@@ -220,6 +244,21 @@ def test_zero_given_and_from_a_reference_recording() -> None:
         assert np.abs((found.phi_rad + turns - phi).mean(axis=0)).max() < 2e-4
     with pytest.raises(AnglesError, match="one finite angle"):
         angles(nodes, zero=(1.0,))
+
+
+def test_a_rest_is_no_better_known_than_its_frames_differ() -> None:
+    # Compressed film repeats a still picture, so its error does not average out: slowly changing, or always the same.
+    rng = np.random.default_rng(18)
+    t = np.arange(1000) / 500
+    sigma = np.full((t.size, 1), 1e-4)
+    for phi, least, most in (
+        (1e-4 * rng.standard_normal(t.size), 2e-6, 5e-6),
+        (1e-4 * np.repeat(rng.standard_normal(20), 50), 1e-5, 6e-5),
+        (np.full(t.size, 1e-4) + 1e-6 * rng.standard_normal(t.size), 1e-4, 1e-4),
+    ):
+        (rest,) = find_rest(LinkAngles(t, phi[:, None], sigma))
+        # White: 1e-4 / sqrt(1000) = 3.2e-6. Twenty pictures: 1e-4 / sqrt(20) = 2.2e-5. One picture: its own sigma.
+        assert least <= rest.sigma_rad[0] <= most
 
 
 def test_rest_that_swings_is_no_rest() -> None:

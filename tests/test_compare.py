@@ -154,6 +154,7 @@ def test_given_clocks_are_taken_and_a_late_reading_is_seen() -> None:
     # An encoder that answers 0.8 ms late shows the angle of 0.8 ms ago.
     assert found.delay_s == pytest.approx(0.0008, abs=5 * found.delay_sigma_s)
     assert found.delay_sigma_s < 1e-4
+    assert any("ms late" in note for note in found.notes)
 
 
 def test_comparison_says_whose_noise_the_residual_is() -> None:

@@ -100,22 +100,24 @@ def _estimate(
 ) -> Raw:
     if method == "pairwise":
         pairs = [pair_angles(m) for m in markers]
+        scales = [fit_pose(m).sigma_scale for m in markers]
         meta = {
             "bodies": [
                 {
                     "name": m.name,
                     "nodes": list(m.nodes),
                     "median_scatter_rad": float(np.nanmedian(p.scatter_rad)),
-                    "median_sigma_rad": float(np.nanmedian(p.sigma_rad)),
+                    "median_sigma_rad": s * float(np.nanmedian(p.sigma_rad)),
+                    "sigma_scale": s,
                 }
-                for m, p in zip(markers, pairs, strict=True)
+                for m, p, s in zip(markers, pairs, scales, strict=True)
             ],
             "notes": [
                 "the scatter of the pairs (Eq. 32) is not the error of their mean; sigma is the latter"
             ],
         }
         theta = np.stack([p.mean_rad for p in pairs], axis=1)
-        sigma = np.stack([p.sigma_rad for p in pairs], axis=1)
+        sigma = np.stack([p.sigma_rad * s for p, s in zip(pairs, scales, strict=True)], axis=1)
         return Raw(theta, sigma, [m.reference_px for m in markers], None, meta)
     if method not in ("rigid", "linkage"):
         raise AnglesError(fault("method", f"{method!r} is not known", "Use rigid, linkage or pairwise"))

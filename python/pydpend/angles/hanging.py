@@ -86,11 +86,10 @@ def _zero_from_reference(
                 "reference recording", "its nodes are not those of this recording", "Track both with one rig"
             )
         )
-    columns = [solve(m.xy_px, m.weight, p).theta for m, p in zip(others, raw.templates, strict=True)]
-    turns = np.stack([unwrap(reference.t_s, c)[0] for c in columns], axis=1)
-    rests = find_rest(
-        LinkAngles(reference.t_s, turns, np.full(turns.shape, np.nan), name="reference recording")
-    )
+    poses = [solve(m.xy_px, m.weight, p) for m, p in zip(others, raw.templates, strict=True)]
+    turns = np.stack([unwrap(reference.t_s, p.theta)[0] for p in poses], axis=1)
+    sigma = np.stack([p.information**-0.5 for p in poses], axis=1)
+    rests = find_rest(LinkAngles(reference.t_s, turns, sigma, name="reference recording"))
     kept = [r for r in rests if _hangs(r.phi_rad, _down(raw, reference, markers, mirrored))]
     value, sigma = zero_of(kept, "reference recording")
     return value, {"from": "reference recording", "sigma_rad": sigma.tolist()}

@@ -11,12 +11,16 @@ import numpy as np
 
 from pydpend.angles.table import Floats, LinkAngles
 from pydpend.errors import AnglesError, fault
+from pydpend.series import correlation_time
 
 REST_WITHIN_RAD = np.radians(0.1)
 """At rest, means over :data:`BLOCK_S` stay within this range (or six of their standard errors)."""
 
 REST_AT_LEAST_S = 0.5
 """A rest lasts at least this long: more than half a swing of a hand-sized pendulum's slow mode."""
+
+REPEATS = 0.4
+"""Rows that scatter by less than this part of their sigmas repeat one picture rather than taking it anew."""
 
 BLOCK_S = 0.05
 """Rest is looked for in means over this long, s."""
@@ -27,8 +31,9 @@ class Rest:
     """A stretch in which no link moves.
 
     Rows ``first`` to ``last`` (both inside), from ``start_s`` to ``stop_s``; ``phi_rad`` (L,) the mean angles
-    and ``sigma_rad`` (L,) their standard errors: scatter over sqrt(rows), or the spread of the block means
-    where that is more.
+    and ``sigma_rad`` (L,) their standard errors: scatter over sqrt(rows), rows that hang together counting as
+    fewer. Where the rows scatter by far less than their own sigmas, as compressed film of something at
+    rest does, they all have one and the same error, and that is it.
     """
 
     first: int
@@ -78,25 +83,28 @@ def find_rest(angles: LinkAngles, at_least_s: float = REST_AT_LEAST_S) -> list[R
                 break
             j += 1
         if j > i and t[j * rows - 1] - t[i * rows] + 1.5 * step >= at_least_s:
-            out.append(_rest(angles, i * rows, j * rows - 1, mean[i:j]))
+            out.append(_rest(angles, i * rows, j * rows - 1))
             i = j
         else:
             i += 1
     return out
 
 
-def _rest(angles: LinkAngles, first: int, last: int, means: Floats) -> Rest:
+def _rest(angles: LinkAngles, first: int, last: int) -> Rest:
     part = angles.phi_rad[first : last + 1]
-    count = np.isfinite(part).sum(axis=0)
-    white = np.nanstd(part, axis=0, ddof=1) / np.sqrt(count)
-    slow = np.std(means, axis=0, ddof=1) / np.sqrt(means.shape[0])
+    mean, scatter = np.nanmean(part, axis=0), np.nanstd(part, axis=0, ddof=1)
+    together = np.array([correlation_time(column) for column in (part - mean).T])
+    own = scatter * np.sqrt(together / np.isfinite(part).sum(axis=0))
+    sigma = angles.sigma_rad[first : last + 1]
+    stated = np.array([float(np.median(s[np.isfinite(s)])) if np.isfinite(s).any() else 0.0 for s in sigma.T])
+    common = np.where(scatter < REPEATS * stated, stated, 0.0)
     return Rest(
         first,
         last,
         float(angles.t_s[first]),
         float(angles.t_s[last]),
-        np.nanmean(part, axis=0),
-        np.maximum(white, slow),
+        mean,
+        np.maximum(own, common),
     )
 
 
@@ -113,8 +121,8 @@ def zero_of(rests: list[Rest], name: str) -> tuple[Floats, Floats]:
             fault(
                 name,
                 "no stretch of 0.5 s was found in which all links hang at rest, so there is no zero",
-                "Give zero=(phi1, phi2), the links' angles in the rig's reference frame in rad, or the nodes "
-                "of a recording at rest",
+                "Give zero (--zero): the links' angles in the rig's reference frame, or the nodes of a recording "
+                "at rest",
             )
         )
     base = rests[0].phi_rad
@@ -126,7 +134,7 @@ def zero_of(rests: list[Rest], name: str) -> tuple[Floats, Floats]:
             fault(
                 name,
                 f"the links rest at angles that differ by {np.degrees(spread.max()):.1f} deg ({times})",
-                "Say which hangs: give zero=(phi1, phi2), the angles in the rig's reference frame in rad",
+                "Say which hangs: give zero (--zero), the angles in the rig's reference frame",
             )
         )
     weight = np.array([r.last - r.first + 1 for r in rests], dtype=np.float64)

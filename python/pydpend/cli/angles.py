@@ -41,6 +41,11 @@ def add_arguments(p: argparse.ArgumentParser) -> None:
         help="where a hidden link may have lost a turn: refuse (default), or leave its angles out from there on",
     )
     p.add_argument("--figure", metavar="FILE", help="draw the angles and their sigmas (.png, .svg, .pdf)")
+    p.add_argument(
+        "--methods-figure",
+        metavar="FILE",
+        help="draw methods 1 and 2 of the paper's Section 8.2.1 on the first link, with their errors",
+    )
     p.add_argument("--json", action="store_true", help="what was done, as JSON on stdout")
 
 
@@ -67,6 +72,13 @@ def run(args: argparse.Namespace) -> int:
         from pydpend.plots.style import save
 
         save(angles_figure(found), args.figure)
+    if args.methods_figure:
+        from pydpend.angles.markers import body_markers
+        from pydpend.plots.angles import body_methods_figure
+        from pydpend.plots.style import save
+
+        first = body_markers(nodes, args.bodies.split(",") if args.bodies else None, args.mirrored)[0]
+        save(body_methods_figure(first), args.methods_figure)
     seen = found.seen.sum(axis=0)
     sigma = [float(np.nanmedian(s)) if np.isfinite(s).any() else None for s in found.sigma_rad.T]
     if args.json:

@@ -1,7 +1,7 @@
 """The encoder beside the video: reading, calibration, clocks and comparison.
 
 ``signal``, ``tdms``: files. ``holds``, ``calibration``: holds to a line. ``convert``: volts to angles.
-``sync``: clocks. ``compare``: the comparison. ``statistics``: series whose neighbours hang together.
+``sync``: clocks. ``compare``: the comparison.
 """
 
 from __future__ import annotations

@@ -39,7 +39,8 @@ class Calibration:
 
     ``covariance`` (2, 2): of (offset, slope), with ``dof`` degrees of freedom. ``residual_v`` (n,): hold
     minus line. ``linearity``: largest residual over the calibrated span. ``noise_v``: standard deviation of
-    a reading, pooled over the holds. ``noisy_holds``: those whose standard deviation is above ``spec_v``.
+    a reading, pooled over the holds. ``noisy_holds``: those whose standard deviation is above ``spec_v`` by more than
+    chance explains.
     ``range_v``: the output's rails; ``wraps``: whether it jumps from one to the other (a single-turn
     encoder) or stays there.
     """
@@ -105,7 +106,7 @@ class Calibration:
             "covariance": self.covariance.tolist(),
             "dof": self.dof,
             "holds": [
-                {**asdict(h), "residual_v": float(r), "within_spec": h.std_v <= self.spec_v}
+                {**asdict(h), "residual_v": float(r), "within_spec": h.name not in self.noisy_holds}
                 for h, r in zip(self.holds, self.residual_v, strict=True)
             ],
             "linearity": self.linearity,
@@ -252,11 +253,20 @@ def calibrate(
         float(np.abs(residual).max() / (abs(slope) * np.ptp(phi))),
         noise if noise > 0 else spec_v,
         spec_v,
-        tuple(h.name for h in holds if h.std_v > spec_v),
+        tuple(h.name for h in holds if _too_noisy(h, spec_v)),
         range_v,
         wraps,
         tuple(notes),
     )
+
+
+def _too_noisy(hold: Hold, spec_v: float) -> bool:
+    """Whether the hold scatters by more than specified, and by more than one in a thousand would by chance."""
+    if hold.std_v <= spec_v or hold.n < 2:
+        return False
+    # Readings that hang together count as fewer.
+    free = max((hold.std_v / hold.sigma_v) ** 2 - 1, 1.0)
+    return bool((hold.std_v / spec_v) ** 2 > stats.chi2.isf(1e-3, free) / free)
 
 
 def _unwrapped_holds(phi: Floats, volts: Floats, sigma: Floats, span: float) -> Floats:

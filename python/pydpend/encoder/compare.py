@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pydpend.angles.table import LinkAngles
-from pydpend.encoder.statistics import correlation_time, highpass_noise
 from pydpend.encoder.sync import Course, Synchronisation, synchronise
+from pydpend.series import correlation_time, highpass_noise
 
 Floats = NDArray[np.float64]
 
@@ -184,6 +184,11 @@ def compare(
     delay, delay_sigma = 0.0, sync.offset_sigma_s
     if sync.given:
         delay, delay_sigma = _delay(course, t, encoder_rad, offset, gain)
+        if abs(delay) > 5 * delay_sigma:
+            notes.append(
+                f"the clocks were said to be one, but the encoder's readings are {1e3 * delay:.3g} +- "
+                f"{1e3 * delay_sigma:.2g} ms late: estimate the clocks if nothing synchronised them"
+            )
     c = sync.covariance
     slope = np.array([-1.0 / sync.gain, sync.zero_rad / sync.gain**2])
     return Comparison(

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pydpend.angles.table import LinkAngles
+from pydpend.angles.unwrap import unwrap
 from pydpend.encoder.calibration import Calibration
 from pydpend.encoder.signal import EncoderSignal
 from pydpend.errors import EncoderError, fault
@@ -26,17 +27,20 @@ def encoder_angles(signal: EncoderSignal, calibration: Calibration | None = None
     while a single-turn encoder jumps from one rail to the other. ``meta["systematic_rad"]`` is the largest
     uncertainty that the calibration line adds, common to all readings.
 
-    A signal already in rad needs no calibration; its noise is taken from itself (residual of a local cubic).
+    A signal already in rad needs no calibration; its noise is taken from itself (residual of a local cubic), and its
+    turns are counted if it jumps from one end of a turn to the other.
 
-    Raises :class:`~pydpend.errors.EncoderError`: volts without a calibration, or more than half of the
-    readings unusable.
+    Raises :class:`~pydpend.errors.EncoderError`: volts without a calibration, more than half of the
+    readings unusable, or a gap in which an encoder of a single turn may have lost one.
     """
     if signal.unit == "rad":
-        from pydpend.encoder.statistics import highpass_noise
+        from pydpend.series import highpass_noise
 
         noise = highpass_noise(signal.value)
         sigma = np.full((signal.value.size, 1), noise if noise > 0 else np.nan)
-        phi = np.unwrap(signal.value)
+        phi = signal.value
+        if (np.abs(np.diff(phi))[np.diff(signal.t_s) <= 1.5 * signal.step_s] > np.pi).any():
+            phi = _counted(signal, phi)
         meta = {"source": "encoder, in angle", "notes": list(signal.notes), "sigma_rad": float(sigma[0, 0])}
         return LinkAngles(signal.t_s, phi[:, None], sigma, None, meta, signal.name)
     if calibration is None:
@@ -63,9 +67,7 @@ def encoder_angles(signal: EncoderSignal, calibration: Calibration | None = None
     ):
         if mask.any():
             first = float(signal.t_s[np.argmax(mask)])
-            notes.append(
-                f"{int(mask.sum())} readings {what} (the first at {first:.6g} s); they have no angle"
-            )
+            notes.append(f"{int(mask.sum())} readings {what} (the first at {first:.6g} s); they are left out")
     bad = beyond | at_rail | jumping
     if bad.mean() > MOST_LEFT_OUT:
         raise EncoderError(
@@ -76,9 +78,10 @@ def encoder_angles(signal: EncoderSignal, calibration: Calibration | None = None
             )
         )
     good = ~bad
-    counted = volts.copy()
+    counted = volts
     if calibration.wraps:
-        counted[good] = np.unwrap(volts[good], period=high - low)
+        per_turn = (high - low) / (2 * np.pi)
+        counted = per_turn * _counted(signal, np.where(good, volts / per_turn, np.nan))
     phi = np.where(good, calibration.angle_rad(counted), np.nan)
     sigma = np.where(good, calibration.noise_rad, np.nan)
     meta = {
@@ -90,6 +93,23 @@ def encoder_angles(signal: EncoderSignal, calibration: Calibration | None = None
         "notes": notes,
     }
     return LinkAngles(signal.t_s, phi[:, None], sigma[:, None], None, meta, signal.name)
+
+
+def _counted(signal: EncoderSignal, wrapped_rad: Floats) -> Floats:
+    """The angle of a single-turn encoder counted over turns. Raises :class:`EncoderError` if a gap may lose one."""
+    phi, lost = unwrap(signal.t_s, wrapped_rad)
+    if lost:
+        gap = lost[0]
+        raise EncoderError(
+            fault(
+                signal.name,
+                f"no readings for {gap.length_s:.4g} s, more than the {gap.limit_s:.4g} s after which a turn of a "
+                "single-turn encoder may be lost",
+                "Cut the recording there",
+                place=f"after {signal.t_s[gap.before]:.6g} s",
+            )
+        )
+    return phi
 
 
 def _jumping(volts: Floats, span: float) -> NDArray[np.bool_]:

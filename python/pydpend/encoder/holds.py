@@ -11,8 +11,8 @@ import numpy as np
 
 from pydpend.columns import read_columns
 from pydpend.encoder.signal import EncoderSignal, Unit, read_encoder
-from pydpend.encoder.statistics import correlation_time
 from pydpend.errors import EncoderError, fault
+from pydpend.series import correlation_time
 
 ENDINGS = (".csv", ".tdms", ".npy", ".parquet", ".txt")
 """What counts as a recording in a folder of holds."""

@@ -16,8 +16,8 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import savgol_coeffs, savgol_filter
 
 from pydpend.angles.table import LinkAngles
-from pydpend.encoder.statistics import correlation_time, highpass_noise
 from pydpend.errors import EncoderError, fault
+from pydpend.series import correlation_time, highpass_noise
 
 Floats = NDArray[np.float64]
 
