@@ -1,10 +1,13 @@
-"""The run of the bundled film that several test files look at; made once."""
+"""What several test files look at, made once: the run of the bundled film, and a browser."""
 
 from __future__ import annotations
 
+import shutil
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from playwright.sync_api import Browser, sync_playwright
 from pydpend.analyse import Options, analyse
 
 DEMO = Path(__file__).parent.parent / "fixtures" / "demo"
@@ -30,3 +33,17 @@ def demo_run(demo_options: Options, tmp_path_factory: pytest.TempPathFactory) ->
     assert outcome.status == "done", outcome.stages
     assert set(outcome.stages.values()) == {"done"}
     return folder
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Browser]:
+    """Debian's Chromium; `make test` installs it."""
+    names = ("chromium", "chromium-browser", "google-chrome")
+    found = next((path for name in names if (path := shutil.which(name)) is not None), None)
+    if found is None:
+        pytest.fail("chromium is not installed; `make test` installs it")
+    flags = ["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-sync"]
+    with sync_playwright() as driver:
+        running = driver.chromium.launch(executable_path=found, args=flags)
+        yield running
+        running.close()

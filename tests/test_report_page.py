@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import shutil
 import subprocess
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Page
 from pydpend.report import page as p
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+from tests.browsing import open_report, until
+
 FRAMES, RATE, STEP = 60, 30.0, 0.05
 HOSTILE = "<script>alert(1)</script>"
 
@@ -88,41 +87,10 @@ def html(mp4: bytes, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    if CHROMIUM is None:
-        pytest.fail("chromium is not installed; `make test` installs it")
-    flags = ["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-sync"]
-    with sync_playwright() as driver:
-        running = driver.chromium.launch(executable_path=CHROMIUM, args=flags)
-        yield running
-        running.close()
-
-
 @pytest.fixture
 def opened(browser: Browser, html: Path) -> Iterator[Page]:
-    problems: list[str] = []
-    page = browser.new_page(viewport={"width": 1100, "height": 900})
-    page.on("console", lambda m: problems.append(m.text) if m.type in ("error", "warning") else None)
-    page.on("pageerror", lambda e: problems.append(str(e)))
-    page.on("dialog", lambda d: problems.append(f"dialog {d.message}"))
-    page.on(
-        "request",
-        lambda r: None if r.url.startswith(("file:", "data:", "blob:")) else problems.append(r.url),
-    )
-    page.goto(html.as_uri())
-    until(page, "window.pydpendReport?.ready === true")
-    yield page
-    page.close()
-    assert problems == []
-
-
-def until(page: Page, condition: str, seconds: float = 20.0) -> None:
-    """Polls: the page's content policy forbids the driver's own waiting, which compiles text in the page."""
-    end = time.monotonic() + seconds
-    while not page.evaluate(condition):
-        assert time.monotonic() < end, f"not within {seconds} s: {condition}"
-        page.wait_for_timeout(20)
+    with open_report(browser, html) as page:
+        yield page
 
 
 def film_time(page: Page) -> float:

@@ -109,7 +109,7 @@ class RunFolder:
                 fault(
                     str(record),
                     f"cannot be read ({error})",
-                    "Use a new folder, or remove the file to do all again",
+                    "Use a new folder",
                 )
             ) from None
 

@@ -79,6 +79,7 @@ ABOUT = {
     "trials.json": "the coefficients of each recording and their mean",
     "trials.png": "the same, drawn (Fig. 20)",
     "maps.png": "angle-dependent bias of the tracking",
+    "windows.csv": "error of each predicted window, degrees",
     "prediction.json": "each recording predicted from the others",
 }
 

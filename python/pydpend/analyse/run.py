@@ -114,7 +114,21 @@ def plan(options: Options, folder: Path, digests: Digests | None = None) -> list
             decay,
             lambda into, tell, resume: stages.prediction(found, options, folder, into, tell),
         )
+    for r in found:
+        if r.kind == "film" and options.overlay:
+            _plan_overlay(r, folder / r.name, add)
     return out
+
+
+def _plan_overlay(r: Recording, here: Path, add: Callable[..., None]) -> None:
+    add(
+        f"{r.name}/overlay",
+        f"Drawing into {r.label}",
+        (f"{r.name}/track",),
+        r.name,
+        [r.digest],
+        lambda into, tell, resume: stages.overlay(r, here, into, tell),
+    )
 
 
 def _plan_recording(

@@ -101,7 +101,7 @@ def _nodes(here: Path, r: Recording) -> Nodes:
     return read_nodes(here / "nodes.parquet" if r.kind == "film" else r.path)
 
 
-def _hanging(options: Options, here: Path, into: Path) -> Any:
+def _hanging(r: Recording, options: Options, here: Path, into: Path) -> Any:
     """The ``zero`` of `angles.angles`, tracking a reference film if one is named."""
     from pydpend.analyse.recordings import kind_of
     from pydpend.nodes import read_nodes
@@ -117,7 +117,7 @@ def _hanging(options: Options, here: Path, into: Path) -> Any:
 
         # The same rig, so that the markers have the same names.
         rig = into / "zero_rig.toml"
-        rig.write_text(read_nodes(here / "nodes.parquet").rig.to_toml(), encoding="utf-8")
+        rig.write_text(_nodes(here, r).rig.to_toml(), encoding="utf-8")
         return track_film(path, rig, fps=options.fps, output=into / "zero.parquet", progress=False)
     try:
         return [math.radians(float(word)) for word in zero.split(",")]
@@ -149,7 +149,7 @@ def angles(r: Recording, options: Options, here: Path, into: Path) -> str:
         found = estimate(
             _nodes(here, r),
             method,
-            zero=_hanging(options, here, into),
+            zero=_hanging(r, options, here, into),
             link_length_m=options.link_length_m,
             gaps="stop",
             name=r.name,
@@ -258,8 +258,11 @@ def _steps(tell: Tell) -> Callable[[int, int, float], None]:
 
 def prediction(found: tuple[Recording, ...], options: Options, folder: Path, into: Path, tell: Tell) -> str:
     """Each recording predicted from a fit of the others."""
+    import numpy as np
+
     from pydpend.damping import fit_damping
     from pydpend.damping.stored import StoredFit
+    from pydpend.plots.damping import windows_columns
 
     recordings = _angles(folder, found)
     model = _model(options)
@@ -276,9 +279,60 @@ def prediction(found: tuple[Recording, ...], options: Options, folder: Path, int
             angle_maps=options.angle_maps,
         )
         stored = StoredFit.of(fitted)
-        out[one.name] = stored.predict(one, start_s=options.start_s, stop_s=options.stop_s).to_json()
+        predicted = stored.predict(one, start_s=options.start_s, stop_s=options.stop_s)
+        out[one.name] = predicted.to_json()
+        windows = windows_columns(predicted)
+        (into / one.name).mkdir()
+        np.savetxt(
+            into / one.name / "windows.csv",
+            np.column_stack(list(windows.values())),
+            fmt="%.9g",
+            delimiter=",",
+            header=",".join(windows),
+            comments="",
+        )
     _write_json(into / "prediction.json", out)
     return f"{len(out)} recordings predicted"
+
+
+MOST_PICTURES = 2000
+"""The overlay film has at most this many pictures: 67 s at 30 a second, a page below 25 MB for any recording."""
+
+PAGE_WIDTH_PX = 640
+"""Its width, unless the recording is narrower."""
+
+OVERLAY_QUALITY = 24
+"""x264's rate factor."""
+
+
+def overlay(r: Recording, here: Path, into: Path, tell: Tell) -> str:
+    """The film with what was found drawn in, for the page: ``overlay.mp4`` and the times of its pictures."""
+    from pydpend.tracking import info
+    from pydpend.tracking import overlay as draw
+
+    nodes = _nodes(here, r)
+    every = max(1, -(-nodes.frame.size // MOST_PICTURES))
+    width = min(PAGE_WIDTH_PX, nodes.rig.image_px[0])
+    drawn = draw(
+        r.path,
+        nodes,
+        into / "overlay.mp4",
+        every=every,
+        width=width - width % 2,
+        quality=OVERLAY_QUALITY,
+        progress=_share(tell),
+    )
+    film = info(into / "overlay.mp4")
+    _write_json(
+        into / "overlay.json",
+        {
+            "rate_hz": drawn.play_fps,
+            "every": every,
+            "size_px": [film["width"], film["height"]],
+            "times_s": drawn.t_s.tolist(),
+        },
+    )
+    return f"{drawn.t_s.size} pictures, one frame in {every}"
 
 
 def report(folder: Path) -> None:

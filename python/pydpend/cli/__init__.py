@@ -15,7 +15,18 @@ import sys
 
 from pydpend.errors import PydpendError
 
-COMMANDS: tuple[str, ...] = ("analyse", "angles", "calibrate", "compare", "fit", "predict", "export")
+COMMANDS: tuple[str, ...] = (
+    "analyse",
+    "angles",
+    "calibrate",
+    "compare",
+    "fit",
+    "predict",
+    "plot",
+    "animate",
+    "export",
+    "completions",
+)
 
 
 def _version() -> str:

@@ -43,10 +43,10 @@ def run(args: argparse.Namespace) -> int:
     for window, rows in result.rows.items():
         lines += [f"{window},{start:.6f},{a:.6f},{b:.6f}" for start, a, b in rows]
     (args.output / "windows.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    from pydpend.plots.damping import prediction_figure
+    from pydpend.plots.damping import windows_columns, windows_figure
     from pydpend.plots.style import save
 
-    save(prediction_figure(result), args.output / "windows.png")
+    save(windows_figure(windows_columns(result)), args.output / "windows.png")
     if args.json:
         print(json.dumps(result.to_json(), indent=1, allow_nan=False))
     else:

@@ -21,7 +21,7 @@ from pydpend.angles.increments import (
 from pydpend.angles.markers import BodyMarkers
 from pydpend.angles.table import LinkAngles
 from pydpend.errors import AnglesError, fault
-from pydpend.plots.style import COLORS, new_figure, style
+from pydpend.plots.style import COLORS, new_figure, plain, style
 
 Floats = NDArray[np.float64]
 
@@ -80,7 +80,7 @@ def angles_figure(angles: LinkAngles, title: str | None = None) -> Figure:
                 lower.plot(t, middle, color=COLORS[k], label=f"$\\sigma_{{\\phi_{k + 1}}}$")
         upper.set_ylabel("angle in deg")
         upper.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=2, borderaxespad=0)
-        upper.set_title(title if title is not None else angles.name, loc="left", fontsize=9)
+        upper.set_title(plain(title if title is not None else angles.name), loc="left", fontsize=9)
         lower.set_ylabel("$\\sigma$ in deg")
         lower.set_xlabel("time in s")
         if lower.lines:

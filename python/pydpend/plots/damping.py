@@ -3,33 +3,42 @@ maps."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from pydpend.damping import DampingFit, Maps, Prediction
+from pydpend.damping.result import EnergyCurve
 from pydpend.damping.stored import recording_suffix
+from pydpend.plots.angles import thinned
 from pydpend.plots.style import COLORS, new_figure, save, style
 from pydpend.trials import Trials
 
+Floats = NDArray[np.float64]
 
-def energy_figure(fit: DampingFit, recording: int = 0, zoom_s: float = 2.0) -> Figure:
+
+def energy_figure(energy: Mapping[str, Floats], zoom_s: float = 2.0) -> Figure:
     """Energy of the motion and the model's, with the first ``zoom_s`` seconds beside (Fig. 19).
 
-    Raises IndexError for a recording the fit does not have.
+    ``energy``: columns ``time_s``, ``energy_j``, ``model_j`` of an energy table.
     """
-    curve = fit.energy[recording]
+    t = energy["time_s"]
     with style():
         figure = new_figure(6.5, 3.0)
         whole, zoom = figure.subplots(1, 2, width_ratios=(2, 1))
-        stride = max(1, curve.t_s.size // 4000)
-        near = curve.t_s <= curve.t_s[0] + zoom_s
-        for axes, keep in ((whole, slice(None, None, stride)), (zoom, near)):
-            axes.plot(curve.t_s[keep], 1e3 * curve.energy_j[keep], color=COLORS[0], label="motion")
-            axes.plot(
-                curve.t_s[keep], 1e3 * curve.model_j[keep], "--", color=COLORS[1], label="start - losses"
-            )
+        near = t <= t[0] + zoom_s
+        for axes, keep in ((whole, slice(None)), (zoom, near)):
+            for name, line, label in (("energy_j", "-", "motion"), ("model_j", "--", "start - losses")):
+                axes.plot(
+                    *thinned(t[keep], 1e3 * energy[name][keep]),
+                    line,
+                    color=COLORS[int(name == "model_j")],
+                    label=label,
+                )
             axes.set_xlabel("time (s)")
         whole.set_ylabel("energy (mJ)")
         whole.legend()
@@ -37,55 +46,74 @@ def energy_figure(fit: DampingFit, recording: int = 0, zoom_s: float = 2.0) -> F
     return figure
 
 
-def shares_figure(fit: DampingFit) -> Figure:
-    """Fractions of the dissipated energy by law and by joint, with their standard errors."""
+def shares_figure(shares: Mapping[str, Mapping[str, Mapping[str, float]]]) -> Figure:
+    """Fractions of the dissipated energy by law and by joint, with their standard errors.
+
+    ``shares``: as in ``fit.json``, ``shares["law"]["viscous"] = {"value": .., "sigma": ..}``.
+    """
     with style():
-        figure = new_figure(6.5, 2.5)
-        for axes, group in zip(figure.subplots(1, 2), ("law", "joint"), strict=True):
-            items = fit.shares[group]
-            axes.bar(
+        figure = new_figure(6.5, 2.2)
+        for axes, group in zip(figure.subplots(1, 2, width_ratios=(3, 2)), ("law", "joint"), strict=True):
+            items = shares[group]
+            axes.barh(
                 list(items),
-                [100 * e.value for e in items.values()],
-                yerr=[100 * e.sigma for e in items.values()],
+                [100 * e["value"] for e in items.values()],
+                xerr=[100 * e["sigma"] for e in items.values()],
                 color=COLORS[: len(items)],
+                height=0.6,
+                capsize=3,
             )
-            axes.set_ylabel("share of the energy (%)")
-            axes.set_title(f"by {group}")
+            axes.invert_yaxis()
+            axes.set_xlim(left=0)
+            axes.set_xlabel(f"share of the energy by {group} (%)")
     return figure
 
 
-def trials_figure(trials: Trials) -> Figure:
-    """Each coefficient over the trials with its errors, and the mean with the spread (Fig. 20)."""
-    names = list(trials.joint.coefficients)
+def coefficients_figure(coefficients: Mapping[str, Mapping[str, Any]]) -> Figure:
+    """Each coefficient over the recordings with its errors, and the mean with its own (Fig. 20).
+
+    ``coefficients``: as in ``trials.json``: ``values``, ``sigmas``, ``unit`` and, of several recordings, ``mean`` and
+    ``sigma``.
+    """
+    columns = min(3, max(1, len(coefficients)))
+    rows = -(-len(coefficients) // columns) or 1
     with style():
-        columns = min(3, len(names))
-        rows = -(-len(names) // columns)
-        figure = new_figure(6.5, 1.7 * rows)
-        grid = figure.subplots(rows, columns, squeeze=False).ravel()
-        for axes in grid[len(names) :]:
-            axes.set_visible(False)
-        for axes, name in zip(grid, names, strict=False):
-            spread = trials.spreads.get(name)
-            if spread is None:
-                continue
-            index = np.arange(1, spread.values.size + 1)
-            axes.errorbar(index, spread.values, spread.sigmas, fmt="o", color=COLORS[0], capsize=3)
-            axes.axhspan(spread.mean - spread.sigma, spread.mean + spread.sigma, alpha=0.2, color=COLORS[1])
-            axes.axhline(spread.mean, color=COLORS[1])
-            axes.set_title(f"{name} ({spread.unit})")
-            axes.set_xticks(index)
+        figure = new_figure(6.5, 1.6 * rows)
+        for k, (name, c) in enumerate(coefficients.items()):
+            axes = figure.add_subplot(rows, columns, k + 1)
+            index = range(1, len(c["values"]) + 1)
+            axes.errorbar(index, c["values"], c["sigmas"], fmt="o", ms=3.5, color=COLORS[0], capsize=3)
+            if "mean" in c:
+                axes.axhspan(c["mean"] - c["sigma"], c["mean"] + c["sigma"], alpha=0.2, color=COLORS[1], lw=0)
+                axes.axhline(c["mean"], color=COLORS[1])
+            else:
+                axes.axhline(0, color="0.5", lw=0.8)
+            axes.set_title(f"{name} ({c['unit']})" if c["unit"] else name, fontsize=8)
+            axes.set_xticks(list(index))
+            axes.set_xlim(0.5, len(c["values"]) + 0.5)
+            axes.tick_params(labelsize=7)
     return figure
 
 
-def prediction_figure(prediction: Prediction) -> Figure:
-    """RMS of each window over the recording, per window length."""
+def windows_columns(prediction: Prediction) -> dict[str, Floats]:
+    """The windows of a prediction as columns: length and start in s, RMS of each link in degrees."""
+    rows = [(w, *r) for w, found in prediction.rows.items() for r in found]
+    table = np.array(rows, dtype=np.float64).reshape(-1, 4)
+    return dict(zip(("window_s", "start_s", "phi1_rms_deg", "phi2_rms_deg"), table.T, strict=True))
+
+
+def windows_figure(windows: Mapping[str, Floats]) -> Figure:
+    """RMS of each window over the recording, per window length; columns as in `windows_columns`."""
+    lengths = np.unique(windows["window_s"])
     with style():
-        figure = new_figure(6.5, 1.8 * len(prediction.rows))
-        grid = figure.subplots(len(prediction.rows), 1, squeeze=False, sharex=True).ravel()
-        for axes, (window, rows) in zip(grid, prediction.rows.items(), strict=True):
+        figure = new_figure(6.5, 1.8 * max(1, lengths.size))
+        grid = figure.subplots(max(1, lengths.size), 1, squeeze=False, sharex=True).ravel()
+        for axes, length in zip(grid, lengths, strict=False):
+            here = windows["window_s"] == length
             for j in range(2):
-                axes.plot(rows[:, 0], rows[:, 1 + j], ".", color=COLORS[j], label=f"phi{j + 1}")
-            axes.set_ylabel(f"RMS in {window} s (deg)")
+                rms = windows[f"phi{j + 1}_rms_deg"][here]
+                axes.plot(windows["start_s"][here], rms, ".", color=COLORS[j], label=f"phi{j + 1}")
+            axes.set_ylabel(f"RMS in {length:g} s (deg)")
             axes.set_ylim(bottom=0)
         grid[0].legend()
         grid[-1].set_xlabel("start of the window (s)")
@@ -105,12 +133,20 @@ def maps_figure(maps: Maps) -> Figure:
     return figure
 
 
+def energy_columns(curve: EnergyCurve) -> dict[str, Floats]:
+    """An energy curve as the columns of its table."""
+    return {"time_s": curve.t_s, "energy_j": curve.energy_j, "model_j": curve.model_j}
+
+
 def save_figures(fit: DampingFit, trials: Trials | None, folder: Path) -> None:
     """Writes every figure that the fit has something for as PNG into a folder."""
-    for k in range(len(fit.energy)):
-        save(energy_figure(fit, k), folder / f"energy{recording_suffix(fit, k)}.png")
-    save(shares_figure(fit), folder / "shares.png")
+    for k, curve in enumerate(fit.energy):
+        save(energy_figure(energy_columns(curve)), folder / f"energy{recording_suffix(fit, k)}.png")
+    shares = {
+        g: {k: {"value": e.value, "sigma": e.sigma} for k, e in s.items()} for g, s in fit.shares.items()
+    }
+    save(shares_figure(shares), folder / "shares.png")
     if fit.maps is not None:
         save(maps_figure(Maps.from_json(fit.maps)), folder / "maps.png")
     if trials is not None:
-        save(trials_figure(trials), folder / "trials.png")
+        save(coefficients_figure(trials.to_json()["coefficients"]), folder / "trials.png")

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from pydpend.encoder.calibration import Calibration
-from pydpend.encoder.compare import Comparison
 from pydpend.plots.angles import thinned
-from pydpend.plots.style import COLORS, new_figure, style
+from pydpend.plots.style import COLORS, new_figure, plain, style
+
+Floats = NDArray[np.float64]
 
 
 def calibration_figure(calibration: Calibration) -> Figure:
@@ -65,8 +69,33 @@ def calibration_figure(calibration: Calibration) -> Figure:
         return figure
 
 
+class Compared(Protocol):
+    """What the figure needs of a `Comparison`."""
+
+    @property
+    def link(self) -> int: ...
+    @property
+    def t_s(self) -> Floats: ...
+    @property
+    def video_rad(self) -> Floats: ...
+    @property
+    def encoder_rad(self) -> Floats: ...
+    @property
+    def video_sigma_rad(self) -> Floats: ...
+    @property
+    def residual_rad(self) -> Floats: ...
+    @property
+    def gain(self) -> float: ...
+    @property
+    def encoder_sigma_rad(self) -> float: ...
+    @property
+    def rms_rad(self) -> float: ...
+    @property
+    def offset_rad(self) -> float: ...
+
+
 def comparison_figure(
-    found: Comparison,
+    found: Compared,
     zooms: tuple[tuple[float, float], tuple[float, float]] | None = None,
     label: str | None = None,
 ) -> Figure:
@@ -78,7 +107,7 @@ def comparison_figure(
     made signal.
     """
     t = found.t_s
-    name = label if label is not None else "encoder"
+    name = plain(label) if label is not None else "encoder"
     length = float(t[-1] - t[0])
     span = min(3.0, length / 4)
     if zooms is None:

@@ -52,6 +52,11 @@ def new_figure(width_in: float = 6.5, height_in: float = 3.5) -> Figure:
     return Figure(figsize=(width_in, height_in), layout="constrained")
 
 
+def plain(text: str) -> str:
+    """A name from a user's file as matplotlib draws it letter by letter: a dollar sign begins no formula."""
+    return text.replace("$", r"\$")
+
+
 def save(figure: Figure, path: str | Path) -> None:
     """Writes PNG, SVG or PDF by the ending. The same figure gives the same bytes."""
     path = Path(path)

@@ -9,47 +9,62 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pydpend.plots.damping import coefficients_figure, shares_figure
+from pydpend.plots.folder import energy_path, read_columns
 from pydpend.plots.style import inline_svg
 from pydpend.report.page import Block, Chart, Figure, Heading, Listing, Reset, Section, Series, Table, Text
-from pydpend.report.words import with_sigma
+from pydpend.report.words import with_sigma, with_squares
+
+ZOOM_S = 2.0
+"""The first seconds of the energy stand alone too (Fig. 19)."""
+
+MEANING = {
+    "mu_v1": "viscous, upper joint",
+    "mu_v2": "viscous, lower joint",
+    "mu_q1": "air drag, upper link",
+    "mu_q2": "air drag, lower link",
+    "rmu1": "friction with the load, upper joint",
+    "rmu2": "friction with the load, lower joint",
+    "tau_c1": "constant dry torque, upper joint",
+    "tau_c2": "constant dry torque, lower joint",
+    "strip_drag": "air drag of the lower link in its own wind",
+    "lambda": "inertia of the lower link",
+    "sigma": "gravity on the upper link",
+    "kappa": "gravity on the lower link",
+    "a3": "coupling of the links",
+}
 
 
 def warnings(fit: dict[str, Any]) -> list[str]:
     """What a reader must know before the numbers."""
-    out = list(fit.get("notes", []))
     if fit["status"] != "converged":
-        out.insert(0, f"The damping fit did not converge: {fit['message']}")
-    return out
+        return [f"The damping fit did not converge: {fit['message']}"]
+    return [f"Damping: {fit['message']}"] if "beyond the noise" in fit["message"] else []
 
 
 def answer(fit: dict[str, Any]) -> Table:
     """Coefficients and shares with their uncertainties."""
-    rows = [(name, with_sigma(c["value"], c["sigma"]), c["unit"]) for name, c in fit["coefficients"].items()]
-    rows += [
-        (
-            f"{name}/psi",
-            with_sigma(value, fit.get("ratio_sigmas", {}).get(name)),
-            "s^-2" if name in "sigma kappa" else "",
-        )
-        for name, value in fit["ratios"].items()
-    ]
+    rows = []
+
+    def add(meaning: str, name: str, value: float | None, sigma: float | None, unit: str) -> None:
+        rows.append((meaning, name, f"{with_sigma(value, sigma)} {with_squares(unit)}".strip()))
+
+    for name, c in fit["coefficients"].items():
+        add(MEANING.get(name, ""), name, c["value"], c["sigma"], c["unit"])
+    for name, value in fit["ratios"].items():
+        unit = "1/s2" if name in ("sigma", "kappa") else ""
+        add(MEANING.get(name, ""), f"{name}/psi", value, fit.get("ratio_sigmas", {}).get(name), unit)
     for group in ("law", "joint"):
         for name, c in fit["shares"].get(group, {}).items():
-            percent = with_sigma(*(None if c[k] is None else 100 * c[k] for k in ("value", "sigma")))
-            rows.append((f"energy taken by {group} {name}", percent, "%"))
-    return Table(("quantity", "value", "unit"), tuple(rows), numbers=frozenset({1}))
-
-
-def _csv(path: Path) -> dict[str, NDArray[np.float64]]:
-    with path.open(encoding="utf-8") as f:
-        names = f.readline().strip().split(",")
-        values = np.loadtxt(f, delimiter=",", ndmin=2)
-    return {n: values[:, i] for i, n in enumerate(names)}
+            value, sigma = (None if c[k] is None else 100 * c[k] for k in ("value", "sigma"))
+            add("share of the energy lost", f"{group} {name}", value, sigma, "%")
+    return Table(("meaning", "quantity", "value"), tuple(rows), numbers=frozenset({2}))
 
 
 def _energy(path: Path, group: str, title: str) -> list[Block]:
-    c = _csv(path)
+    c = read_columns(path)
     t, energy, model = c["time_s"], c["energy_j"], c["model_j"]
+    near = t <= t[0] + ZOOM_S
     laws = [n for n in c if n.endswith("_j") and n not in ("energy_j", "model_j")]
     return [
         Chart(
@@ -57,9 +72,24 @@ def _energy(path: Path, group: str, title: str) -> list[Block]:
             f"Energy{title}",
             group,
             t,
-            (Series("of the motion (J)", energy, 0), Series("start minus all losses (J)", model, 1)),
+            (
+                Series("of the motion (J)", energy, 0),
+                Series("start minus all losses (J)", model, 1, dashed=True),
+            ),
             y_label="energy (J)",
             height=280,
+        ),
+        Chart(
+            f"{group}-zoom",
+            f"Its first {ZOOM_S:g} s",
+            f"{group}-zoom",
+            t[near],
+            (
+                Series("of the motion (J)", energy[near], 0),
+                Series("start minus all losses (J)", model[near], 1, dashed=True),
+            ),
+            y_label="energy (J)",
+            height=200,
         ),
         Chart(
             f"{group}-residual",
@@ -75,7 +105,7 @@ def _energy(path: Path, group: str, title: str) -> list[Block]:
             "Energy taken out by each law",
             group,
             t,
-            tuple(Series(n.removesuffix("_j"), c[n], i) for i, n in enumerate(laws)),
+            tuple(Series(n.removesuffix("_j"), c[n], i % 6, dashed=i >= 6) for i, n in enumerate(laws)),
             y_label="energy (J)",
         ),
         Reset(group),
@@ -85,10 +115,15 @@ def _energy(path: Path, group: str, title: str) -> list[Block]:
 def sections(folder: Path, fit: dict[str, Any], prediction: dict[str, Any] | None) -> list[Section]:
     """Energy, identifiability, trials and prediction."""
     blocks: list[Block] = [Text(fit["message"])]
+    blocks += [Listing(tuple(fit["notes"]))] if fit.get("notes") else []
+    blocks.append(
+        Figure(
+            inline_svg(shares_figure(fit["shares"])), "Where the energy goes, with standard uncertainties."
+        )
+    )
     names = [i.get("name", f"recording {k + 1}") for k, i in enumerate(fit["inputs"])]
     for k, name in enumerate(names):
-        suffix = "" if len(names) == 1 else f"-{k + 1}"
-        path = folder / "fit" / f"energy{suffix}.csv"
+        path = energy_path(folder, k)
         if path.exists():
             blocks += _energy(path, f"e{k}", f" of {name}" if len(names) > 1 else "")
     out = [Section("damping", "Damping", tuple(blocks))]
@@ -113,20 +148,18 @@ def sections(folder: Path, fit: dict[str, Any], prediction: dict[str, Any] | Non
             )
         )
     if prediction:
-        out.append(Section("prediction", "Prediction", tuple(_prediction(prediction))))
+        out.append(Section("prediction", "Prediction", tuple(_prediction(folder, prediction))))
     return out
 
 
 def _trials(trials: dict[str, Any]) -> list[Block]:
-    from pydpend.plots.report import trials_overview
-
     rows = tuple(
         (
             name,
             *(with_sigma(v, s) for v, s in zip(c["values"], c["sigmas"], strict=True)),
             with_sigma(c["mean"], c["sigma"]),
             "–" if c["p_value"] is None else f"{c['p_value']:.2g}",
-            c["unit"],
+            with_squares(c["unit"]),
         )
         for name, c in trials["coefficients"].items()
     )
@@ -135,20 +168,20 @@ def _trials(trials: dict[str, Any]) -> list[Block]:
     return [
         Text(trials["message"]),
         Figure(
-            inline_svg(trials_overview(trials)),
+            inline_svg(coefficients_figure(trials["coefficients"])),
             "Each coefficient over the recordings, with standard uncertainties.",
         ),
         Table(header, rows, numbers=frozenset(range(1, count + 3))),
     ]
 
 
-def _prediction(prediction: dict[str, Any]) -> list[Block]:
+def _prediction(folder: Path, prediction: dict[str, Any]) -> list[Block]:
     blocks: list[Block] = [
         Text(
             "Each recording predicted from a fit of the others; only the state at each window's start was fitted."
         )
     ]
-    for name, p in prediction.items():
+    for k, (name, p) in enumerate(prediction.items()):
         rows = tuple(
             (
                 kind.replace("_", " "),
@@ -163,9 +196,42 @@ def _prediction(prediction: dict[str, Any]) -> list[Block]:
         blocks += [
             Heading(name),
             Table(
-                ("", "window", "RMS phi1 (deg)", "RMS phi2 (deg)", "median phi1", "median phi2", "windows"),
+                (
+                    "kind",
+                    "window",
+                    "RMS phi1 (deg)",
+                    "RMS phi2 (deg)",
+                    "median phi1",
+                    "median phi2",
+                    "windows",
+                ),
                 rows,
                 numbers=frozenset({2, 3, 4, 5, 6}),
             ),
+            *_windows(read_columns(folder / name / "windows.csv"), f"w{k}"),
         ]
     return blocks
+
+
+def _windows(c: dict[str, NDArray[np.float64]], group: str) -> list[Block]:
+    """The error of each window over the recording, a chart for each length."""
+    out: list[Block] = []
+    for n, length in enumerate(np.unique(c["window_s"])):
+        here = c["window_s"] == length
+        rms = tuple(
+            Series(f"phi{j + 1} (deg)", c[f"phi{j + 1}_rms_deg"][here], j, points=True) for j in range(2)
+        )
+        title = f"RMS error of each window of {length:g} s"
+        out.append(
+            Chart(
+                f"{group}-{n}",
+                title,
+                group,
+                c["start_s"][here],
+                rms,
+                "start of the window (s)",
+                "RMS (deg)",
+                180,
+            )
+        )
+    return [*out, Reset(group)]

@@ -102,13 +102,18 @@ class Film:
 
 @dataclass(frozen=True)
 class Series:
-    """One curve. ``band`` (i, j): fill between the series i and j places before this one (0 is itself)."""
+    """One curve. ``band`` (i, j): fill between the series i and j places before this one (0 is itself).
+
+    ``edge``: no line, because it only bounds a band.
+    """
 
     label: str
     y: NDArray[np.float64]
     color: int | None = 0
     points: bool = False
     band: tuple[int, int] | None = None
+    dashed: bool = False
+    edge: bool = False
 
 
 @dataclass(frozen=True)
@@ -220,8 +225,9 @@ def _chart_data(chart: Chart | StatusMap, arrays: _Arrays) -> dict[str, Any]:
         entry: dict[str, Any] = {"label": s.label, "y": arrays.add(s.y)}
         if s.color is not None:
             entry["color"] = s.color
-        if s.points:
-            entry["points"] = True
+        for key in ("points", "dashed", "edge"):
+            if getattr(s, key):
+                entry[key] = True
         if s.band is not None:
             entry["band"] = [-s.band[0], -s.band[1]]
         series.append(entry)

@@ -61,7 +61,7 @@ class Part:
                 mp4,
                 np.asarray(about["times_s"], dtype=np.float64),
                 float(about["rate_hz"]),
-                f"{self.label} with nodes and bodies drawn in; {shown}. The plots below follow it.",
+                f"{self.label} with nodes and bodies drawn in; {shown}. The plots follow it.",
             )
         ]
 
@@ -119,7 +119,7 @@ class Part:
         known = bool(np.isfinite(residual).any())
         full = float(np.nanpercentile(residual, 99.9)) if known else 1.0
         told = (
-            f"The black curve in each row is the distance of the marker from its place in its body's shape; the row "
+            f"The curve in each row is the distance of the marker from its place in its body's shape; the row "
             f"is {full:.2g} px high, larger ones are cut off."
             if known
             else "No body shows two markers at once, so there is no shape to compare them with."
@@ -189,21 +189,22 @@ class Part:
         if self.compared is not None:
             t = self.compared["time_s"]
             both = (
-                Series("film (deg)", np.degrees(self.compared["video_rad"]), 0),
                 Series("encoder (deg)", np.degrees(self.compared["encoder_rad"]), 1),
+                Series("film (deg)", np.degrees(self.compared["video_rad"]), 0),
             )
-            sigma = np.full(t.size, math.degrees(c["stated_sigma_rad"]["encoder"] or math.nan))
+            stated = [v for v in c["stated_sigma_rad"].values() if v is not None]
+            sigma = np.full(t.size, math.degrees(math.hypot(*stated)) if stated else math.nan)
             left = np.degrees(self.compared["residual_rad"])
             blocks += [
                 Chart(f"{id_}-both", "Film and encoder, phi1", id_, t, both, y_label="phi1 (deg)"),
                 Chart(
                     f"{id_}-difference",
-                    "Film minus encoder; the band is the encoder's stated standard uncertainty",
+                    "Film minus encoder; the band is ± the stated standard uncertainty of both",
                     id_,
                     t,
                     (
-                        Series("+ sigma", sigma, 1),
-                        Series("- sigma", -sigma, 1, band=(1, 0)),
+                        Series("+ sigma", sigma, 1, edge=True),
+                        Series("- sigma", -sigma, 1, band=(1, 0), edge=True),
                         Series("difference (deg)", left, 0),
                     ),
                     y_label="difference (deg)",
@@ -283,7 +284,7 @@ def read(folder: Path, facts: dict[str, Any], stages: set[str]) -> Part:
         part.warnings += [f"{part.label}: {note}" for note in part.comparison["notes"]]
         rows.append(("film against encoder, RMS", f"{part.comparison['rms_deg']:.4f} deg"))
     if rows:
-        part.answer = Table(("", "value"), tuple(rows), numbers=frozenset({1}))
+        part.answer = Table(("property", "value"), tuple(rows), numbers=frozenset({1}))
     return part
 
 

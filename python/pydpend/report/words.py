@@ -17,4 +17,10 @@ def with_sigma(value: float | None, sigma: float | None) -> str:
     digits = max(0, exponent + 1 - int(np.floor(np.log10(sigma))))
     scale = 10.0**exponent
     text = f"{value / scale:.{digits}f} ± {sigma / scale:.{digits}f}"
-    return text if exponent == 0 else f"({text}) × 10^{exponent}"
+    raised = str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+    return text if exponent == 0 else f"({text}) × 10{raised}"
+
+
+def with_squares(unit: str) -> str:
+    """``N m s2`` as ``N m s²``."""
+    return unit.replace("s2", "s²")

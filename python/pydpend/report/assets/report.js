@@ -112,9 +112,9 @@
     for (const s of spec.series) {
       const stroke = s.color === undefined ? "transparent" : css(`--s${s.color % 6}`);
       series.push({
-        label: s.label, stroke: s.band ? "transparent" : stroke, width: s.points ? 0 : 1.25,
+        label: s.label, stroke: s.edge ? "transparent" : stroke, width: s.points ? 0 : 1.25,
         points: s.points ? { show: true, size: 4, fill: stroke, stroke } : { show: false },
-        value: (u, v) => (v == null ? "–" : v.toPrecision(6)), scale: "y", spanGaps: false, dash: s.dash,
+        value: (u, v) => (v == null ? "–" : v.toPrecision(6)), scale: "y", spanGaps: false, dash: s.dashed ? [6, 4] : undefined,
       });
       if (s.band) bands.push({ series: [series.length - 1 + s.band[0], series.length - 1 + s.band[1]], fill: stroke + "40" });
     }

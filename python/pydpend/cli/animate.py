@@ -1,0 +1,74 @@
+"""Films a recording beside the simulation of the pendulum that was fitted to it.
+
+Left the film with what was found (or its angles as links, where there is no film), right the motion of the fitted
+equations from the recording's own state at --start, below the angles of both. A double pendulum is chaotic: the two
+part after some seconds however good the fit.
+
+  pydpend animate run/ -o beside.mp4
+  pydpend animate run/ --start 1.5 --length 2 --speed 0.1 -o beside.gif
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+
+HELP = "film of a recording beside its simulation"
+
+
+def add_arguments(p: argparse.ArgumentParser) -> None:
+    """The command's arguments."""
+    p.add_argument("run_folder", metavar="RUN", help="a folder made by pydpend analyse, with a damping fit")
+    p.add_argument("-o", "--output", required=True, metavar="FILM", help=".mp4 or .gif")
+    p.add_argument("--recording", metavar="NAME", help="which recording, where there are several")
+    p.add_argument("--start", type=float, metavar="S", help="start of the simulation, s (default: the fit's)")
+    p.add_argument("--length", type=float, default=4.0, metavar="S", help="its length, s (default 4)")
+    p.add_argument("--speed", type=float, default=0.2, help="film time over real time (default 0.2, slowed)")
+    p.add_argument("--fps", type=float, default=25.0, help="pictures a second (default 25)")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Simulates and films."""
+    import numpy as np
+
+    from pydpend.angles import read_angles
+    from pydpend.damping.stored import load_fit
+    from pydpend.errors import ArgumentError, fault
+    from pydpend.model import Damping
+    from pydpend.plots.beside import Pictures, beside
+    from pydpend.plots.folder import chosen
+    from pydpend.simulate import simulate
+    from pydpend.states import states
+
+    r = chosen(args.run_folder, args.recording)
+    stored = load_fit(r.run / "fit")
+    model = stored.model()
+    angles = read_angles(r.here / "angles.parquet", name=r.facts["label"])
+    fit = json.loads((r.run / "fit" / "fit.json").read_text("utf-8"))
+    start = fit["inputs"][r.index].get("start_s", angles.t_s[0]) if args.start is None else args.start
+    if not angles.t_s[0] <= start < angles.t_s[-1]:
+        raise ArgumentError(
+            fault(
+                "--start",
+                f"{start:g} s is not in the recording",
+                f"It goes from {angles.t_s[0]:g} to {angles.t_s[-1]:g} s",
+            )
+        )
+    if not args.length > 0:
+        raise ArgumentError(fault("--length", f"{args.length:g} s is not above 0"))
+    # The smoother needs no more than the surroundings of the start.
+    state = states(angles.between(start - 1.0, start + 1.0))
+    row = int(np.argmin(np.abs(state.t_s - start)))
+    until = min(float(angles.t_s[-1]), start + args.length)
+    times = np.arange(float(state.t_s[row]), until, 1e-3)
+    damping = Damping(**{k: c["value"] for k, c in fit["coefficients"].items()})
+    motion = simulate(model, damping, [*state.phi_rad[row], *state.w_rad_s[row]], times)
+    pictures = None
+    about = r.here / "overlay.json"
+    if about.exists():
+        shown = json.loads(about.read_text("utf-8"))
+        width, height = shown["size_px"]
+        pictures = Pictures(r.here / "overlay.mp4", (width, height), np.array(shown["times_s"]))
+    count = beside(angles, motion, model, args.output, pictures=pictures, fps=args.fps, speed=args.speed)
+    print(f"{count} pictures from {times[0]:.3f} to {times[-1]:.3f} s; written to {args.output}")
+    return 0

@@ -1,0 +1,46 @@
+"""Draws one figure of a run folder alone, as PNG, SVG or PDF.
+
+pydpend plot energy run/ -o energy.pdf
+pydpend plot angles both/ --recording trial1 -o angles.svg
+"""
+
+from __future__ import annotations
+
+import argparse
+
+HELP = "one figure of a run folder as PNG, SVG or PDF"
+
+
+def add_arguments(p: argparse.ArgumentParser) -> None:
+    """The command's arguments."""
+    p.add_argument("figure", choices=FIGURES, metavar="FIGURE", help=", ".join(FIGURES))
+    p.add_argument("run_folder", metavar="RUN", help="a folder made by pydpend analyse")
+    p.add_argument("-o", "--output", required=True, metavar="FILE", help=".png, .svg or .pdf")
+    p.add_argument("--recording", metavar="NAME", help="which recording, where there are several")
+
+
+FIGURES = (
+    "nodes",
+    "angles",
+    "calibration",
+    "comparison",
+    "energy",
+    "coefficients",
+    "shares",
+    "prediction",
+    "maps",
+)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Draws it."""
+    from pydpend.errors import ArgumentError, fault
+    from pydpend.plots.folder import figure_of
+    from pydpend.plots.style import save
+
+    figure = figure_of(args.figure, args.run_folder, args.recording)
+    try:
+        save(figure, args.output)
+    except OSError as error:
+        raise ArgumentError(fault(f"-o {args.output}", f"cannot be written ({error.strerror})")) from None
+    return 0
