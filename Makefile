@@ -5,7 +5,7 @@ PY := .venv/bin/python
 EXTENSION := python/pydpend/_tracker.abi3.so
 CARGO_FLAGS := --release --workspace --locked
 
-.PHONY: help demo test build check format bench validate fixtures clean
+.PHONY: help demo screenshot test build check format bench validate fixtures clean
 help:
 	@echo "make demo      set up, build, and go from the bundled film to out/demo/report.html"
 	@echo "make test      set up, build, and run every test, Rust and Python"
@@ -13,6 +13,7 @@ help:
 	@echo "make validate  the long accuracy sweeps, into docs/validation.md's tables (about an hour)"
 	@echo "make bench     the speed figures (criterion), and the ratios beside them"
 	@echo "make fixtures  make the bundled recordings again from their seeds"
+	@echo "make screenshot  the README's picture, from the demo's report"
 	@echo "make format    rustfmt and ruff"
 
 .make/system: tools/system-packages.txt tools/system-packages.sh
@@ -33,6 +34,9 @@ build: .make/system .make/venv
 
 demo: build
 	@$(PY) tools/demo.py
+
+screenshot: demo
+	@$(PY) tools/screenshot.py
 
 test: build
 	cargo test $(CARGO_FLAGS)

@@ -8,7 +8,8 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from pydpend.errors import PydpendError, fault
+from pydpend.coefficients import coefficients
+from pydpend.errors import FitError, PydpendError, fault
 
 
 class OptionsError(PydpendError):
@@ -64,12 +65,55 @@ class Options:
             raise OptionsError(
                 fault("--method", f"{self.method!r} is not known", "Give trajectory or energy")
             )
+        if self.estimator not in ("rigid", "linkage", "pairwise"):
+            raise OptionsError(
+                fault("--estimator", f"{self.estimator!r} is not known", "Give rigid, linkage or pairwise")
+            )
+        try:
+            coefficients(self.laws)
+        except FitError as error:
+            raise OptionsError(f"--{error}") from None
+        if self.columns is not None and any(
+            not (ours.strip() and theirs.strip())
+            for ours, _, theirs in (word.partition("=") for word in self.columns.split(","))
+        ):
+            raise OptionsError(
+                fault(
+                    "--columns", f"{self.columns!r} is not OURS=THEIRS,...", "Write time_s=t,phi1_rad=theta1"
+                )
+            )
         if self.fps is not None and not self.fps > 0:
             raise OptionsError(fault("--fps", f"{self.fps} is not above 0"))
         if self.threads is not None and self.threads < 1:
             raise OptionsError(fault("--threads", f"{self.threads} is below 1"))
         if self.start_s is not None and self.stop_s is not None and not self.start_s < self.stop_s:
             raise OptionsError(fault("--start", f"{self.start_s} s is not before --stop, {self.stop_s} s"))
+
+
+def check_files(options: Options) -> None:
+    """Whether the files that options name are there. Raises OptionsError, naming the flag, before anything is done."""
+    for field in ("rig", "encoder", "calibration"):
+        name = getattr(options, field)
+        if name is not None and not Path(name).exists():
+            raise OptionsError(fault(f"{flag_of(field)} {name}", "there is no such file", "Check the name"))
+    if options.model not in ("derived", "published") and not Path(options.model).is_file():
+        raise OptionsError(
+            fault(
+                f"--model {options.model}", "there is no such file", "Give derived, published or a TOML file"
+            )
+        )
+    zero = options.zero
+    if zero not in ("rest", "reference_frame") and not Path(zero).exists():
+        try:
+            [float(word) for word in zero.split(",")]
+        except ValueError:
+            raise OptionsError(
+                fault(
+                    f"--zero {zero}",
+                    "is no file and no degrees",
+                    "Give rest, reference_frame, 180,180, or a film or node table",
+                )
+            ) from None
 
 
 def flag_of(field: str) -> str:

@@ -115,6 +115,7 @@ def readme(run: RunFolder) -> str:
         lines.append(f"{name}: {done['message']}")
         lines += [f"  {file:32} {about(file)}".rstrip() for file in done["files"]]
     lines += [f"{name}: not done: {why}" for name, why in facts.get("not_done", {}).items()]
+    lines += [f"{name}: does not apply: {why}" for name, why in facts.get("does_not_apply", {}).items()]
     lines += [
         "",
         "Angles are in rad, counter-clockwise positive, zero hanging down; other units are in the names.",

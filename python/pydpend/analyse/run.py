@@ -16,13 +16,17 @@ from typing import Any
 
 from pydpend.analyse import provenance, stages
 from pydpend.analyse.folder import UNFINISHED, Digests, RunFolder, digest, write_whole
-from pydpend.analyse.options import Options
+from pydpend.analyse.options import Options, check_files
 from pydpend.analyse.recordings import Recording, recordings
 from pydpend.errors import PydpendError
 
 Progress = Callable[[int, int, str, str], None]
 """Called as ``progress(stage number from 1, stages, title, what)``, ``what`` being ``start``, how far it is
-(``40 %``), ``kept``, ``done`` or ``not done: why``."""
+(``40 %``), ``kept``, ``done``, ``not done: why`` or ``does not apply: why``."""
+
+
+LEFT_OUT = ("not done", "does not apply")
+"""How what is said of a stage that gave nothing begins."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +55,7 @@ class Outcome:
     status: str
     message: str
     stages: dict[str, str]
-    """For each stage ``done``, ``kept`` or ``not done: why``."""
+    """For each stage ``done``, ``kept``, ``not done: why`` or ``does not apply: why``."""
     seconds: dict[str, float]
     """How long each stage took when it was done, the report included."""
 
@@ -69,6 +73,7 @@ class Outcome:
 
 def plan(options: Options, folder: Path, digests: Digests | None = None) -> list[Stage]:
     """The stages that these options ask for, in order. Reads the inputs' bytes to know them again, no more."""
+    check_files(options)
     known = Digests() if digests is None else digests
     found = recordings(options, known)
     out: list[Stage] = []
@@ -209,9 +214,10 @@ def analyse(options: Options, folder: str | Path, progress: Progress | None = No
     of = len(todo) + 1
     tell = progress or (lambda number, of, title, what: None)
     for number, stage in enumerate(todo, 1):
-        failed = [n for n in stage.needs if said[n].startswith("not done")]
+        failed = [n for n in stage.needs if said[n].startswith(LEFT_OUT)]
         if failed and len(failed) == len(stage.needs):
-            said[stage.name] = f"not done: it needs {' and '.join(failed)}"
+            how = "does not apply" if all(said[n].startswith(LEFT_OUT[1]) for n in failed) else "not done"
+            said[stage.name] = f"{how}: it needs {' and '.join(failed)}"
             run.stages.pop(stage.name, None)
         elif run.holds(stage.name, stage.key):
             said[stage.name] = "kept"
@@ -219,9 +225,8 @@ def analyse(options: Options, folder: str | Path, progress: Progress | None = No
             tell(number, of, stage.title, "start")
             said[stage.name] = _do(run, stage, partial(tell, number, of, stage.title))
         tell(number, of, stage.title, said[stage.name])
-    run.facts["not_done"] = {
-        n: s.removeprefix("not done: ") for n, s in said.items() if s.startswith("not done")
-    }
+    for key, how in zip(("not_done", "does_not_apply"), LEFT_OUT, strict=True):
+        run.facts[key] = {n: s.removeprefix(f"{how}: ") for n, s in said.items() if s.startswith(how)}
     run.save()
     tell(of, of, "Report", "start")
     begun = time.monotonic()
@@ -250,6 +255,9 @@ def _do(run: RunFolder, stage: Stage, tell: stages.Tell) -> str:
     begun = time.monotonic()
     try:
         message = stage.action(work, tell, resume)
+    except stages.DoesNotApply as reason:
+        run.stages.pop(stage.name, None)
+        return f"does not apply: {reason}"
     except PydpendError as error:
         run.stages.pop(stage.name, None)
         if stage.name.endswith("/track"):

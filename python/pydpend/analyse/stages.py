@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from pydpend.analyse.folder import write_whole
 from pydpend.analyse.options import Options
-from pydpend.errors import PydpendError, fault
+from pydpend.errors import PydpendError
 
 if TYPE_CHECKING:
     from pydpend.analyse.recordings import Recording
@@ -24,6 +24,10 @@ if TYPE_CHECKING:
 
 Tell = Callable[[str], None]
 """Called with how far a stage is, in words."""
+
+
+class DoesNotApply(PydpendError):
+    """A stage that has no meaning for these recordings; nothing is wrong with them."""
 
 
 def version() -> str:
@@ -119,16 +123,7 @@ def _hanging(r: Recording, options: Options, here: Path, into: Path) -> Any:
         rig = into / "zero_rig.toml"
         rig.write_text(_nodes(here, r).rig.to_toml(), encoding="utf-8")
         return track_film(path, rig, fps=options.fps, output=into / "zero.parquet", progress=False)
-    try:
-        return [math.radians(float(word)) for word in zero.split(",")]
-    except ValueError:
-        raise PydpendError(
-            fault(
-                "--zero",
-                f"{zero!r} is no file and no degrees",
-                "Give rest, reference_frame, 180,180 or a film",
-            )
-        ) from None
+    return [math.radians(float(word)) for word in zero.split(",")]
 
 
 def angles(r: Recording, options: Options, here: Path, into: Path) -> str:
@@ -146,8 +141,11 @@ def angles(r: Recording, options: Options, here: Path, into: Path) -> str:
         )
     else:
         method: Any = options.estimator
+        nodes = _nodes(here, r)
+        if all(nodes.rig.indices(body).size < 2 for body in nodes.rig.bodies):
+            raise DoesNotApply("no body has two markers, so there is no link and no angle")
         found = estimate(
-            _nodes(here, r),
+            nodes,
             method,
             zero=_hanging(r, options, here, into),
             link_length_m=options.link_length_m,
@@ -227,6 +225,8 @@ def fit(found: tuple[Recording, ...], options: Options, folder: Path, into: Path
     from pydpend.trials import summary
 
     recordings = _angles(folder, found)
+    if any(a.links < 2 for a in recordings):
+        raise DoesNotApply("the fit is of a double pendulum, and a recording has one link")
     with warnings.catch_warnings():
         # What is wrong with published constants is said by the fit itself, with numbers.
         warnings.simplefilter("ignore")
@@ -265,6 +265,8 @@ def prediction(found: tuple[Recording, ...], options: Options, folder: Path, int
     from pydpend.plots.damping import windows_columns
 
     recordings = _angles(folder, found)
+    if any(a.links < 2 for a in recordings):
+        raise DoesNotApply("the fit is of a double pendulum, and a recording has one link")
     model = _model(options)
     out = {}
     for i, one in enumerate(recordings):

@@ -93,7 +93,7 @@ def teller() -> Callable[[int, int, str, str], None]:
         if what == "start":
             begun = time.monotonic()
             print(f"{head} ...", end="\r" if moving else "\n", file=sys.stderr, flush=True)
-        elif what in ("done", "kept") or what.startswith("not done"):
+        elif what in ("done", "kept") or what.startswith(("not done", "does not apply")):
             wipe = "\x1b[K" if moving else ""
             took = f" ({time.monotonic() - begun:.1f} s)" if what == "done" else ""
             print(f"{wipe}{head}: {what}{took}", file=sys.stderr, flush=True)

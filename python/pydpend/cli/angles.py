@@ -2,6 +2,9 @@
 
 Angles are counter-clockwise positive, zero hanging down, counted over turns. The table written is Parquet
 or CSV by the ending of OUT.
+
+  pydpend angles drop.parquet -o angles.parquet --figure angles.pdf
+  pydpend angles drop.parquet --zero hanging.parquet --link-length-m 0.1719 -o angles.csv
 """
 
 from __future__ import annotations

@@ -2,6 +2,9 @@
 
 HOLDS are one recording per angle, a folder of them, or one table with a column angle_deg. The angles are
 given with --angles-deg in the files' order, or stand in the files' names (hold_-360deg.csv).
+
+  pydpend calibrate holds/ -o encoder.json --figure calibration.png
+  pydpend calibrate h0.csv h1.csv h2.csv --angles-deg=-360,0,360 -o encoder.json
 """
 
 from __future__ import annotations

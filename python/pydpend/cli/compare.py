@@ -2,6 +2,9 @@
 
 Finds the offset and drift of the two clocks (or takes them as one), then gain, zero, residuals and whose
 noise explains them. DIR gets compare.json, residuals.parquet and the figures.
+
+  pydpend compare angles.parquet drop.csv --calibration encoder.json -o compared/
+  pydpend compare angles.parquet drop.tdms --calibration holds/ --clocks given -o compared/
 """
 
 from __future__ import annotations

@@ -1,8 +1,10 @@
 """Prints completions for a shell.
 
-pydpend completions bash > ~/.local/share/bash-completion/completions/pydpend
-pydpend completions zsh  > ~/.zfunc/_pydpend
-pydpend completions fish > ~/.config/fish/completions/pydpend.fish
+Where each shell looks for them:
+
+  pydpend completions bash > ~/.local/share/bash-completion/completions/pydpend
+  pydpend completions zsh > ~/.zfunc/_pydpend
+  pydpend completions fish > ~/.config/fish/completions/pydpend.fish
 """
 
 from __future__ import annotations

@@ -1,6 +1,9 @@
 """Write a node table in the form of another program.
 
 By the ending of the output: .c3d and .trc (biomechanics), .csv (DLTdv's xypts), .mat (MATLAB).
+
+  pydpend export drop.parquet -o drop.c3d --px-per-m 930
+  pydpend export drop.parquet -o drop.mat
 """
 
 from __future__ import annotations

@@ -1,7 +1,9 @@
 """Draws one figure of a run folder alone, as PNG, SVG or PDF.
 
-pydpend plot energy run/ -o energy.pdf
-pydpend plot angles both/ --recording trial1 -o angles.svg
+It is drawn from the files of the folder; the report's page is not needed.
+
+  pydpend plot energy run/ -o energy.pdf
+  pydpend plot angles both/ --recording trial1 -o angles.svg
 """
 
 from __future__ import annotations

@@ -1,6 +1,9 @@
 """How well a fit predicts a recording: only the initial state of each window and the angle zeros are fitted.
 
 Writes predict.json, windows.csv and a figure into DIR.
+
+  pydpend predict trial3.parquet --fit damping/ -o predicted/
+  pydpend predict trial3.parquet --fit damping/ --windows 0.25,1 --json -o predicted/
 """
 
 from __future__ import annotations

@@ -62,6 +62,7 @@ def shares_figure(shares: Mapping[str, Mapping[str, Mapping[str, float]]]) -> Fi
                 color=COLORS[: len(items)],
                 height=0.6,
                 capsize=3,
+                ecolor="0.5",
             )
             axes.invert_yaxis()
             axes.set_xlim(left=0)
@@ -88,7 +89,7 @@ def coefficients_figure(coefficients: Mapping[str, Mapping[str, Any]]) -> Figure
                 axes.axhline(c["mean"], color=COLORS[1])
             else:
                 axes.axhline(0, color="0.5", lw=0.8)
-            axes.set_title(f"{name} ({c['unit']})" if c["unit"] else name, fontsize=8)
+            axes.set_title(f"{name} ({c['unit']})" if c["unit"] else name, fontsize=8, loc="right")
             axes.set_xticks(list(index))
             axes.set_xlim(0.5, len(c["values"]) + 0.5)
             axes.tick_params(labelsize=7)

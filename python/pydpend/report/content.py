@@ -42,6 +42,10 @@ def report_page(folder: str | Path) -> Page:
         parts += damping.sections(path, fit, prediction)
     if not answer:
         answer = [Text("No stage gave a result; the warnings say why.")]
+    apart = facts.get("does_not_apply", {})
+    if apart:
+        answer.append(Heading("What does not apply"))
+        answer.append(Listing(tuple(f"{name}: {why}" for name, why in apart.items())))
     names = ", ".join(r["label"] for r in found) or path.name
     return Page(
         title=f"Analysis of {names}",
@@ -50,17 +54,23 @@ def report_page(folder: str | Path) -> Page:
         sections=(
             Section("answer", "Results", tuple(answer)),
             *parts,
-            Section("reproduce", "Reproduce and cite", tuple(_reproduce(facts, found))),
+            Section("reproduce", "Reproduce and cite", tuple(_reproduce(facts, run["stages"]))),
         ),
     )
 
 
-def _reproduce(facts: dict[str, Any], found: list[dict[str, Any]]) -> list[Block]:
-    rows = tuple((r["label"], r["kind"], r["digest"][:16]) for r in found)
+def _reproduce(facts: dict[str, Any], stages: dict[str, dict[str, Any]]) -> list[Block]:
+    rows = tuple((i["path"], i["given_as"], i["sha256"]) for i in facts.get("inputs", ()))
     return [
         Text("This page was made by"),
         Code(facts.get("command", "")),
-        Table(("input", "read as", "SHA-256 (first 16)"), rows),
+        Table(("file", "given as", "SHA-256"), rows),
+        Table(("program", "version"), tuple(facts.get("versions", {}).items())),
+        Table(
+            ("stage", "what came of it", "took (s)"),
+            tuple((name, done["message"], f"{done['seconds']:.1f}") for name, done in stages.items()),
+            numbers=frozenset({2}),
+        ),
         Text(
             "Every number, table and option is in the folder beside this page; README.txt there lists them."
         ),

@@ -16,6 +16,9 @@ from pydpend.nodes import Nodes, read_nodes
 from pydpend.report.page import Block, Chart, Figure, Film, Reset, Section, Series, StatusMap, Table, Text
 from pydpend.report.words import with_sigma
 
+MOST_PLACES = 6
+"""Curves of places in one chart."""
+
 
 @dataclass
 class Part:
@@ -40,8 +43,9 @@ class Part:
         out: list[Section] = []
         if self.angles is not None:
             out.append(Section(f"{id_}-angles", f"Angles{end}", tuple(self._angle_blocks(id_))))
-        elif self.film is not None:
-            out.append(Section(f"{id_}-film", f"Film{end}", tuple(self._film_blocks(id_))))
+        elif self.nodes is not None:
+            blocks = (*self._film_blocks(id_), *self._place_blocks(id_))
+            out.append(Section(f"{id_}-places", f"Places{end}", blocks))
         if self.nodes is not None:
             out.append(Section(f"{id_}-nodes", f"Markers{end}", tuple(self._node_blocks(id_))))
         if self.comparison is not None:
@@ -90,6 +94,28 @@ class Part:
             )
         blocks.append(Reset(id_))
         return blocks
+
+    def _place_blocks(self, id_: str) -> list[Block]:
+        """Where there are no angles: the markers' places in the picture."""
+        assert self.nodes is not None
+        n = self.nodes
+        few = list(enumerate(n.rig.nodes))[:MOST_PLACES]
+        blocks: list[Block] = [
+            Chart(
+                f"{id_}-{axis}",
+                f"{axis} in the picture, {way}",
+                id_,
+                n.t_s,
+                tuple(
+                    Series(f"{node.name} (px)", n.xy_px[:, i, k], i, points=len(n) < 200) for i, node in few
+                ),
+                y_label=f"{axis} (px)",
+            )
+            for k, (axis, way) in enumerate((("x", "to the right"), ("y", "downwards")))
+        ]
+        if len(n.rig.nodes) > MOST_PLACES:
+            blocks.append(Text(f"The first {MOST_PLACES} of {len(n.rig.nodes)} markers.", quiet=True))
+        return [*blocks, Reset(id_)]
 
     def _node_blocks(self, id_: str) -> list[Block]:
         assert self.nodes is not None
