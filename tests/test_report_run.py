@@ -34,6 +34,12 @@ PICTURE = """() => {
 """How many bright pixels the film shows now, and their centre."""
 
 
+RANGE = """id => {
+  const c = window.pydpendReport.groups.get('r0').charts.find(c => c.root.parentElement.id === id);
+  return [c.scales.x.min, c.scales.x.max];
+}"""
+
+
 @pytest.fixture
 def opened(browser: Browser, demo_run: Path) -> Iterator[Page]:
     with open_report(browser, demo_run / "report.html") as page:
@@ -65,12 +71,11 @@ def click_at(page: Page, chart: str, share: float) -> float:
     over.scroll_into_view_if_needed()
     box = over.bounding_box()
     assert box is not None
-    page.mouse.click(box["x"] + share * box["width"], box["y"] + box["height"] / 2)
-    scale = page.evaluate(
-        "id => { const c = window.pydpendReport.groups.get('r0').charts.find(c => c.root.parentElement.id === id);"
-        " return [c.scales.x.min, c.scales.x.max]; }",
-        chart,
-    )
+    scale = page.evaluate(RANGE, chart)
+    # Between pixels, as a mouse is on a fine screen.
+    page.mouse.click(box["x"] + share * box["width"] + 0.4, box["y"] + box["height"] / 2)
+    page.wait_for_timeout(100)
+    assert page.evaluate(RANGE, chart) == scale, "a click is no zoom"
     return float(scale[0] + share * (scale[1] - scale[0]))
 
 
@@ -84,6 +89,13 @@ def test_a_click_takes_the_film_there(opened: Page, chart: str) -> None:
     # A pixel of the plot is 5 s / 500; the film has one frame in 3.
     assert film_time(opened) == pytest.approx(wanted, abs=0.02)
     until(opened, f"Math.abs(window.pydpendReport.groups.get('r0').time - {film_time(opened)}) < 1e-6")
+    # The mouse goes, the cursor stays where the film is.
+    opened.mouse.move(2, 2)
+    until(
+        opened,
+        "window.pydpendReport.groups.get('r0').charts.every("
+        f"c => Math.abs(c.posToVal(c.cursor.left, 'x') - {film_time(opened)}) < 0.02)",
+    )
     then = opened.evaluate(PICTURE)
     assert min(first[0], then[0]) > 200
     assert np.hypot(first[1] - then[1], first[2] - then[2]) > 20

@@ -29,6 +29,7 @@ def main() -> int:
         assert box is not None
         page.mouse.click(box["x"] + 0.42 * box["width"], box["y"] + box["height"] / 2)
         page.wait_for_timeout(1500)
+        page.mouse.move(0, 0)
         page.screenshot(path=PICTURE)
         browser.close()
     print(f"{PICTURE.relative_to(ROOT)}: {PICTURE.stat().st_size / 1000:.0f} kB")

@@ -127,7 +127,8 @@
         { ...axis, label: spec.y_label, size: 64,
           ...(map ? { splits: () => spec.nodes.map((_, i) => spec.nodes.length - i - 0.5), values: () => spec.nodes } : {}) },
       ],
-      cursor: { drag: { x: true, y: false }, sync: { key: spec.group }, focus: { prox: -1 }, y: false },
+      // Less than 5 px is a click, also where the cursor was set by the film in between.
+      cursor: { drag: { x: true, y: false, dist: 5 }, sync: { key: spec.group }, focus: { prox: -1 }, y: false },
       legend: { show: !map, live: true },
       hooks: {
         setScale: [(u, key) => {
@@ -174,6 +175,8 @@
       if (down !== null && Math.abs(e.clientX - down) < 4) gotoTime(g, u.posToVal(e.offsetX, "x"));
       down = null;
     });
+    // Once the mouse has gone, the cursor is the film's again.
+    u.over.addEventListener("mouseleave", () => setTimeout(() => { if (g.film && g.time !== null) putCursor(g, g.time); }));
     host.tabIndex = 0;
     host.setAttribute("role", "img");
     host.addEventListener("keydown", (e) => {
