@@ -110,6 +110,25 @@ def test_markers_of_no_weight_say_nothing_about_the_others(method: Method) -> No
     np.testing.assert_allclose(pull, 1.0, atol=0.05)
 
 
+@pytest.mark.parametrize("method", ["rigid", "linkage"])
+def test_markers_covered_at_their_edge_are_found_out_over_the_recording(method: Method) -> None:
+    # Beside two hidden markers a third is off by 0.3 px, and its sigma says 0.075: too little to be left out by the
+    # frame, with three others to judge by; in all such frames together it shows.
+    t, phi = tumbling(6000, 22)
+    rng = np.random.default_rng(22)
+    hidden, moved = np.zeros((t.size, 9), dtype=bool), np.zeros((t.size, 9, 2))
+    crossed = (np.arange(t.size) // 40) % 5 == 0
+    hidden[crossed, 4:6] = True
+    moved[crossed, 3] = 0.3 * rng.standard_normal((crossed.sum(), 2))
+    nodes = rig.film(t, phi, 22, hidden=hidden, moved_px=moved)
+    nodes.sigma_px[crossed, 3] = 0.075
+    found = angles(nodes, method, zero="reference_frame")
+    error = found.phi_rad - phi
+    pull = ((error - error.mean(axis=0)) / found.sigma_rad)[crossed].std(axis=0)
+    # 1200 frames: 2 % scatter; without the doubt it is 1.7 for phi2 (rigid).
+    np.testing.assert_allclose(pull, 1.0, atol=0.1)
+
+
 def test_pivot_and_link_length_of_ten_seconds() -> None:
     t, phi = tumbling(10_000, 5)
     found = find_linkage(rig.film(t, phi, 5))

@@ -157,6 +157,7 @@ def _body_meta(pose: Pose) -> dict[str, Any]:
         "name": pose.markers.name,
         "nodes": list(pose.markers.nodes),
         "sigma_scale": pose.sigma_scale,
+        "covered_factor": pose.covered_factor,
         "frames_without_angle": int(np.isnan(pose.theta_rad).sum()),
         "doubtful_frames": int(pose.doubtful.sum()),
         "markers_left_out": {

@@ -11,16 +11,27 @@ is the Cramer-Rao bound, with ``p_mean`` the weighted mean of the markers seen i
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
 from pydpend.angles.markers import BodyMarkers
-from pydpend.angles.scale import hidden_factor, inflation, partly_hidden, pooled_scale2, reject_limit
+from pydpend.angles.scale import (
+    PRIOR_DOF,
+    hidden_factor,
+    inflation,
+    partly_hidden,
+    pooled_scale2,
+    reject_limit,
+    suspects,
+)
 from pydpend.angles.table import Floats
 from pydpend.errors import AnglesError, fault
+
+LEAST_COVERED = 1.5
+"""Suspects that miss by less than this factor are no worse than others: errors along the way of motion do as much."""
 
 TEMPLATE_FRAMES = 10_000
 """The template is learned from at most this many frames, evenly spread: its noise is then 1 % of a marker's."""
@@ -35,6 +46,7 @@ class Pose:
     ``template_px`` (K, 2): the body's shape, turned as in the rig's reference frame, its mean at the origin.
     ``used`` (T, K): markers used. ``chi2``, ``dof`` (T,): of the residuals with the stated sigmas.
     ``sigma_scale``: factor by which the residuals make the stated sigmas larger; it is in ``sigma_rad``.
+    ``covered_factor``: by how much more the sigmas of markers were raised that may be covered at their edge.
     ``doubtful`` (T,): frames where a marker is wrong and it cannot be told which; they have no angle.
     """
 
@@ -47,6 +59,7 @@ class Pose:
     chi2: Floats
     dof: NDArray[np.int64]
     sigma_scale: float
+    covered_factor: float
     doubtful: NDArray[np.bool_]
 
 
@@ -135,6 +148,8 @@ def fit_pose(markers: BodyMarkers) -> Pose:
             )
         )
     template, scale2 = _template(markers)
+    hidden = partly_hidden(w)
+    markers, covered = _less_sure(markers, template, scale2, suspects(w, hidden))
     used, doubtful, fitted = _reject(markers, template, scale2)
     dof = np.maximum(2 * fitted.count - 3, 0)
     good = np.isfinite(fitted.theta) & ~doubtful
@@ -146,7 +161,6 @@ def fit_pose(markers: BodyMarkers) -> Pose:
     freedom = fitted.freedom[:, 0] if along else fitted.freedom.sum(axis=1)
     parameters = 2 * template.shape[0] - 3
     scale2 = pooled_scale2(scatter[told], freedom[told], parameters, float(dof[told].sum()))
-    hidden = partly_hidden(w)
     whole2 = pooled_scale2(
         scatter[told & ~hidden], freedom[told & ~hidden], parameters, float(dof[told].sum())
     )
@@ -157,8 +171,45 @@ def fit_pose(markers: BodyMarkers) -> Pose:
     centre = np.where(good[:, None], fitted.centre, np.nan)
     sigma = np.where(good, sigma, np.nan)
     return Pose(
-        markers, theta, centre, sigma, template, used, fitted.chi2, dof, float(np.sqrt(scale2)), doubtful
+        markers,
+        theta,
+        centre,
+        sigma,
+        template,
+        used,
+        fitted.chi2,
+        dof,
+        float(np.sqrt(scale2)),
+        covered,
+        doubtful,
     )
+
+
+def _less_sure(
+    markers: BodyMarkers, template: Floats, scale2: float, suspect: NDArray[np.bool_]
+) -> tuple[BodyMarkers, float]:
+    """The sigmas of suspect markers (T, K) made as large as these markers miss the pose of the others, on the whole.
+
+    A marker that is covered at its edge still looks like one, and its centre is off by many of its sigmas; in one frame
+    with little else to see that does not show, in all of them it does.
+    """
+    rows = np.flatnonzero(suspect.any(axis=1))
+    others = markers.without(suspect).at(rows)
+    fitted = solve(others.xy_px, others.weight, template)
+    total = others.weight.sum(axis=1, keepdims=True)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        arm2 = ((template - (others.weight @ template / total)[:, None]) ** 2).sum(axis=2)
+        # Variance of where the others put a marker, each coordinate, in units of the marker's own.
+        there = markers.weight[rows] * (1 / total + arm2 / 2 / fitted.information[:, None])
+    miss = others.xy_px - fitted.centre[:, None] - rotate(fitted.theta[:, None], template[None])
+    told = suspect[rows] & np.isfinite(there)
+    miss2 = markers.weight[rows][told] * (miss[told] ** 2).sum(axis=1) / scale2 - 2 * there[told]
+    count = 1 / (1 + there[told]) ** 2
+    factor2 = (float((count * miss2).sum()) + PRIOR_DOF) / (2 * float(count.sum()) + PRIOR_DOF)
+    if factor2 < LEAST_COVERED**2:
+        return markers, 1.0
+    weight = np.where(suspect, markers.weight / factor2, markers.weight)
+    return replace(markers, weight=weight), float(np.sqrt(factor2))
 
 
 def _template(markers: BodyMarkers) -> tuple[Floats, float]:

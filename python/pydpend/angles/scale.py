@@ -40,10 +40,28 @@ def pooled_scale2(scatter: Floats, freedom: Floats, parameters: float = 0.0, dof
     return (float(scatter.sum()) + PRIOR_DOF) / (free + PRIOR_DOF)
 
 
+_SUSPECT = 1.2
+"""Beside a hidden marker, one with a sigma this many times its usual one may be covered at its edge."""
+
+
 def partly_hidden(weight: Floats) -> NDArray[np.bool_]:
     """(T,): frames in which a marker of the body, of weights (T, K), is not seen or far less sure than usual."""
     usual = float(np.median(weight[weight > 0]))
     return np.asarray((weight < usual / _UNSURE**2).any(axis=1))
+
+
+def suspects(weight: Floats, hidden: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(T, K): markers whose edge may be covered by what hides others of the body, ``hidden`` (T,).
+
+    Their sigma is above their usual one, but not so far that it says by itself how little is known.
+    """
+    out = np.zeros(weight.shape, dtype=bool)
+    for k, own in enumerate(weight.T):
+        whole = own[(own > 0) & ~hidden]
+        if whole.size:
+            usual = np.median(whole)
+            out[:, k] = hidden & (own < usual / _SUSPECT**2) & (own > usual / _UNSURE**2)
+    return out
 
 
 def reject_limit(hidden: NDArray[np.bool_]) -> Floats:
