@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import subprocess
+import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from pydpend.angles import read_angles
+from pydpend.angles import LinkAngles, read_angles, write_angles
 from pydpend.cli import main
 
 from tests import two_links
@@ -106,6 +109,215 @@ def test_errors_are_one_line_and_exit_status_2(tmp_path: Path, capsys: pytest.Ca
     given = ["angles", str(tmp_path / "moving.parquet"), "-o", str(tmp_path / "a.csv"), "--zero=0,0"]
     assert main(given) == 0
     np.testing.assert_allclose(read_angles(tmp_path / "a.csv").phi_rad, phi, atol=0.02)
+
+
+@pytest.fixture(scope="module")
+def lab(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the angles of a swing, a calibration, and node tables with faults."""
+    folder = tmp_path_factory.mktemp("lab")
+    t = np.arange(1500) / 500
+    phi = np.stack([2.5 * np.sin(4 * t) + 0.8 * t**2, 12 * np.sin(2 * t)], axis=1)
+    write_angles(LinkAngles(t, phi, np.full(phi.shape, 1e-3)), folder / "angles.parquet")
+    nodes = dataclasses.replace(two_links.film(t, phi, 72), meta=META)
+    hidden = np.zeros((t.size, 9), dtype=bool)
+    hidden[:, 3:] = True
+    dataclasses.replace(two_links.film(t, phi, 72, hidden=hidden), meta=META).write(folder / "never.parquet")
+    hidden[:] = False
+    hidden[400:900, 3:] = True
+    dataclasses.replace(two_links.film(t, phi, 72, hidden=hidden), meta=META).write(folder / "gap.parquet")
+    nodes.write(folder / "nodes.parquet")
+    rng = np.random.default_rng(72)
+    for k in (-1, 0, 1):
+        write_encoder(
+            folder / f"hold_{360 * k}deg.csv",
+            np.arange(400) / 500,
+            5 + 0.65 * k + 2.5e-3 * rng.standard_normal(400),
+        )
+    holds = [str(folder / f"hold_{360 * k}deg.csv") for k in (-1, 0, 1)]
+    assert main(["calibrate", *holds, "-o", str(folder / "encoder.json")]) == 0
+    return folder
+
+
+def readings(lab: Path, tmp_path: Path, change: Callable[[list[str]], list[str]]) -> Path:
+    """The encoder's file of the lab's swing, its lines (the header first) changed."""
+    angles = read_angles(lab / "angles.parquet")
+    noise = 2.5e-3 * np.random.default_rng(73).standard_normal(angles.t_s.size)
+    volts = 5 + 0.65 / (2 * np.pi) * angles.phi_rad[:, 0] + noise
+    lines = [f"{a:.6f},{b:.6f}" for a, b in zip(angles.t_s, volts, strict=True)]
+    file = tmp_path / "daq.csv"
+    file.write_text("\n".join(change(["time_s,voltage_v", *lines])) + "\n")
+    return file
+
+
+def replaced(
+    line: int, time: str | None = None, volts: str | None = None
+) -> Callable[[list[str]], list[str]]:
+    """Changes one line of the file, counted from 1."""
+
+    def change(lines: list[str]) -> list[str]:
+        a, b = lines[line - 1].split(",")
+        return [
+            *lines[: line - 1],
+            f"{a if time is None else time},{b if volts is None else volts}",
+            *lines[line:],
+        ]
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("change", "status", "message"),
+    [
+        (replaced(101, volts="five"), 2, "daq.csv, line 101, column voltage_v: 'five' is not a number"),
+        (
+            replaced(101, volts=""),
+            1,
+            "1 of 1500 samples have no value and were left out (the first: line 101, column v",
+        ),
+        (replaced(101, volts="NaN"), 1, "1 of 1500 samples have no value and were left out"),
+        (
+            replaced(101, time="0.196"),
+            2,
+            "daq.csv, line 101, column time: the time 0.196 s does not come after 0.196",
+        ),
+        (replaced(101, time=""), 2, "daq.csv, line 101, column time: there is no time"),
+        (replaced(101, time="0.1987"), 0, "uneven steps"),
+        (
+            replaced(101, volts="12.5"),
+            1,
+            "1 readings beyond the range of 0 to 10 V (the first at 0.198 s); they are left",
+        ),
+        (
+            replaced(101, volts="10.0"),
+            1,
+            "1 readings at a rail of 0 to 10 V, the angle is cut off there (the first at 0.198",
+        ),
+        (lambda lines: lines[:100] + lines[150:], 0, "1 gaps, the longest 0.102 s, after 0.196 s"),
+        (lambda lines: lines[:1], 2, "daq.csv: there are no samples"),
+        (
+            lambda lines: ["zeit,volt", *lines[1:]],
+            2,
+            "daq.csv: there is no column time_s. The columns are zeit, volt",
+        ),
+        (
+            lambda lines: [*lines[:100], "0.2", *lines[101:]],
+            2,
+            "daq.csv, line 101: there are 1 fields, the header has 2",
+        ),
+    ],
+)
+def test_an_encoder_file_with_faults(
+    lab: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    change: Callable[[list[str]], list[str]],
+    status: int,
+    message: str,
+) -> None:
+    file = readings(lab, tmp_path, change)
+    command = ["compare", str(lab / "angles.parquet"), str(file), "--calibration", str(lab / "encoder.json")]
+    assert main([*command, "-o", str(tmp_path / "out"), "--format", "svg", "--json"]) == status
+    out, error = capsys.readouterr()
+    assert message in error
+    if status == 2:
+        assert error.count("\n") == 1
+    else:
+        found = json.loads(out)
+        assert any(message in note for note in found["notes"])
+        assert found["gain"] == pytest.approx(1.0, abs=5 * found["gain_sigma"])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "message"),
+    [
+        (["angles", "never.parquet", "-o", "a.csv"], 2, "no node of the body lower is ever seen"),
+        (
+            ["angles", "nodes.parquet", "-o", "a.csv", "--bodies", "upper,middle"],
+            2,
+            "there is no body 'middle'",
+        ),
+        (
+            ["angles", "nodes.parquet", "-o", "a.txt", "--zero=0,0"],
+            2,
+            "a.txt: the ending '.txt' is not known",
+        ),
+        (
+            ["angles", "nodes.parquet", "-o", "a.csv", "--zero=0,0", "--figure", "a.jpg"],
+            2,
+            "jpg is not a figure format",
+        ),
+        (
+            ["angles", "gap.parquet", "-o", "a.csv", "--zero=0,0"],
+            2,
+            "frames 400 to 899, body lower: not seen for 1.002 s",
+        ),
+        (
+            ["angles", "gap.parquet", "-o", "a.csv", "--zero=0,0", "--gaps", "stop"],
+            1,
+            "left out from there on",
+        ),
+        (
+            ["calibrate", "hold_0deg.csv", "-o", "c.json", "--angles-deg", "0"],
+            2,
+            "1 hold (hold_0deg) is not enough",
+        ),
+        (
+            ["calibrate", "hold_0deg.csv", "hold_360deg.csv", "-o", "c.json", "--angles-deg", "90,90"],
+            2,
+            "all 2 holds (hold_0deg, hold_360deg) are at one angle, 90 deg",
+        ),
+        (
+            ["calibrate", "hold_0deg.csv", "-o", "c.json"],
+            2,
+            "hold_0deg.csv: one file is a calibration only if it has",
+        ),
+        (
+            ["compare", "angles.parquet", "hold_0deg.csv", "-o", "d"],
+            2,
+            "it is in volts and there is no calibration",
+        ),
+        (
+            ["compare", "angles.parquet", "hold_0deg.csv", "--calibration", "encoder.json", "-o", "d"],
+            2,
+            "no 1 s of common motion was found",
+        ),
+    ],
+)
+def test_commands_that_cannot_be_done_or_only_in_part(
+    lab: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    arguments: list[str],
+    status: int,
+    message: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for file in lab.iterdir():
+        (tmp_path / file.name).symlink_to(file)
+    assert main(arguments) == status
+    error = capsys.readouterr().err
+    assert message in error
+    assert "Traceback" not in error
+    assert status == 1 or error.count("\n") == 1
+
+
+def test_the_program_itself(lab: Path, tmp_path: Path) -> None:
+    program = [sys.executable, "-c", "import sys; from pydpend.cli import main; sys.exit(main())"]
+    out = tmp_path / "angles.csv"
+    done = subprocess.run(
+        [*program, "angles", str(lab / "nodes.parquet"), "-o", str(out), "--zero=0,0", "--json"],
+        capture_output=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["frames"] == 1500
+    assert read_angles(out).phi_rad.shape == (1500, 2)
+    failed = subprocess.run(
+        [*program, "angles", str(lab / "never.parquet"), "-o", str(out)], capture_output=True, check=False
+    )
+    assert failed.returncode == 2
+    assert failed.stderr.startswith(b"pydpend: nodes: no node of the body lower is ever seen")
 
 
 @pytest.mark.parametrize("ending", ["png", "svg", "pdf"])

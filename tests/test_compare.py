@@ -178,6 +178,22 @@ def test_comparison_says_whose_noise_the_residual_is() -> None:
     assert worse.correlation_samples > 5
 
 
+def test_a_motion_that_repeats_itself_is_said() -> None:
+    rng = np.random.default_rng(55)
+    t = np.arange(6000) / 500
+    sigma = np.full((t.size, 1), VIDEO_RAD)
+    swing = LinkAngles(t, 0.5 * np.sin(7 * t)[:, None], sigma)
+    readings = LinkAngles(t, swing.phi_rad + NOISE_RAD * rng.standard_normal((t.size, 1)), sigma)
+    found = compare(swing, readings)
+    assert found.sync.offset_s == pytest.approx(0.0, abs=5 * found.sync.offset_sigma_s)
+    assert found.sync.rival_offset_s is not None
+    # Half a period, 0.449 s, with the other sense, or a whole one.
+    assert abs(found.sync.rival_offset_s) / (np.pi / 7) == pytest.approx(
+        round(abs(found.sync.rival_offset_s) * 7 / np.pi), abs=0.02
+    )
+    assert any("repeats itself" in note for note in found.notes)
+
+
 def test_recordings_without_common_motion_are_refused() -> None:
     video, encoder, _ = made(54)
     still = LinkAngles(encoder.t_s, np.zeros_like(encoder.phi_rad), encoder.sigma_rad)

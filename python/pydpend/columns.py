@@ -60,9 +60,9 @@ def read_columns(
 ) -> Columns:
     """Reads the named columns of a Parquet file (by its first four bytes) or else of a delimited text file.
 
-    In text the header is the first line that holds every required name, so notes above it do no harm; the
-    delimiter is comma, semicolon or tab, with a decimal comma allowed between semicolons or tabs. An empty
-    field, ``nan``, ``null`` or ``n/a`` is NaN.
+    In text the header is the first line that holds every required name, so notes above it do no harm, nor does a
+    line of units below it. The delimiter is comma, semicolon or tab, with a decimal comma allowed between
+    semicolons or tabs. An empty field, ``nan``, ``null`` or ``n/a`` is NaN.
 
     Raises ``error`` naming file, line and column: no such file, no header with these names, a name twice, a
     line with too few fields, a field that is not a number.
@@ -158,6 +158,7 @@ def _text(
     index = [header.index(c) for c in wanted]
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter)
     lines: list[int] = []
+    units: bool | None = None
     fields: list[list[str]] = [[] for _ in wanted]
     try:
         for row in reader:
@@ -173,6 +174,10 @@ def _text(
                         place=f"line {line}",
                     )
                 )
+            if not lines and units is None:
+                units = all(_is_word(row[i]) for i in index)
+                if units:
+                    continue
             lines.append(line)
             for texts, i in zip(fields, index, strict=True):
                 texts.append(row[i])
@@ -183,6 +188,12 @@ def _text(
     comma = delimiter in ";\t"
     values = {c: _numbers(name, c, f, lines, comma, error) for c, f in zip(wanted, fields, strict=True)}
     return Columns(name, tuple(header), values, np.asarray(lines, dtype=np.int64), {})
+
+
+def _is_word(field: str) -> bool:
+    """Whether a field is neither a number nor empty, as the units under a header are."""
+    bare = field.strip().lower()
+    return bare not in _EMPTY and not any(c.isdigit() for c in bare)
 
 
 def _find_header(

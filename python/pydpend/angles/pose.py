@@ -154,18 +154,17 @@ def fit_pose(markers: BodyMarkers) -> Pose:
     dof = np.maximum(2 * fitted.count - 3, 0)
     good = np.isfinite(fitted.theta) & ~doubtful
     told = good & (dof > 0)
-    # A moving marker's centre errs more along its way than across it, and the way along is what turns the body. Two
-    # markers have no freedom there: then their distance must do.
-    along = fitted.freedom[told, 0].sum() > 0.01 * fitted.freedom[told].sum()
-    scatter = fitted.scatter[:, 0] if along else fitted.scatter.sum(axis=1)
-    freedom = fitted.freedom[:, 0] if along else fitted.freedom.sum(axis=1)
-    parameters = 2 * template.shape[0] - 3
-    scale2 = pooled_scale2(scatter[told], freedom[told], parameters, float(dof[told].sum()))
-    whole2 = pooled_scale2(
-        scatter[told & ~hidden], freedom[told & ~hidden], parameters, float(dof[told].sum())
+    # A moving marker's centre errs more along its way than across it, and the way along is what turns the body. But
+    # pixels that are not square show in the distances first; and two markers have nothing but their distance.
+    whole, parameters, counted = told & ~hidden, 2 * template.shape[0] - 3, float(dof[told].sum())
+    along, both = (
+        pooled_scale2(fitted.scatter[whole, :n], fitted.freedom[whole, :n], parameters, counted)
+        for n in (1, 2)
     )
-    factor = hidden_factor(scatter, freedom, hidden & told, whole2)
-    each2 = np.where(hidden, factor**2, 1.0) * whole2
+    n = 1 if along > both and fitted.freedom[told, 0].any() else 2
+    scale2 = along if n == 1 else both
+    factor = hidden_factor(fitted.scatter[:, :n], fitted.freedom[:, :n], hidden & told, scale2)
+    each2 = np.where(hidden, factor**2, 1.0) * scale2
     sigma = np.sqrt(each2 / fitted.information) * inflation(fitted.chi2 / each2, dof)
     theta = np.where(good, fitted.theta, np.nan)
     centre = np.where(good[:, None], fitted.centre, np.nan)

@@ -180,7 +180,7 @@ def calibrate(
         raise EncoderError(
             fault(
                 "calibration",
-                f"{len(holds)} hold is not enough for a line",
+                f"{len(holds)} hold ({_names(holds)}) is not enough for a line",
                 "Give at least two, at two angles",
             )
         )
@@ -192,8 +192,8 @@ def calibrate(
         raise EncoderError(
             fault(
                 "calibration",
-                f"all {len(holds)} holds are at one angle, {np.degrees(phi[0]):.6g} deg",
-                "Give two",
+                f"all {len(holds)} holds ({_names(holds)}) are at one angle, {np.degrees(phi[0]):.6g} deg",
+                "Give recordings of at least two angles",
             )
         )
     margin = 4 * spec_v
@@ -258,6 +258,10 @@ def calibrate(
         wraps,
         tuple(notes),
     )
+
+
+def _names(holds: Sequence[Hold]) -> str:
+    return ", ".join(h.name for h in holds) or "none"
 
 
 def _too_noisy(hold: Hold, spec_v: float) -> bool:

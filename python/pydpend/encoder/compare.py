@@ -80,6 +80,7 @@ class Comparison:
                 "drift": s.drift,
                 "drift_sigma": s.drift_sigma,
                 "reference_s": s.reference_s,
+                "rival_offset_s": s.rival_offset_s,
                 "turns": s.turns,
                 "left_out": s.left_out,
             },
@@ -164,6 +165,11 @@ def compare(
     mean = float(residual.mean())
     half = 1.96 * float(residual.std(ddof=1)) * float(np.sqrt(together / residual.size))
     notes = [*map(str, video.meta.get("notes", ())), *map(str, encoder.meta.get("notes", ()))]
+    if sync.rival_offset_s is not None:
+        notes.append(
+            f"the motion repeats itself: a clock offset of {sync.rival_offset_s:.4f} s explains the readings as well; "
+            "that with the longer overlap was taken"
+        )
     if sync.left_out:
         notes.append(f"{sync.left_out} encoder readings are outliers and were left out of the regression")
     # The regression's noise is that of one encoder reading and one interpolated video angle.

@@ -151,7 +151,7 @@ def _holds_of_table(path: Path, column: str) -> list[Hold]:
     out = []
     for value in np.unique(angle):
         rows = np.flatnonzero(angle == value)
-        name = f"{np.degrees(value):g} deg"
+        name = f"{path.stem} at {np.degrees(value):g} deg"
         if rows.size == 1 and "std_v" in table.values:
             std = float(table.values["std_v"][rows[0]])
             n = int(table.values["n"][rows[0]]) if "n" in table.values else 1

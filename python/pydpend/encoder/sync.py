@@ -8,7 +8,7 @@ is the maximum likelihood on the rates with the zero free, without ever differen
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +37,10 @@ OUTLIER_SIGMAS = 6.0
 """Readings further from the fit than this (of the residuals' robust standard deviation) are left out."""
 
 
+ALIKE = 1.05
+"""Fits whose residuals differ by less than this factor explain the readings equally well."""
+
+
 @dataclass(frozen=True, eq=False)
 class Synchronisation:
     """``video time = t + offset_s + drift (t - reference_s)`` for an encoder time ``t``.
@@ -45,7 +49,8 @@ class Synchronisation:
     encoder angle where the video's is zero, within (-pi, pi], and ``turns`` the whole turns between them.
     ``covariance`` (4, 4): of (zero, gain, offset, drift), from the residuals and their autocorrelation.
     ``sigma_rad``: standard deviation of the residual. ``given``: the clocks were said to be one; offset and
-    drift are then 0 and not fitted.
+    drift are then 0 and not fitted. ``rival_offset_s``: another offset that explains the readings as well, over a
+    shorter time; ``None`` if there is none.
     """
 
     offset_s: float
@@ -60,6 +65,7 @@ class Synchronisation:
     left_out: int
     correlation_samples: float
     given: bool = False
+    rival_offset_s: float | None = None
 
     @property
     def offset_sigma_s(self) -> float:
@@ -173,7 +179,13 @@ def synchronise(
                 "They must show the same motion, and enough of it; check the link and the column",
             )
         )
-    return min(fits, key=lambda f: f.sigma_rad)
+    least = min(f.sigma_rad for f in fits)
+    alike = sorted((f for f in fits if f.sigma_rad <= ALIKE * least), key=lambda f: f.n, reverse=True)
+    best = alike[0]
+    others = [
+        f.offset_s for f in alike[1:] if f.gain * best.gain < 0 or abs(f.offset_s - best.offset_s) > COARSE_S
+    ]
+    return replace(best, rival_offset_s=others[0] if others else None)
 
 
 def _bins(course_t: Floats, phi: Floats, start: float, count: int) -> tuple[Floats, Floats]:
