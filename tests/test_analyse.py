@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import shutil
 import signal
 import subprocess
 import sys
@@ -174,6 +175,17 @@ def test_a_stage_that_cannot_be_done_says_why_and_the_rest_is_there(tmp_path: Pa
     record = json.loads((tmp_path / "run" / "run.json").read_text("utf-8"))
     assert "fit" in record["facts"]["not_done"]
     assert any(w.startswith("fit: ") for w in report_page(tmp_path / "run").warnings)
+
+
+def test_a_fit_that_did_not_converge_is_said(demo_run: Path, demo_options: Options, tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    shutil.copytree(demo_run, folder)
+    fit = folder / "fit" / "fit.json"
+    fit.write_text(fit.read_text("utf-8").replace('"converged"', '"stalled"  ', 1), encoding="utf-8")
+    outcome = analyse(demo_options, folder)
+    assert set(outcome.stages.values()) == {"kept"}
+    assert (outcome.status, outcome.message) == ("partly", "the damping fit did not converge")
+    assert report_page(folder).warnings[0].startswith("The damping fit did not converge")
 
 
 def test_config_there_and_back(tmp_path: Path, demo_options: Options) -> None:

@@ -49,7 +49,8 @@ class Stage:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a run came to. ``status``: ``done``, or ``partly`` where a stage could not be done."""
+    """What a run came to. ``status``: ``done``, or ``partly`` where a stage could not be done or the fit did not
+    converge."""
 
     folder: Path
     status: str
@@ -235,14 +236,12 @@ def analyse(options: Options, folder: str | Path, progress: Progress | None = No
     seconds = {name: float(done["seconds"]) for name, done in run.stages.items()}
     seconds["report"] = round(time.monotonic() - begun, 2)
     tell(of, of, "Report", "done")
-    missing = [s for s in said.values() if s.startswith("not done")]
-    return Outcome(
-        path,
-        "partly" if missing else "done",
-        f"{len(missing)} of {len(said)} stages could not be done" if missing else "every stage is done",
-        said,
-        seconds,
-    )
+    missing = sum(s.startswith("not done") for s in said.values())
+    problems = [f"{missing} of {len(said)} stages could not be done"] if missing else []
+    if "fit" in run.stages and not stages.converged(path):
+        problems.append("the damping fit did not converge")
+    status = "partly" if problems else "done"
+    return Outcome(path, status, "; ".join(problems) or "every stage is done", said, seconds)
 
 
 def _do(run: RunFolder, stage: Stage, tell: stages.Tell) -> str:

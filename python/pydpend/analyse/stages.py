@@ -252,6 +252,12 @@ def fit(found: tuple[Recording, ...], options: Options, folder: Path, into: Path
     return fitted.message
 
 
+def converged(folder: Path) -> bool:
+    """Whether the fit of a run came to its end."""
+    fitted = json.loads((folder / "fit" / "fit.json").read_text("utf-8"))
+    return bool(fitted["status"] == "converged")
+
+
 def _steps(tell: Tell) -> Callable[[int, int, float], None]:
     return lambda step, most, chi2: tell(f"step {step}, chi-square {chi2:.4g}")
 
