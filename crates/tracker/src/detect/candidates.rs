@@ -159,11 +159,12 @@ fn top_height(maps: &[Vec<u8>]) -> f64 {
 fn markers(field: &Field<'_>, maps: &[Vec<u8>], height: f64, sigma: f64) -> Vec<Candidate> {
     let threshold = height.ceil().clamp(1.0, 65535.0) as u16;
     let segment = Segment { start: 0, end: field.width as u32, threshold, edge: (true, true) };
-    let plan = Plan {
-        segments: vec![segment; field.height],
-        first: (0..=field.height as u32).collect(),
-        edge_rows: (0, field.height - 1),
-    };
+    let plan = Plan::new(
+        vec![segment; field.height],
+        (0..=field.height as u32).collect(),
+        (0, field.height - 1),
+        Side::Bright,
+    );
     let most = field.width * field.height / 5;
     let mut labeller = Labeller::default();
     let mut blobs: Vec<Blob> = Vec::new();

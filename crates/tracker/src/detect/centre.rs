@@ -2,7 +2,8 @@
 //!
 //! Owns: [`Centre`], [`Window`]. Must not: decide what is a marker.
 
-use super::fit::{DiscFit, Fitted, Patch, Ring, Start};
+use super::edge::LANES;
+use super::fit::{DiscFit, Fitted, LEAST_PATH_PX, Patch, Ring, Start};
 use super::levels::{Levels, Side};
 use super::mask::Spans;
 use super::pixels::Pixels;
@@ -52,6 +53,12 @@ impl Window {
         for y in self.y0..self.y0 + self.height {
             pixels.append(y, self.x0, self.width, &mut self.row, &mut self.heights);
         }
+        self.heights.resize(self.width * self.height + LANES, 0.0);
+    }
+
+    /// Rows of the window.
+    fn rows(&self) -> std::slice::ChunksExact<'_, f32> {
+        self.heights[..self.width * self.height].chunks_exact(self.width)
     }
 
     /// Middle of the values at eight places around (cx, cy) at a distance; `None` where all lie outside.
@@ -98,6 +105,8 @@ impl Window {
             return Some(sharp);
         }
         let Some(smear_px) = self.smear(&sharp) else { return Some(sharp) };
+        let path = smear_px[0].hypot(smear_px[1]);
+        self.load(pixels, blob, (fit.table.reach_px + fit.band_px + path / 2.0 + 1.0).ceil() as usize);
         let disc = [sharp.x_px, sharp.y_px, sharp.radius_px, sharp.base, sharp.height];
         match self.run(fit, &Start { disc, smear_px, avoid }) {
             Some(smeared) if smeared.chi2 < 0.7 * sharp.chi2 => Some(smeared),
@@ -120,8 +129,13 @@ impl Window {
     }
 
     fn run(&mut self, fit: &DiscFit<'_>, start: &Start) -> Option<Fitted> {
-        let patch =
-            Patch { values: &self.heights, width: self.width, x0: self.x0 as f64, y0: self.y0 as f64 };
+        let patch = Patch {
+            values: &self.heights,
+            width: self.width,
+            height: self.height,
+            x0: self.x0 as f64,
+            y0: self.y0 as f64,
+        };
         fit.fit(&patch, start, &mut self.ring)
     }
 
@@ -133,11 +147,11 @@ impl Window {
     }
 
     /// The path that would give a disc its second moments: along the longer axis the variance grows by a
-    /// twelfth of the path's square. `None` where it is under half a pixel or longer than the disc.
+    /// twelfth of the path's square. `None` where it is too short to be seen or longer than the disc.
     fn smear(&self, disc: &Fitted) -> Option<[f64; 2]> {
         let outer = (disc.radius_px + 3.0).powi(2);
         let (mut s, mut xx, mut xy, mut yy, mut sx, mut sy) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
-        for (j, row) in self.heights.chunks_exact(self.width).enumerate() {
+        for (j, row) in self.rows().enumerate() {
             for (i, &v) in row.iter().enumerate() {
                 let dx = (self.x0 + i) as f64 - disc.x_px;
                 let dy = (self.y0 + j) as f64 - disc.y_px;
@@ -160,7 +174,8 @@ impl Window {
         let twice = (xx - yy).hypot(2.0 * xy);
         let path = (12.0 * twice).sqrt();
         let angle = 0.5 * (2.0 * xy).atan2(xx - yy);
-        (path > 0.5 && path < 2.0 * disc.radius_px).then(|| [path * angle.cos(), path * angle.sin()])
+        (path > LEAST_PATH_PX && path < 2.0 * disc.radius_px)
+            .then(|| [path * angle.cos(), path * angle.sin()])
     }
 
     /// Variances of the pixels just outside and just inside of a fitted disc's edge, appended to `flat`.
@@ -175,7 +190,7 @@ impl Window {
         let reach = fit.table.reach_px + fitted.smear_px[0].hypot(fitted.smear_px[1]) / 2.0;
         self.load(pixels, blob, (reach + 3.0).ceil() as usize);
         let mut sums = [[0.0; 3]; 2];
-        for (j, row) in self.heights.chunks_exact(self.width).enumerate() {
+        for (j, row) in self.rows().enumerate() {
             for (i, &v) in row.iter().enumerate() {
                 let dx = (self.x0 + i) as f64 - fitted.x_px;
                 let dy = (self.y0 + j) as f64 - fitted.y_px;
@@ -204,32 +219,33 @@ impl Window {
         self.load(pixels, blob, MARGIN);
         let sign = levels.side.sign();
         let [mut cx, mut cy] = blob.mean();
-        let reach = blob.axes().0.map(|v| 2.0 * v.sqrt());
+        let reach = blob.axes().map(|v| 2.0 * v.sqrt());
         let radius = reach[0] + 2.0;
         let (inner, outer) = (radius * radius, (radius + 1.5).powi(2));
         let mut result = Centre::default();
         let threshold = levels.threshold(cx, cy);
+        let mut ground = std::mem::take(&mut self.ground);
         for _ in 0..3 {
-            // The background is the median of a ring just outside.
-            self.ground.clear();
-            for (j, row) in self.heights.chunks_exact(self.width).enumerate() {
+            // The background is the mean of a ring just outside.
+            ground.clear();
+            for (j, row) in self.rows().enumerate() {
                 for (i, &v) in row.iter().enumerate() {
                     let (dx, dy) = ((self.x0 + i) as f64 - cx, (self.y0 + j) as f64 - cy);
                     let q = dx * dx + dy * dy;
                     if q > inner && q <= outer && sign * (f64::from(v) - threshold) < 0.0 {
-                        self.ground.push(v);
+                        ground.push(v);
                     }
                 }
             }
-            let base = if self.ground.is_empty() {
+            let base = if ground.is_empty() {
                 levels.background.at(cx, cy)
             } else {
-                f64::from(self.ground.iter().sum::<f32>()) / self.ground.len() as f64
+                f64::from(ground.iter().sum::<f32>()) / ground.len() as f64
             };
-            let (mut s, mut sx, mut sy, mut q, mut n) = (0.0, 0.0, 0.0, 0.0, 0.0);
+            let (mut s, mut sx, mut sy, mut q) = (0.0, 0.0, 0.0, 0.0);
             result.saturated = 0;
             result.peak = 0.0;
-            for (j, row) in self.heights.chunks_exact(self.width).enumerate() {
+            for (j, row) in self.rows().enumerate() {
                 for (i, &v) in row.iter().enumerate() {
                     let (dx, dy) = ((self.x0 + i) as f64 - cx, (self.y0 + j) as f64 - cy);
                     let d = dx * dx + dy * dy;
@@ -241,7 +257,6 @@ impl Window {
                     s += h;
                     sx += h * dx;
                     sy += h * dy;
-                    n += 0.5 * d;
                     q += 0.5 * d * levels.noise.variance(v);
                     result.peak = result.peak.max(h);
                     result.saturated += u32::from(levels.saturation.is_some_and(|l| match levels.side {
@@ -254,11 +269,11 @@ impl Window {
                 break;
             }
             // The background's own error moves nothing while the disc is whole.
-            let _ = n;
             cx += sx / s;
             cy += sy / s;
             result.sigma_px = (q.sqrt() / s).hypot(SHAPE_PX);
         }
+        self.ground = ground;
         result.x_px = cx;
         result.y_px = cy;
         result

@@ -250,14 +250,14 @@ impl Detector {
 fn disc_fit<'a>(table: &'a EdgeTable, levels: &Levels) -> DiscFit<'a> {
     // In much noise more pixels beside the edge are worth their time.
     let clear = levels.contrast > 30.0 * levels.noise.variance(levels.noise.dark).sqrt();
-    let band_px = if clear { 0.75 } else { 2.0 };
+    let band_px = if clear { 0.5 } else { 2.0 };
     DiscFit {
         table,
         noise: levels.noise,
         side: levels.side,
         saturation: levels.saturation,
         band_px,
-        usual_chi2: levels.marker.map_or(1.0, |m| m.chi2_high),
+        usual_chi2: levels.marker.map_or(1.0, |m| m.chi2),
     }
 }
 
@@ -287,10 +287,10 @@ fn detection(blob: &Blob, centre: &Centre, levels: &Levels) -> Detection {
 
 /// Spans with thresholds: one segment a span where the threshold is the same all over it.
 fn plan(levels: &Levels, spans: &Spans, height: usize) -> Plan {
-    let mut plan = Plan { segments: Vec::new(), first: vec![0], edge_rows: (usize::MAX, 0) };
+    let (mut segments, mut first, mut edge_rows) = (Vec::<Segment>::new(), vec![0], (usize::MAX, 0));
     for y in 0..height {
         for &(start, end) in spans.row(y) {
-            plan.edge_rows = (plan.edge_rows.0.min(y), y);
+            edge_rows = (edge_rows.0.min(y), y);
             let mut from = start;
             while from < end {
                 let to = (from + STRETCH_PX).min(end);
@@ -300,17 +300,17 @@ fn plan(levels: &Levels, spans: &Spans, height: usize) -> Plan {
                     Side::Dark => t.floor().clamp(0.0, 65534.0),
                 } as u16;
                 let edge = (from == start, to == end);
-                match plan.segments.last_mut() {
-                    Some(last) if !edge.0 && last.threshold == threshold && plan.first.len() == y + 1 => {
+                match segments.last_mut() {
+                    Some(last) if !edge.0 && last.threshold == threshold && first.len() == y + 1 => {
                         last.end = to;
                         last.edge.1 = edge.1;
                     }
-                    _ => plan.segments.push(Segment { start: from, end: to, threshold, edge }),
+                    _ => segments.push(Segment { start: from, end: to, threshold, edge }),
                 }
                 from = to;
             }
         }
-        plan.first.push(plan.segments.len() as u32);
+        first.push(segments.len() as u32);
     }
-    plan
+    Plan::new(segments, first, edge_rows, levels.side)
 }

@@ -3,21 +3,23 @@
 //!
 //! Owns: [`DiscFit`], [`Fitted`], [`Ring`]. Must not: decide what is a marker.
 //!
-//! The model is `base + height * coverage(pixel; x, y, radius)`; all five are free. Only pixels near the edge
-//! are used: they hold all that is known of the centre, and what is inside the marker or farther off (a link's
-//! edge, a neighbour) does not matter. Dark markers are turned into bright ones by the sign of their values.
+//! The model is `base + height * coverage(pixel; x, y, radius)`; all five are free. Of a marker that moved during
+//! the exposure the coverage is the mean along its path, whose two components are free as well. Only pixels near
+//! the edge are used: they hold all that is known of the centre, and what is inside the marker or farther off (a
+//! link's edge, a neighbour) does not matter. Dark markers are turned into bright ones by the sign of their values.
 
 use std::array::from_fn;
 
 use nalgebra::{SMatrix, SVector};
 
-use super::edge::EdgeTable;
+use super::edge::{EdgeTable, Eight, LANES, lanes};
 use super::levels::{Noise, Side};
 
-/// A rectangle of pixels, raw units.
+/// A rectangle of pixels, raw units; behind the last pixel come [`LANES`] more values that mean nothing.
 pub(crate) struct Patch<'a> {
     pub values: &'a [f32],
     pub width: usize,
+    pub height: usize,
     /// Image coordinates of its first pixel.
     pub x0: f64,
     pub y0: f64,
@@ -68,55 +70,101 @@ pub(crate) struct Start {
     pub avoid: [[f64; 3]; 2],
 }
 
-/// Places along the path of a smeared disc; 0.6 px apart they cannot be told from a line.
-const SHIFTS: usize = 7;
+/// Free numbers of a disc that stands still and of one that moves.
+const STILL: usize = 5;
+const MOVING: usize = 7;
 
-/// Rounds of Gauss-Newton; two or three are used.
-const ROUNDS: usize = 8;
-/// A step below this part of the uncertainty is the last: the next would be far smaller.
-const SETTLED: f64 = 0.3;
+/// Distance of the places along a path whose mean stands for it, px, and how many there may be: closer ones
+/// cannot be told from a line.
+const SHIFT_PX: f64 = 0.45;
+const MOST_SHIFTS: usize = 32;
+/// A path shorter than this cannot be told from none, px.
+pub(crate) const LEAST_PATH_PX: f64 = 0.3;
+
+/// Rounds of Gauss-Newton; two are usual.
+const ROUNDS: usize = 10;
+/// The last step is the one after which the next would be below this part of the uncertainty.
+const SETTLED: f64 = 0.2;
 /// How far the first guess may be off before the pixels are chosen anew, px.
-const SLACK_PX: f64 = 0.35;
+const SLACK_PX: f64 = 0.2;
 
-/// Pixels around an edge, relative to the first guess of the centre, eight by eight; `live` is 0 for those that
-/// fill up the last eight.
+/// Pixels around an edge: place relative to the first guess of the centre, value, and 1 where it counts.
 #[derive(Debug, Default)]
 pub(crate) struct Ring {
-    eights: Vec<[[f32; 8]; 4]>,
-    /// Number, sum and sum of squares of values relative to the first base: of pixels outside, inside.
-    flat: [[f64; 3]; 2],
-    used: u32,
+    x: Vec<f32>,
+    y: Vec<f32>,
+    value: Vec<f32>,
+    live: Vec<f32>,
+    used: usize,
     saturated: u32,
 }
 
-/// `line_k * line_l * weight` for k <= l, where a line is the model's derivatives by x, y, radius, base and
-/// height, then the residual.
-const PRODUCTS: usize = 21;
+/// `line_k * line_l * weight` for k <= l, where a line is the model's derivative by one of its numbers, or last
+/// the residual.
+const PRODUCTS: usize = (MOVING + 1) * (MOVING + 2) / 2;
 
-struct Normal {
-    sums: [f64; PRODUCTS],
-    squares: f64,
+/// Where the product of lines k <= l is.
+const fn place(k: usize, l: usize, n: usize) -> usize {
+    k * (n + 1) - k * (k + 1) / 2 + l
 }
 
-fn product(k: usize, l: usize) -> usize {
-    let (k, l) = (k.min(l), k.max(l));
-    k * 6 - k * (k + 1) / 2 + l
+/// Adds line K's products; a function for each line, so that all indices are constants.
+#[inline(always)]
+fn products<const K: usize, const N: usize>(
+    sums: &mut [Eight; PRODUCTS],
+    w: &Eight,
+    line: &[Eight; MOVING + 1],
+) {
+    if K > N {
+        return;
+    }
+    let weighted = lanes(|i| w[i] * line[K][i]);
+    for l in K..=N {
+        let sum = &mut sums[place(K, l, N)];
+        *sum = lanes(|i| sum[i] + weighted[i] * line[l][i]);
+    }
+}
+
+struct Normal<const N: usize> {
+    matrix: SMatrix<f64, N, N>,
+    gradient: SVector<f64, N>,
+    chi2: f64,
+    squares: f64,
+    count: f64,
 }
 
 impl Ring {
-    fn push(&mut self, dx: f32, dy: f32, value: f32) {
-        let lane = self.used as usize % 8;
-        if lane == 0 {
-            // Fillers lie far outside, where nothing has a slope.
-            self.eights.push([[1.0; 8], [1.0; 8], [0.0; 8], [0.0; 8]]);
+    fn begin(&mut self, most: usize) {
+        for lanes in [&mut self.x, &mut self.y, &mut self.value, &mut self.live] {
+            if lanes.len() < most {
+                lanes.resize(most, 0.0);
+            }
         }
-        if let Some(last) = self.eights.last_mut() {
-            last[0][lane] = dx;
-            last[1][lane] = dy;
-            last[2][lane] = value;
-            last[3][lane] = 1.0;
+        self.used = 0;
+        self.saturated = 0;
+    }
+
+    /// `count` pixels of a row from `values` on, the first at `x`; up to seven beyond are written too and then
+    /// overwritten by those that follow.
+    fn push(&mut self, x: f32, y: f32, values: &[f32], count: usize) {
+        for k in (0..count).step_by(LANES) {
+            let (at, first) = (self.used + k, x + k as f32);
+            let to = at..at + LANES;
+            self.x[to.clone()].copy_from_slice(&from_fn::<f32, LANES, _>(|i| first + i as f32));
+            self.y[to.clone()].copy_from_slice(&[y; LANES]);
+            self.live[to.clone()].copy_from_slice(&[1.0; LANES]);
+            self.value[to].copy_from_slice(&values[k..k + LANES]);
         }
-        self.used += 1;
+        self.used += count;
+    }
+
+    fn eights(&self) -> impl Iterator<Item = [&Eight; 4]> {
+        let n = self.used.div_ceil(LANES);
+        let part = |v| <[f32]>::as_chunks::<LANES>(v).0.iter().take(n);
+        part(&self.x)
+            .zip(part(&self.y))
+            .zip(part(&self.value).zip(part(&self.live)))
+            .map(|((x, y), (value, live))| [x, y, value, live])
     }
 }
 
@@ -131,218 +179,217 @@ impl DiscFit<'_> {
 
     /// Fits a disc from a start; `None` where it does not come to rest near it.
     pub fn fit(&self, patch: &Patch<'_>, start: &Start, ring: &mut Ring) -> Option<Fitted> {
+        if start.smear_px == [0.0; 2] {
+            self.settle::<STILL>(patch, start, ring)
+        } else {
+            self.settle::<MOVING>(patch, start, ring)
+        }
+    }
+
+    fn settle<const N: usize>(&self, patch: &Patch<'_>, start: &Start, ring: &mut Ring) -> Option<Fitted> {
         let sign = self.side.sign();
-        let mut origin = start.disc;
-        origin[3] *= sign;
-        origin[4] *= sign;
-        let first = origin;
-        // Relative to the origin: x, y; as they are: radius, base, height.
-        let mut p = [0.0, 0.0, origin[2], origin[3], origin[4]];
-        self.choose(patch, &origin, start, ring);
+        let [x, y, first_radius, base, height] = start.disc;
+        let [path_x, path_y] = start.smear_px;
+        // Where the pixels were chosen: x, y, radius, length of the path.
+        let mut origin = [x, y, first_radius, path_x.hypot(path_y)];
+        // Relative to it x and y, as they are radius, base, height and path.
+        let all = [0.0, 0.0, first_radius, sign * base, sign * height, path_x, path_y];
+        let mut p: [f64; N] = from_fn(|i| all[i]);
+        let path = |p: &[f64; N]| if N == MOVING { p[N - 2].hypot(p[N - 1]) } else { 0.0 };
+        self.choose(patch, &origin, &start.avoid, ring);
         let (mut round, mut chosen) = (0, 1);
         loop {
             if ring.used < 12 {
                 return None;
             }
-            let n = self.normal(ring, &p, origin[3], start.smear_px);
-            let matrix = SMatrix::<f64, 5, 5>::from_fn(|i, j| n.sums[product(i, j)]);
-            let factor = matrix.cholesky()?;
-            let step = factor.solve(&SVector::<f64, 5>::from_fn(|i, _| n.sums[product(i, 5)]));
+            let n = self.normal::<N>(ring, &p);
+            let factor = n.matrix.cholesky()?;
+            let step = factor.solve(&n.gradient);
             round += 1;
-            let limit = 0.25 * first[2].max(2.0);
+            let limit = 0.25 * first_radius.max(2.0);
             let scale = (limit / step[0].abs().max(step[1].abs()).max(step[2].abs())).min(1.0);
-            let moved = step[0].hypot(step[1]) * scale;
-            let settled = moved * moved * (n.sums[product(0, 0)] + n.sums[product(1, 1)])
-                < 2.0 * SETTLED * SETTLED
-                || moved < 1e-4;
             for (v, s) in p.iter_mut().zip(&step) {
                 *v += s * scale;
             }
             let at = [origin[0] + p[0], origin[1] + p[1]];
-            let strayed = (at[0] - first[0]).hypot(at[1] - first[1]) > 0.5 * first[2] + 1.0
-                || p[2] < 0.5 * first[2]
-                || p[2] > 1.6 * first[2]
-                || p[4] <= 0.0;
+            let strayed = (at[0] - x).hypot(at[1] - y) > 0.5 * first_radius + 1.0
+                || p[2] < 0.5 * first_radius
+                || p[2] > 1.6 * first_radius
+                || p[4] <= 0.0
+                || (N == MOVING && !(LEAST_PATH_PX..=2.5 * first_radius).contains(&path(&p)));
             if strayed || p.iter().any(|v| !v.is_finite()) {
                 return None;
             }
-            if p[0].hypot(p[1]) + (p[2] - origin[2]).abs() > SLACK_PX && chosen < 4 {
-                origin = [at[0], at[1], p[2], p[3], p[4]];
+            let off = p[0].hypot(p[1]) + (p[2] - origin[2]).abs() + (0.5 * (path(&p) - origin[3])).max(0.0);
+            if off > SLACK_PX && chosen < 4 {
+                origin = [at[0], at[1], p[2], path(&p)];
                 p[0] = 0.0;
                 p[1] = 0.0;
-                self.choose(patch, &origin, start, ring);
+                self.choose(patch, &origin, &start.avoid, ring);
                 chosen += 1;
                 continue;
             }
-            if settled || round >= ROUNDS {
-                let all = f64::from(ring.used) + ring.flat[0][0] + ring.flat[1][0];
-                let inverse = factor.inverse();
+            // Near the end each step is about the product of the one before with what else moved then; not so
+            // where pixels come and go by saturation.
+            let moved = step[0].hypot(step[1]) * scale;
+            let else_moved = step[2].abs() + (step[4] / p[4]).abs() + if N == MOVING { moved } else { 0.0 };
+            let next = if ring.saturated > 0 { moved } else { moved * (moved + else_moved) };
+            let settled = next * next * (n.matrix[(0, 0)] + n.matrix[(1, 1)]) < 2.0 * SETTLED * SETTLED;
+            if (settled && scale >= 1.0) || round >= ROUNDS {
+                let unit = |i: usize| SVector::<f64, N>::from_fn(|k, _| f64::from(u8::from(k == i)));
+                let variance = |i: usize| factor.solve(&unit(i))[i];
+                // What the last step gains.
+                let chi2 = n.chi2 - step.dot(&n.gradient);
                 return Some(Fitted {
                     x_px: at[0],
                     y_px: at[1],
                     radius_px: p[2],
                     base: sign * p[3],
                     height: sign * p[4],
-                    sigma_px: inverse[(0, 0)].max(inverse[(1, 1)]).sqrt(),
-                    chi2: n.sums[product(5, 5)].max(0.0) / (all - 5.0).max(1.0),
-                    rms: (n.squares.max(0.0) / all).sqrt(),
+                    sigma_px: variance(0).max(variance(1)).sqrt(),
+                    chi2: chi2.max(0.0) / (n.count - N as f64).max(1.0),
+                    rms: (n.squares / n.count.max(1.0)).sqrt(),
                     saturated: ring.saturated,
-                    smear_px: start.smear_px,
+                    smear_px: if N == MOVING { [p[N - 2], p[N - 1]] } else { [0.0; 2] },
                 });
             }
         }
     }
 
-    /// Chooses the pixels near the edge of a disc: those on it one by one, those beside it in sums.
-    fn choose(&self, patch: &Patch<'_>, disc: &[f64; 5], start: &Start, ring: &mut Ring) {
-        let [cx, cy, r, base, _] = *disc;
-        ring.eights.clear();
-        ring.flat = [[0.0; 3]; 2];
-        ring.used = 0;
-        ring.saturated = 0;
-        let path = start.smear_px[0].hypot(start.smear_px[1]);
-        let edge = self.table.reach_px + SLACK_PX + path / 2.0;
-        let (outer, inner) = (r + edge + self.band_px, (r - edge - self.band_px).max(0.0));
-        let near = (((r + edge) * (r + edge)) as f32, ((r - edge).max(0.0) * (r - edge).max(0.0)) as f32);
-        let (sign, base) = (self.side.sign() as f32, base as f32);
-        let limit = self.saturation.map_or(f32::INFINITY, |l| l as f32 * sign);
-        let guard = start.avoid.iter().any(|a| a[2] > 0.0);
-        let rows = patch.values.len() / patch.width;
+    /// Chooses the pixels near the edge of a disc, `[x, y, radius, length of its path]`.
+    fn choose(&self, patch: &Patch<'_>, disc: &[f64; 4], avoid: &[[f64; 3]; 2], ring: &mut Ring) {
+        let [cx, cy, r, path] = *disc;
+        let reach = self.table.reach_px + SLACK_PX + path / 2.0 + self.band_px;
+        let (outer, inner) = (r + reach, (r - reach).max(0.0));
+        let left = cx - patch.x0;
         let first = (cy - outer - patch.y0).ceil().max(0.0) as usize;
-        let last = ((cy + outer - patch.y0).floor() as usize + 1).min(rows);
+        let last = ((cy + outer - patch.y0).floor() as usize + 1).min(patch.height);
+        ring.begin(last.saturating_sub(first) * (patch.width + 2 * LANES));
         for j in first..last {
             let dy = patch.y0 + j as f64 - cy;
-            let reach = (outer * outer - dy * dy).max(0.0).sqrt();
+            let half = (outer * outer - dy * dy).max(0.0).sqrt();
             let hole = (inner * inner - dy * dy).max(0.0).sqrt();
             let clip = |x: f64| (x.max(0.0) as usize).min(patch.width);
-            let left = cx - patch.x0;
-            let row = &patch.values[j * patch.width..(j + 1) * patch.width];
-            let (a, d) = (clip((left - reach).ceil()), clip((left + reach).floor() + 1.0));
+            let (a, d) = (clip((left - half).ceil()), clip((left + half).floor() + 1.0));
             let (b, c) = (clip((left - hole).floor() + 1.0), clip((left + hole).ceil()));
+            let mut part = |from: usize, to: usize| {
+                let values = &patch.values[j * patch.width + from..];
+                ring.push((from as f64 - left) as f32, dy as f32, values, to.saturating_sub(from));
+            };
             // Left and right of the hole, or all of it.
-            let parts =
-                if hole > 0.0 && b < c { [(a, b.max(a)), (c, d.max(c))] } else { [(a, d.max(a)), (0, 0)] };
-            let dy = dy as f32;
-            for (from, to) in parts {
-                let mut dx = (from as f64 - left) as f32;
-                let mut sums = [[0.0f32; 3]; 2];
-                for &value in &row[from..to] {
-                    let q = dx * dx + dy * dy;
-                    let v = value * sign;
-                    if guard && self.belongs_to_another(start, cx + f64::from(dx), cy + f64::from(dy)) {
-                        dx += 1.0;
-                        continue;
-                    }
-                    if v >= limit {
-                        ring.saturated += 1;
-                    }
-                    if q < near.0 && q > near.1 {
-                        ring.push(dx, dy, v.min(limit));
-                    } else if v < limit {
-                        // A saturated pixel inside says nothing.
-                        let s = &mut sums[usize::from(q <= near.1)];
-                        let h = v - base;
-                        s[0] += 1.0;
-                        s[1] += h;
-                        s[2] += h * h;
-                    }
-                    dx += 1.0;
-                }
-                for (all, part) in ring.flat.iter_mut().zip(sums) {
-                    for (a, s) in all.iter_mut().zip(part) {
-                        *a += f64::from(s);
-                    }
+            if hole > 0.0 && b < c {
+                part(a, b);
+                part(c, d);
+            } else {
+                part(a, d);
+            }
+        }
+        // Those that fill up the last eight do not count.
+        let filled = ring.used.next_multiple_of(LANES);
+        ring.live[ring.used..filled].fill(0.0);
+        if self.side == Side::Dark {
+            ring.value[..filled].iter_mut().for_each(|v| *v = -*v);
+        }
+        if avoid.iter().any(|a| a[2] > 0.0) {
+            // A pixel that shows, in part, a neighbour's disc.
+            let near = self.table.reach_px + SLACK_PX;
+            for i in 0..ring.used {
+                let (x, y) = (cx + f64::from(ring.x[i]), cy + f64::from(ring.y[i]));
+                if avoid.iter().any(|a| a[2] > 0.0 && (x - a[0]).hypot(y - a[1]) < a[2] + near) {
+                    ring.live[i] = 0.0;
                 }
             }
         }
-    }
-
-    /// Whether a pixel shows, in part, a neighbour's disc.
-    fn belongs_to_another(&self, start: &Start, x: f64, y: f64) -> bool {
-        start
-            .avoid
-            .iter()
-            .any(|a| a[2] > 0.0 && (x - a[0]).hypot(y - a[1]) < a[2] + self.table.reach_px + SLACK_PX)
+        if let Some(limit) = self.saturation {
+            let limit = (limit * self.side.sign()) as f32;
+            for (v, live) in ring.value[..ring.used].iter_mut().zip(&ring.live) {
+                ring.saturated += u32::from(*v >= limit && *live > 0.0);
+                *v = v.min(limit);
+            }
+        }
     }
 
     /// Normal equations at a place; single precision holds a place inside the patch to 1e-6 px.
-    fn normal(&self, ring: &Ring, p: &[f64; 5], flat_base: f64, smear_px: [f64; 2]) -> Normal {
-        let sign = self.side.sign();
-        let [x, y, r, base, height] = p.map(|v| v as f32);
+    fn normal<const N: usize>(&self, ring: &Ring, p: &[f64; N]) -> Normal<N> {
+        let sign = self.side.sign() as f32;
+        let [x, y, r, base, height]: [f32; 5] = from_fn(|i| p[i] as f32);
         let (read, shot, dark) = (self.noise.read as f32, self.noise.shot as f32, self.noise.dark as f32);
-        let sign32 = sign as f32;
-        let limit = self.saturation.map_or(f32::INFINITY, |l| l as f32 * sign32);
-        // A smeared disc is the mean of discs along its path.
-        let count = if smear_px == [0.0; 2] { 1 } else { SHIFTS };
+        let limit = self.saturation.map_or(f32::INFINITY, |l| l as f32 * sign);
+        // A smeared disc is the mean of discs along its path: x, y, and the part of the path to there.
+        let mut shifts = [[x, y, 0.0]; MOST_SHIFTS];
+        let mut count = 1;
+        if N == MOVING {
+            let path = [p[N - 2], p[N - 1]];
+            count = ((path[0].hypot(path[1]) / SHIFT_PX).ceil() as usize).clamp(3, MOST_SHIFTS);
+            for (k, shift) in shifts[..count].iter_mut().enumerate() {
+                let part = (k as f64 + 0.5) / count as f64 - 0.5;
+                *shift = [(p[0] + part * path[0]) as f32, (p[1] + part * path[1]) as f32, part as f32];
+            }
+        }
         let share = 1.0 / count as f32;
-        let shifts: [[f32; 2]; SHIFTS] = from_fn(|k| {
-            let part = ((k as f32 + 0.5) * share - 0.5) * f32::from(u8::from(count > 1));
-            [x + part * smear_px[0] as f32, y + part * smear_px[1] as f32]
-        });
-        let mut sums = [[0.0f32; 8]; PRODUCTS];
-        let mut squares = [0.0f32; 8];
-        for [px, py, value, live] in &ring.eights {
-            let (mut cover, mut slope, mut gc, mut gs) = ([0.0; 8], [0.0; 8], [0.0; 8], [0.0; 8]);
-            for [sx, sy] in &shifts[..count] {
-                let dx: [f32; 8] = from_fn(|i| px[i] - sx);
-                let dy: [f32; 8] = from_fn(|i| py[i] - sy);
-                let rho: [f32; 8] = from_fn(|i| (dx[i] * dx[i] + dy[i] * dy[i]).max(1e-12).sqrt());
-                let c: [f32; 8] = from_fn(|i| dx[i] / rho[i]);
-                let s: [f32; 8] = from_fn(|i| dy[i] / rho[i]);
-                let minor: [f32; 8] = from_fn(|i| c[i].abs().min(s[i].abs()));
-                let (part, rise) = self.table.at(rho.map(|rho| r - rho), minor);
-                for i in 0..8 {
-                    cover[i] += part[i] * share;
-                    let rise = rise[i] * share;
-                    slope[i] += rise;
-                    gc[i] += rise * c[i];
-                    gs[i] += rise * s[i];
+        let mut sums = [[0.0f32; LANES]; PRODUCTS];
+        let (mut squares, mut open) = ([0.0f32; LANES], [0.0f32; LANES]);
+        for [px, py, value, live] in ring.eights() {
+            // Coverage, its slopes by x, y and radius, and by the path.
+            let mut sum = [[0.0; LANES]; 6];
+            for [sx, sy, part] in &shifts[..count] {
+                let dx = lanes(|i| px[i] - sx);
+                let dy = lanes(|i| py[i] - sy);
+                let rho = lanes(|i| (dx[i] * dx[i] + dy[i] * dy[i]).max(1e-6).sqrt());
+                let c = lanes(|i| dx[i] / rho[i]);
+                let s = lanes(|i| dy[i] / rho[i]);
+                let inside = lanes(|i| r - rho[i]);
+                let minor = lanes(|i| c[i].abs().min(s[i].abs()));
+                let (cover, rise) = self.table.at(&inside, &minor);
+                let rise = lanes(|i| rise[i] * share);
+                sum[0] = lanes(|i| sum[0][i] + cover[i] * share);
+                sum[1] = lanes(|i| sum[1][i] + rise[i] * c[i]);
+                sum[2] = lanes(|i| sum[2][i] + rise[i] * s[i]);
+                sum[3] = lanes(|i| sum[3][i] + rise[i]);
+                if N == MOVING {
+                    sum[4] = lanes(|i| sum[4][i] + rise[i] * c[i] * part);
+                    sum[5] = lanes(|i| sum[5][i] + rise[i] * s[i] * part);
                 }
             }
-            let full: [f32; 8] = from_fn(|i| base + height * cover[i]);
-            let model = full.map(|m| m.min(limit));
-            let w: [f32; 8] = from_fn(|i| {
-                // Saturated in the model and in the picture: nothing to learn.
-                let open = if full[i] < limit || value[i] < limit { live[i] } else { 0.0 };
-                open / (read + shot * (sign32 * model[i] - dark).max(0.0))
-            });
-            let g: [f32; 8] = from_fn(|i| height * slope[i]);
-            let e: [f32; 8] = from_fn(|i| value[i] - model[i]);
-            let line = [gc.map(|v| v * height), gs.map(|v| v * height), g, [1.0; 8], cover, e];
-            let mut at = 0;
-            for k in 0..6 {
-                let wk: [f32; 8] = from_fn(|i| w[i] * line[k][i]);
-                for l in &line[k..] {
-                    for i in 0..8 {
-                        sums[at][i] += wk[i] * l[i];
-                    }
-                    at += 1;
-                }
+            let full = lanes(|i| base + height * sum[0][i]);
+            let model = lanes(|i| full[i].min(limit));
+            // Saturated in the model and in the picture: nothing to learn.
+            let known = lanes(|i| if full[i] < limit || value[i] < limit { live[i] } else { 0.0 });
+            let w = lanes(|i| known[i] / (read + shot * (sign * model[i] - dark).max(0.0)));
+            let e = lanes(|i| value[i] - model[i]);
+            let mut line = [[0.0f32; LANES]; MOVING + 1];
+            line[0] = lanes(|i| sum[1][i] * height);
+            line[1] = lanes(|i| sum[2][i] * height);
+            line[2] = lanes(|i| sum[3][i] * height);
+            line[3] = [1.0; LANES];
+            line[4] = sum[0];
+            if N == MOVING {
+                line[5] = lanes(|i| sum[4][i] * height);
+                line[6] = lanes(|i| sum[5][i] * height);
             }
-            for i in 0..8 {
-                squares[i] += live[i] * e[i] * e[i];
-            }
+            line[N] = e;
+            products::<0, N>(&mut sums, &w, &line);
+            products::<1, N>(&mut sums, &w, &line);
+            products::<2, N>(&mut sums, &w, &line);
+            products::<3, N>(&mut sums, &w, &line);
+            products::<4, N>(&mut sums, &w, &line);
+            products::<5, N>(&mut sums, &w, &line);
+            products::<6, N>(&mut sums, &w, &line);
+            products::<7, N>(&mut sums, &w, &line);
+            squares = lanes(|i| squares[i] + known[i] * e[i] * e[i]);
+            open = lanes(|i| open[i] + known[i]);
         }
-        let mut n = Normal {
-            sums: sums.map(|s| s.iter().map(|&v| f64::from(v)).sum()),
-            squares: squares.iter().map(|&v| f64::from(v)).sum(),
+        let total = |s: &Eight| s.iter().map(|&v| f64::from(v)).sum::<f64>();
+        let product = |k: usize, l: usize| {
+            let (k, l) = (k.min(l), k.max(l));
+            total(&sums[place(k, l, N)])
         };
-        // Pixels beside the edge: coverage 0 or 1, no slope.
-        for (inside, [count, sum, square]) in ring.flat.iter().enumerate() {
-            let cover = inside as f64;
-            let model = p[3] + cover * p[4];
-            let w = 1.0 / self.noise.variance(sign * model);
-            let off = model - flat_base;
-            let error = sum - count * off;
-            let squared = square - 2.0 * off * sum + count * off * off;
-            n.sums[product(3, 3)] += w * count;
-            n.sums[product(3, 4)] += w * count * cover;
-            n.sums[product(4, 4)] += w * count * cover;
-            n.sums[product(3, 5)] += w * error;
-            n.sums[product(4, 5)] += w * error * cover;
-            n.sums[product(5, 5)] += w * squared;
-            n.squares += squared;
+        Normal {
+            matrix: SMatrix::from_fn(product),
+            gradient: SVector::from_fn(|k, _| product(k, N)),
+            chi2: product(N, N),
+            squares: total(&squares),
+            count: total(&open),
         }
-        n
     }
 }

@@ -56,29 +56,40 @@ impl Blob {
         [self.sums[0] as f64 / n, self.sums[1] as f64 / n]
     }
 
-    /// Variances of its pixels along the longer and the shorter principal axis, px^2, and the direction of the
-    /// longer one; each pixel counts as a square, not a point.
-    pub fn axes(&self) -> ([f64; 2], [f64; 2]) {
+    /// Variances of its pixels along x and y and their covariance, px^2; each pixel counts as a square, not a
+    /// point.
+    fn spread(&self) -> [f64; 3] {
         let n = self.area as f64;
         let [mx, my] = self.mean();
         let s = self.sums.map(|v| v as f64 / n);
-        let (xx, xy, yy) = (s[2] - mx * mx + 1.0 / 12.0, s[3] - mx * my, s[4] - my * my + 1.0 / 12.0);
+        [s[2] - mx * mx + 1.0 / 12.0, s[3] - mx * my, s[4] - my * my + 1.0 / 12.0]
+    }
+
+    /// Variances of its pixels along the longer and the shorter principal axis, px^2.
+    pub fn axes(&self) -> [f64; 2] {
+        let [xx, xy, yy] = self.spread();
         let (half, diff) = ((xx + yy) / 2.0, (xx - yy) / 2.0);
-        let root = diff.hypot(xy);
-        let angle = 0.5 * xy.atan2(diff);
-        ([half + root, (half - root).max(1.0 / 12.0)], [angle.cos(), angle.sin()])
+        let root = (diff * diff + xy * xy).sqrt();
+        [half + root, (half - root).max(1.0 / 12.0)]
+    }
+
+    /// Direction of the longer principal axis.
+    pub fn direction(&self) -> [f64; 2] {
+        let [xx, xy, yy] = self.spread();
+        let angle = 0.5 * (2.0 * xy).atan2(xx - yy);
+        [angle.cos(), angle.sin()]
     }
 
     /// Longer over shorter principal axis.
     pub fn elongation(&self) -> f64 {
-        let ([a, b], _) = self.axes();
+        let [a, b] = self.axes();
         (a / b).sqrt()
     }
 
     /// Its area over that of the ellipse with its second moments: 1 for a full disc or ellipse, 0.95 for a
     /// rectangle, far below 1 for something branched or hollow.
     pub fn fill(&self) -> f64 {
-        let ([a, b], _) = self.axes();
+        let [a, b] = self.axes();
         self.area as f64 / (4.0 * std::f64::consts::PI * (a * b).sqrt())
     }
 }
@@ -102,6 +113,36 @@ pub(crate) struct Plan {
     pub first: Vec<u32>,
     /// Whether the region begins at a row or ends after it.
     pub edge_rows: (usize, usize),
+    /// [`BAND`] rows after another: columns from the first looked at to the last, and the threshold that is the
+    /// easiest to exceed in them; nothing to look at is an empty range.
+    pub bands: Vec<Segment>,
+}
+
+/// Rows that are tested at once, before each is looked at on its own.
+pub(crate) const BAND: usize = 8;
+
+impl Plan {
+    /// The plan of segments, row by row as `first` says.
+    pub fn new(segments: Vec<Segment>, first: Vec<u32>, edge_rows: (usize, usize), side: Side) -> Self {
+        let rows = first.len().saturating_sub(1);
+        let bands = (0..rows)
+            .step_by(BAND)
+            .map(|y| {
+                let here = &segments[first[y] as usize..first[(y + BAND).min(rows)] as usize];
+                let easiest = match side {
+                    Side::Bright => here.iter().map(|s| s.threshold).min(),
+                    Side::Dark => here.iter().map(|s| s.threshold).max(),
+                };
+                Segment {
+                    start: here.iter().map(|s| s.start).min().unwrap_or(0),
+                    end: here.iter().map(|s| s.end).max().unwrap_or(0),
+                    threshold: easiest.unwrap_or(0),
+                    edge: (false, false),
+                }
+            })
+            .collect();
+        Self { segments, first, edge_rows, bands }
+    }
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -133,13 +174,23 @@ impl Labeller {
         self.parents.clear();
         self.blobs.clear();
         self.above.clear();
-        for y in 0..pixels.height {
-            self.here.clear();
-            for s in plan.first[y]..plan.first[y + 1] {
-                self.scan(pixels, y, plan.segments[s as usize], plan.edge_rows, side);
+        for (k, band) in plan.bands.iter().enumerate() {
+            let rows = k * BAND..((k + 1) * BAND).min(pixels.height);
+            let columns = (band.start, band.end);
+            if columns.0 >= columns.1
+                || !self.skip.may_hold(pixels, rows.clone(), columns, band.threshold, side)
+            {
+                self.above.clear();
+                continue;
             }
-            self.join();
-            std::mem::swap(&mut self.above, &mut self.here);
+            for y in rows {
+                self.here.clear();
+                for s in plan.first[y]..plan.first[y + 1] {
+                    self.scan(pixels, y, plan.segments[s as usize], plan.edge_rows, side);
+                }
+                self.join();
+                std::mem::swap(&mut self.above, &mut self.here);
+            }
         }
         for i in 0..self.blobs.len() {
             if self.parents[i] as usize == i {
@@ -149,7 +200,7 @@ impl Labeller {
     }
 
     fn scan(&mut self, pixels: &Pixels<'_>, y: usize, s: Segment, edge_rows: (usize, usize), side: Side) {
-        if !self.skip.may_hold(pixels, y, (s.start, s.end), s.threshold, side) {
+        if !self.skip.may_hold(pixels, y..y + 1, (s.start, s.end), s.threshold, side) {
             return;
         }
         let edge_row = y == edge_rows.0 || y == edge_rows.1;

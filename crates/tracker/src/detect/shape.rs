@@ -43,13 +43,14 @@ pub(crate) fn judge(blob: &Blob, centre: &Centre, levels: &Levels) -> Flags {
 /// `None` where it does not look like two markers.
 pub(crate) fn two_discs(blob: &Blob, levels: &Levels) -> Option<[[f64; 3]; 2]> {
     let (whole, marker) = (levels.marker_area_px?, levels.marker?);
-    let ratio = blob.area as f64 / whole;
-    let ([long, _], [ax, ay]) = blob.axes();
-    let r = marker.radius_px;
-    let apart = (long - r * r / 4.0).max(0.0).sqrt();
-    if !(1.25..=2.4).contains(&ratio) || blob.border || apart < 0.45 * r {
+    if !(1.25..=2.4).contains(&(blob.area as f64 / whole)) || blob.border {
         return None;
     }
-    let [x, y] = blob.mean();
+    let r = marker.radius_px;
+    let apart = (blob.axes()[0] - r * r / 4.0).max(0.0).sqrt();
+    if apart < 0.45 * r {
+        return None;
+    }
+    let ([x, y], [ax, ay]) = (blob.mean(), blob.direction());
     Some([[x - apart * ax, y - apart * ay, r], [x + apart * ax, y + apart * ay, r]])
 }

@@ -1,7 +1,9 @@
 //! Passing over background at vector speed: whether any pixel of a stretch is beyond the threshold.
 //!
 //! Owns: [`Skip`], the trait [`Sample`]. Must not: say where. Written so that the compiler makes vector
-//! instructions of it: saturating differences, or-ed together, one test at the end.
+//! instructions of it: the extreme of many bytes, or saturating differences or-ed together, one test at the end.
+
+use std::ops::Range;
 
 use super::levels::Side;
 use super::pixels::Pixels;
@@ -18,7 +20,7 @@ pub(crate) trait Sample: Copy {
 }
 
 macro_rules! sample {
-    ($t:ty) => {
+    ($t:ty, $any:ident) => {
         impl Sample for $t {
             #[inline]
             fn limit(threshold: u16, side: Side) -> Option<Self> {
@@ -31,20 +33,7 @@ macro_rules! sample {
 
             #[inline]
             fn any(values: &[Self], limit: Self, side: Side) -> bool {
-                let mut beyond: $t = 0;
-                match side {
-                    Side::Bright => {
-                        for &v in values {
-                            beyond |= v.saturating_sub(limit);
-                        }
-                    }
-                    Side::Dark => {
-                        for &v in values {
-                            beyond |= limit.saturating_sub(v);
-                        }
-                    }
-                }
-                beyond != 0
+                $any(values, limit, side)
             }
 
             #[inline]
@@ -57,8 +46,27 @@ macro_rules! sample {
         }
     };
 }
-sample!(u8);
-sample!(u16);
+sample!(u8, any_u8);
+sample!(u16, any_u16);
+
+/// Every processor has an instruction for the extreme of bytes.
+#[inline]
+fn any_u8(values: &[u8], limit: u8, side: Side) -> bool {
+    match side {
+        Side::Bright => values.iter().fold(0, |a, &v| a.max(v)) > limit,
+        Side::Dark => values.iter().fold(u8::MAX, |a, &v| a.min(v)) < limit,
+    }
+}
+
+/// Not so for 16 bits, but all have saturating differences.
+#[inline]
+fn any_u16(values: &[u16], limit: u16, side: Side) -> bool {
+    let beyond = match side {
+        Side::Bright => values.iter().fold(0, |a, &v| a | v.saturating_sub(limit)),
+        Side::Dark => values.iter().fold(0, |a, &v| a | limit.saturating_sub(v)),
+    };
+    beyond != 0
+}
 
 /// Sixteen-bit words of a packed stretch tested at once: a multiple of the packing's period and of a vector.
 const LANES: usize = 120;
@@ -124,26 +132,28 @@ pub(crate) struct Skip {
 }
 
 impl Skip {
-    /// Whether columns `start..end` of row `y` may hold a pixel beyond the threshold. For packed rows that do
-    /// not end on whole bytes the pixels just before and behind are looked at too.
+    /// Whether any pixel from the first column of the first row to the last column of the last may be beyond the
+    /// threshold. What lies between rows is looked at too, and where packed rows do not end on whole bytes the
+    /// pixels just before and behind.
     #[inline]
     pub fn may_hold(
         &mut self,
         pixels: &Pixels<'_>,
-        y: usize,
+        rows: Range<usize>,
         columns: (u32, u32),
         threshold: u16,
         side: Side,
     ) -> bool {
-        let (start, end) = (columns.0 as usize, columns.1 as usize);
-        let from = pixels.start(y, start).0;
+        let from = pixels.start(rows.start, columns.0 as usize).0;
+        let (last, skip) = pixels.start(rows.end - 1, columns.1 as usize);
+        let last = last + usize::from(skip > 0);
         match pixels.format {
             PixelFormat::Gray8 => u8::limit(threshold, side)
-                .is_some_and(|limit| u8::any(&pixels.bytes[from..from + end - start], limit, side)),
+                .is_some_and(|limit| u8::any(&pixels.bytes[from..last], limit, side)),
             PixelFormat::Gray16 => {
                 let Some(limit) = u16::limit(threshold, side) else { return false };
                 let mut beyond = 0;
-                for b in pixels.bytes[from..from + 2 * (end - start)].chunks_exact(2) {
+                for b in pixels.bytes[from..last].chunks_exact(2) {
                     let v = u16::from_le_bytes([b[0], b[1]]);
                     beyond |= match side {
                         Side::Bright => v.saturating_sub(limit),
@@ -162,11 +172,9 @@ impl Skip {
                 }
                 let Some((_, _, _, words)) = &self.words else { return true };
                 // Back to the start of a group of samples that begins on a byte.
-                let origin = pixels.group_origin(y);
+                let origin = pixels.group_origin(rows.start);
                 let period = if bits == 12 { 3 } else { 5 };
                 let mut at = origin + (from - origin) / period * period;
-                let (last, skip) = pixels.start(y, end);
-                let last = last + usize::from(skip > 0);
                 while at < last {
                     let Some(chunk) = pixels.bytes.get(at..at + 2 * LANES + 1) else { return true };
                     if words.any(chunk, side) {
@@ -203,14 +211,14 @@ mod tests {
                     let bytes = crate::detect::pixels::pack(&values, bits);
                     let pixels = Pixels::of_samples(&bytes, w, h, format);
                     let mut skip = Skip::default();
-                    assert!(skip.may_hold(&pixels, 1, (0, w as u32), t, side), "{format:?} {side:?} {x}");
+                    assert!(skip.may_hold(&pixels, 1..2, (0, w as u32), t, side), "{format:?} {side:?} {x}");
                     // A step farther and nothing is beyond; the last row's tail may be looked at in full.
                     let farther = match side {
                         Side::Bright => t + 1,
                         Side::Dark => t - 1,
                     };
                     assert!(
-                        !skip.may_hold(&pixels, 0, (0, w as u32), farther, side),
+                        !skip.may_hold(&pixels, 0..1, (0, w as u32), farther, side),
                         "{format:?} {side:?} {x} farther"
                     );
                 }

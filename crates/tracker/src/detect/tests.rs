@@ -9,6 +9,8 @@ use rand_distr::{Distribution, Normal};
 use super::*;
 use crate::frame::{Frame, PixelFormat};
 
+mod accuracy;
+
 /// Discs on a flat ground with noise.
 pub(super) struct Scene {
     pub size: [usize; 2],
