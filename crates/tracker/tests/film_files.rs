@@ -7,6 +7,8 @@ use std::path::Path;
 use tracker::film::encode::Codec;
 use tracker::film::{Film, Scene, Truth, WriteOptions, preset, write};
 use tracker::frame::TimeBase;
+use tracker::pipeline::{RunSettings, Silent, run};
+use tracker::score::{LIMIT_PX, Tracked, score};
 use tracker::source::{Ending, OpenOptions, open};
 
 /// The paper's layout in a small image, 12 frames.
@@ -166,4 +168,48 @@ fn what_cannot_be_written_is_refused() {
     assert!(message("a.mraw", &eight).contains("8 bits per pixel cannot hold a film of 12 bits"));
     let text = WriteOptions { truth: Some(folder.path().join("t.txt")), ..WriteOptions::default() };
     assert!(message("a.mkv", &text).contains(".parquet or .csv"));
+}
+
+/// An encoder moves whole markers by what it spares, which their pixels do not show: their bodies do.
+///
+/// Prints the table of `docs/validation.md`:
+/// `cargo test --release --workspace --test film_files -- codec --nocapture`.
+#[test]
+fn stated_uncertainties_hold_through_every_codec() {
+    let folder = tempfile::tempdir().unwrap();
+    println!("| codec, quality | kB | RMS x, y px | error / sigma |");
+    println!("|---|---|---|---|");
+    let mut wrong = Vec::new();
+    for (name, codec, quality, seed) in [
+        ("a.mkv", Codec::Ffv1, None, 52_300),
+        ("b.mp4", Codec::H264, Some(12), 52_301),
+        ("c.mp4", Codec::H264, Some(18), 52_302),
+        ("d.mp4", Codec::H264, Some(23), 52_303),
+        ("e.mp4", Codec::H264, Some(28), 52_304),
+        ("f.avi", Codec::Mjpeg, Some(2), 52_305),
+        ("g.avi", Codec::Mjpeg, Some(8), 52_306),
+    ] {
+        let mut scene = preset("clean", seed).unwrap();
+        scene.frames = 240;
+        let film = Film::new(&scene).unwrap();
+        let path = folder.path().join(name);
+        let options = WriteOptions { codec: Some(codec), quality, ..WriteOptions::default() };
+        write(&film, &path, &options, &mut |_| Ok(())).unwrap();
+        let settings = RunSettings {
+            input: path.to_str().unwrap().into(),
+            rig: Some(film.rig(0)),
+            collect: true,
+            ..RunSettings::default()
+        };
+        let table = run(&settings, &mut Silent).unwrap().table.unwrap();
+        let s = score(&Tracked::from(&table), &Truth::of(&film), LIMIT_PX).unwrap();
+        let ratio = s.error_over_sigma.unwrap();
+        let kb = std::fs::metadata(&path).unwrap().len() / 1000;
+        let quality = quality.map_or("lossless".into(), |q| q.to_string());
+        println!("| {codec:?}, {quality} | {kb} | {:.4}, {:.4} | {ratio:.2} |", s.rms_x_px, s.rms_y_px);
+        if !(0.8..=1.2).contains(&ratio) {
+            wrong.push(name);
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:?}");
 }

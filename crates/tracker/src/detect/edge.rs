@@ -4,19 +4,10 @@
 
 use std::array::from_fn;
 
+use wide::f32x8;
+
 /// Pixels worked on together.
 pub(crate) const LANES: usize = 8;
-pub(crate) type Eight = [f32; LANES];
-
-/// Eight numbers at once; written so that they become vector instructions.
-#[inline(always)]
-pub(crate) fn lanes(value: impl Fn(usize) -> f32) -> Eight {
-    let mut all = [0.0; LANES];
-    for (i, v) in all.iter_mut().enumerate() {
-        *v = value(i);
-    }
-    all
-}
 
 /// Steps of distance per pixel.
 const PER_PX: usize = 32;
@@ -96,21 +87,20 @@ impl EdgeTable {
     /// Coverage and slope of eight pixels at distances inside the edge, where the edge's normal has the smaller
     /// component `minor` (at most 0.71).
     #[inline(always)]
-    pub fn at(&self, inside_px: &Eight, minor: &Eight) -> (Eight, Eight) {
-        // Adding 2^23 rounds to a whole number and leaves it in the lowest bits.
-        const WHOLE: f32 = 8_388_608.0;
-        let (last, columns) = (self.last_column, self.last_column + 1.0);
-        let (steps, reach) = (PER_PX as f32, self.reach_px as f32);
-        let t = lanes(|i| ((inside_px[i] + reach) * steps).max(0.0).min(last));
-        let column = lanes(|i| (t[i] + WHOLE) - WHOLE);
-        let row = lanes(|i| {
-            let middle = minor[i] * (DIRECTIONS as f32 * std::f32::consts::SQRT_2) - 0.5;
-            (middle.max(0.0).min(DIRECTIONS as f32 - 1.0) + WHOLE) - WHOLE
-        });
-        let place = lanes(|i| row[i] * columns + column[i] + WHOLE);
-        let entry: [[f32; 2]; LANES] = from_fn(|i| self.rows[place[i].to_bits() as usize % SIZE]);
-        let cover = lanes(|i| entry[i][0] + entry[i][1] * ((t[i] - column[i]) * (1.0 / steps)));
-        (cover, lanes(|i| entry[i][1]))
+    pub fn at(&self, inside_px: f32x8, minor: f32x8) -> (f32x8, f32x8) {
+        // Adding 2^23 rounds to a whole number.
+        let whole = f32x8::splat(8_388_608.0);
+        let (steps, zero) = (PER_PX as f32, f32x8::ZERO);
+        let (last, columns) = (f32x8::splat(self.last_column), f32x8::splat(self.last_column + 1.0));
+        let t = ((inside_px + self.reach_px as f32) * steps).fast_max(zero).fast_min(last);
+        let column = (t + whole) - whole;
+        let middle = minor * (DIRECTIONS as f32 * std::f32::consts::SQRT_2) - 0.5;
+        let row = (middle.fast_max(zero).fast_min(f32x8::splat(DIRECTIONS as f32 - 1.0)) + whole) - whole;
+        let place = (row * columns + column).fast_trunc_int().to_array();
+        let entry: [[f32; 2]; LANES] = from_fn(|i| self.rows[place[i] as usize % SIZE]);
+        let slope = f32x8::new(from_fn(|i| entry[i][1]));
+        let cover = f32x8::new(from_fn(|i| entry[i][0])) + slope * ((t - column) * (1.0 / steps));
+        (cover, slope)
     }
 }
 
@@ -128,7 +118,8 @@ mod tests {
                 let (dx, dy) = (f64::from(x) - c[0], f64::from(y) - c[1]);
                 let rho = dx.hypot(dy);
                 let minor = (dx.abs().min(dy.abs()) / rho) as f32;
-                let p = f64::from(table.at(&[(r - rho) as f32; 8], &[minor; 8]).0[0]);
+                let p =
+                    f64::from(table.at(f32x8::splat((r - rho) as f32), f32x8::splat(minor)).0.to_array()[0]);
                 worst = worst.max((p - disc_in_pixel(dx, dy, r)).abs());
             }
         }
@@ -139,9 +130,13 @@ mod tests {
     #[test]
     fn blur_keeps_the_middle_and_widens_the_edge() {
         let (sharp, soft) = (EdgeTable::new(50.0, 0.0), EdgeTable::new(50.0, 0.8));
-        assert!((f64::from(soft.at(&[0.0; 8], &[0.3; 8]).0[0]) - 0.5).abs() < 0.01);
+        assert!(
+            (f64::from(soft.at(f32x8::splat(0.0), f32x8::splat(0.3)).0.to_array()[0]) - 0.5).abs() < 0.01
+        );
         // One standard deviation of blur and pixel together: sqrt(0.64 + 1/12) = 0.85 px holds 84 %.
-        assert!((f64::from(soft.at(&[0.85; 8], &[0.3; 8]).0[0]) - 0.841).abs() < 0.01);
-        assert_eq!(sharp.at(&[0.85; 8], &[0.3; 8]).0[0], 1.0);
+        assert!(
+            (f64::from(soft.at(f32x8::splat(0.85), f32x8::splat(0.3)).0.to_array()[0]) - 0.841).abs() < 0.01
+        );
+        assert_eq!(sharp.at(f32x8::splat(0.85), f32x8::splat(0.3)).0.to_array()[0], 1.0);
     }
 }

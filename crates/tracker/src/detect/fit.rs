@@ -11,8 +11,9 @@
 use std::array::from_fn;
 
 use nalgebra::{SMatrix, SVector};
+use wide::f32x8;
 
-use super::edge::{EdgeTable, Eight, LANES, lanes};
+use super::edge::{EdgeTable, LANES};
 use super::levels::{Noise, Side};
 
 /// A rectangle of pixels, raw units; behind the last pixel come [`LANES`] more values that mean nothing.
@@ -81,6 +82,8 @@ const MOST_SHIFTS: usize = 32;
 /// A path shorter than this cannot be told from none, px.
 pub(crate) const LEAST_PATH_PX: f64 = 0.3;
 
+const STEPS: f32x8 = f32x8::new([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
+
 /// Rounds of Gauss-Newton; two are usual.
 const ROUNDS: usize = 10;
 /// The last step is the one after which the next would be below this part of the uncertainty.
@@ -111,17 +114,16 @@ const fn place(k: usize, l: usize, n: usize) -> usize {
 /// Adds line K's products; a function for each line, so that all indices are constants.
 #[inline(always)]
 fn products<const K: usize, const N: usize>(
-    sums: &mut [Eight; PRODUCTS],
-    w: &Eight,
-    line: &[Eight; MOVING + 1],
+    sums: &mut [f32x8; PRODUCTS],
+    w: f32x8,
+    line: &[f32x8; MOVING + 1],
 ) {
     if K > N {
         return;
     }
-    let weighted = lanes(|i| w[i] * line[K][i]);
+    let weighted = w * line[K];
     for l in K..=N {
-        let sum = &mut sums[place(K, l, N)];
-        *sum = lanes(|i| sum[i] + weighted[i] * line[l][i]);
+        sums[place(K, l, N)] += weighted * line[l];
     }
 }
 
@@ -150,7 +152,7 @@ impl Ring {
         for k in (0..count).step_by(LANES) {
             let (at, first) = (self.used + k, x + k as f32);
             let to = at..at + LANES;
-            self.x[to.clone()].copy_from_slice(&from_fn::<f32, LANES, _>(|i| first + i as f32));
+            self.x[to.clone()].copy_from_slice(&(f32x8::splat(first) + STEPS).to_array());
             self.y[to.clone()].copy_from_slice(&[y; LANES]);
             self.live[to.clone()].copy_from_slice(&[1.0; LANES]);
             self.value[to].copy_from_slice(&values[k..k + LANES]);
@@ -158,9 +160,9 @@ impl Ring {
         self.used += count;
     }
 
-    fn eights(&self) -> impl Iterator<Item = [&Eight; 4]> {
+    fn eights(&self) -> impl Iterator<Item = [f32x8; 4]> {
         let n = self.used.div_ceil(LANES);
-        let part = |v| <[f32]>::as_chunks::<LANES>(v).0.iter().take(n);
+        let part = |v| <[f32]>::as_chunks::<LANES>(v).0.iter().take(n).map(|&eight| f32x8::new(eight));
         part(&self.x)
             .zip(part(&self.y))
             .zip(part(&self.value).zip(part(&self.live)))
@@ -269,9 +271,12 @@ impl DiscFit<'_> {
             let dy = patch.y0 + j as f64 - cy;
             let half = (outer * outer - dy * dy).max(0.0).sqrt();
             let hole = (inner * inner - dy * dy).max(0.0).sqrt();
-            let clip = |x: f64| (x.max(0.0) as usize).min(patch.width);
-            let (a, d) = (clip((left - half).ceil()), clip((left + half).floor() + 1.0));
-            let (b, c) = (clip((left - hole).floor() + 1.0), clip((left + hole).ceil()));
+            // The first pixel at or behind a place, the first one behind it.
+            let clip = |i: i32| (i.max(0) as usize).min(patch.width);
+            let from = |x: f64| clip(x as i32 + i32::from(f64::from(x as i32) < x));
+            let behind = |x: f64| clip(x as i32 + i32::from(x >= 0.0));
+            let (a, d) = (from(left - half), behind(left + half));
+            let (b, c) = (behind(left - hole), from(left + hole));
             let mut part = |from: usize, to: usize| {
                 let values = &patch.values[j * patch.width + from..];
                 ring.push((from as f64 - left) as f32, dy as f32, values, to.saturating_sub(from));
@@ -327,69 +332,69 @@ impl DiscFit<'_> {
             }
         }
         let share = 1.0 / count as f32;
-        let mut sums = [[0.0f32; LANES]; PRODUCTS];
-        let (mut squares, mut open) = ([0.0f32; LANES], [0.0f32; LANES]);
+        let (read, dark) = (f32x8::splat(read), f32x8::splat(dark));
+        let (limit, zero) = (f32x8::splat(limit), f32x8::ZERO);
+        let mut sums = [zero; PRODUCTS];
+        let (mut squares, mut open) = (zero, zero);
         for [px, py, value, live] in ring.eights() {
             // Coverage, its slopes by x, y and radius, and by the path.
-            let mut sum = [[0.0; LANES]; 6];
+            let mut sum = [zero; 6];
             for [sx, sy, part] in &shifts[..count] {
-                let dx = lanes(|i| px[i] - sx);
-                let dy = lanes(|i| py[i] - sy);
-                let rho = lanes(|i| (dx[i] * dx[i] + dy[i] * dy[i]).max(1e-6).sqrt());
-                let c = lanes(|i| dx[i] / rho[i]);
-                let s = lanes(|i| dy[i] / rho[i]);
-                let inside = lanes(|i| r - rho[i]);
-                let minor = lanes(|i| c[i].abs().min(s[i].abs()));
-                let (cover, rise) = self.table.at(&inside, &minor);
-                let rise = lanes(|i| rise[i] * share);
-                sum[0] = lanes(|i| sum[0][i] + cover[i] * share);
-                sum[1] = lanes(|i| sum[1][i] + rise[i] * c[i]);
-                sum[2] = lanes(|i| sum[2][i] + rise[i] * s[i]);
-                sum[3] = lanes(|i| sum[3][i] + rise[i]);
+                let (dx, dy) = (px - *sx, py - *sy);
+                let rho = (dx * dx + dy * dy).fast_max(f32x8::splat(1e-6)).sqrt();
+                let (c, s) = (dx / rho, dy / rho);
+                let (cover, rise) = self.table.at(f32x8::splat(r) - rho, c.abs().fast_min(s.abs()));
+                let rise = rise * share;
+                let (rise_x, rise_y) = (rise * c, rise * s);
+                sum[0] += cover * share;
+                sum[1] += rise_x;
+                sum[2] += rise_y;
+                sum[3] += rise;
                 if N == MOVING {
-                    sum[4] = lanes(|i| sum[4][i] + rise[i] * c[i] * part);
-                    sum[5] = lanes(|i| sum[5][i] + rise[i] * s[i] * part);
+                    sum[4] += rise_x * *part;
+                    sum[5] += rise_y * *part;
                 }
             }
-            let full = lanes(|i| base + height * sum[0][i]);
-            let model = lanes(|i| full[i].min(limit));
+            let full = sum[0] * height + base;
+            let model = full.fast_min(limit);
             // Saturated in the model and in the picture: nothing to learn.
-            let known = lanes(|i| if full[i] < limit || value[i] < limit { live[i] } else { 0.0 });
-            let w = lanes(|i| known[i] / (read + shot * (sign * model[i] - dark).max(0.0)));
-            let e = lanes(|i| value[i] - model[i]);
-            let mut line = [[0.0f32; LANES]; MOVING + 1];
-            line[0] = lanes(|i| sum[1][i] * height);
-            line[1] = lanes(|i| sum[2][i] * height);
-            line[2] = lanes(|i| sum[3][i] * height);
-            line[3] = [1.0; LANES];
+            let known = live & (full.simd_lt(limit) | value.simd_lt(limit));
+            let w = known / (read + (model * sign - dark).fast_max(zero) * shot);
+            let e = value - model;
+            let mut line = [zero; MOVING + 1];
+            line[0] = sum[1] * height;
+            line[1] = sum[2] * height;
+            line[2] = sum[3] * height;
+            line[3] = f32x8::splat(1.0);
             line[4] = sum[0];
             if N == MOVING {
-                line[5] = lanes(|i| sum[4][i] * height);
-                line[6] = lanes(|i| sum[5][i] * height);
+                line[5] = sum[4] * height;
+                line[6] = sum[5] * height;
             }
             line[N] = e;
-            products::<0, N>(&mut sums, &w, &line);
-            products::<1, N>(&mut sums, &w, &line);
-            products::<2, N>(&mut sums, &w, &line);
-            products::<3, N>(&mut sums, &w, &line);
-            products::<4, N>(&mut sums, &w, &line);
-            products::<5, N>(&mut sums, &w, &line);
-            products::<6, N>(&mut sums, &w, &line);
-            products::<7, N>(&mut sums, &w, &line);
-            squares = lanes(|i| squares[i] + known[i] * e[i] * e[i]);
-            open = lanes(|i| open[i] + known[i]);
+            products::<0, N>(&mut sums, w, &line);
+            products::<1, N>(&mut sums, w, &line);
+            products::<2, N>(&mut sums, w, &line);
+            products::<3, N>(&mut sums, w, &line);
+            products::<4, N>(&mut sums, w, &line);
+            products::<5, N>(&mut sums, w, &line);
+            products::<6, N>(&mut sums, w, &line);
+            products::<7, N>(&mut sums, w, &line);
+            squares += known * e * e;
+            open += known;
         }
-        let total = |s: &Eight| s.iter().map(|&v| f64::from(v)).sum::<f64>();
+        // One lane after another, so that every processor adds in the same order.
+        let total = |s: f32x8| s.to_array().iter().map(|&v| f64::from(v)).sum::<f64>();
         let product = |k: usize, l: usize| {
             let (k, l) = (k.min(l), k.max(l));
-            total(&sums[place(k, l, N)])
+            total(sums[place(k, l, N)])
         };
         Normal {
             matrix: SMatrix::from_fn(product),
             gradient: SVector::from_fn(|k, _| product(k, N)),
             chi2: product(N, N),
-            squares: total(&squares),
-            count: total(&open),
+            squares: total(squares),
+            count: total(open),
         }
     }
 }

@@ -166,7 +166,8 @@ impl Levels {
         let saturation = saturation(&images, best.side, top);
         let area = |part: f64| candidates::weighted_quantile(&best.blobs, |b| b.area, part);
         let low = (0.15 * area(0.05)).max(0.01 * area(0.5)).max(4.0);
-        let high = 6.0 * area(0.95);
+        // Where most blobs are of one size, a few large ones are something else.
+        let high = 6.0 * typical(&best.blobs).unwrap_or_else(|| area(0.95)).min(area(0.95));
         let area_px = [settings.min_area_px.unwrap_or(low), settings.max_area_px.unwrap_or(high)];
         if !(area_px[0] >= 0.0 && area_px[0] <= area_px[1]) {
             return Err(Error::Detect(

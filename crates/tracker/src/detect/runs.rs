@@ -119,7 +119,7 @@ pub(crate) struct Plan {
 }
 
 /// Rows that are tested at once, before each is looked at on its own.
-pub(crate) const BAND: usize = 8;
+pub(crate) const BAND: usize = 4;
 
 impl Plan {
     /// The plan of segments, row by row as `first` says.
@@ -163,8 +163,8 @@ pub(crate) struct Labeller {
     skip: Skip,
 }
 
-/// Pixels tested at once, first many, then few, before any is looked at on its own.
-const MANY: usize = 128;
+/// Pixels of a row tested at once, first a piece, then few, before any is looked at on its own.
+const PIECE: usize = 256;
 const FEW: usize = 16;
 
 impl Labeller {
@@ -200,52 +200,69 @@ impl Labeller {
     }
 
     fn scan(&mut self, pixels: &Pixels<'_>, y: usize, s: Segment, edge_rows: (usize, usize), side: Side) {
-        if !self.skip.may_hold(pixels, y..y + 1, (s.start, s.end), s.threshold, side) {
-            return;
-        }
         let edge_row = y == edge_rows.0 || y == edge_rows.1;
-        if pixels.format == PixelFormat::Gray8 {
-            let from = pixels.start(y, s.start as usize).0;
-            self.runs(&pixels.bytes[from..from + (s.end - s.start) as usize], y, s, edge_row, side);
-        } else {
-            let mut row = std::mem::take(&mut self.row);
-            row.resize((s.end - s.start) as usize, 0);
-            pixels.read(y, s.start as usize, &mut row);
-            self.runs(&row, y, s, edge_row, side);
-            self.row = row;
+        for start in (s.start..s.end).step_by(PIECE) {
+            let end = (start + PIECE as u32).min(s.end);
+            if !self.skip.may_hold(pixels, y..y + 1, (start, end), s.threshold, side) {
+                continue;
+            }
+            let edge = (s.edge.0 && start == s.start, s.edge.1 && end == s.end);
+            let piece = Segment { start, end, edge, ..s };
+            if pixels.format == PixelFormat::Gray8 {
+                let from = pixels.start(y, start as usize).0;
+                self.runs(&pixels.bytes[from..from + (end - start) as usize], y, piece, edge_row, side);
+            } else {
+                let mut row = std::mem::take(&mut self.row);
+                row.resize((end - start) as usize, 0);
+                pixels.read(y, start as usize, &mut row);
+                self.runs(&row, y, piece, edge_row, side);
+                self.row = row;
+            }
         }
     }
 
-    /// The runs of a stretch in which there may be some.
+    /// The runs of a piece in which there may be some.
     fn runs<T: Sample>(&mut self, row: &[T], y: usize, s: Segment, edge_row: bool, side: Side) {
         let Some(limit) = T::limit(s.threshold, side) else { return };
         let mut open: Option<u32> = None;
         let mut x = s.start;
-        for many in row.chunks(MANY) {
-            if open.is_none() && !T::any(many, limit, side) {
-                x += many.len() as u32;
-                continue;
-            }
-            for few in many.chunks(FEW) {
-                if open.is_none() && !T::any(few, limit, side) {
-                    x += few.len() as u32;
-                    continue;
-                }
-                for &v in few {
-                    match (v.beyond(limit, side), open) {
-                        (true, None) => open = Some(x),
-                        (false, Some(x0)) => {
-                            self.run(y as u32, x0, x, edge_row || (s.edge.0 && x0 == s.start));
-                            open = None;
-                        }
-                        _ => {}
-                    }
-                    x += 1;
-                }
+        let (few, rest) = row.as_chunks::<FEW>();
+        for few in few {
+            if open.is_none() && !T::any(few, limit, side) {
+                x += FEW as u32;
+            } else {
+                self.pixels(few, limit, (y, edge_row), &s, side, &mut x, &mut open);
             }
         }
+        self.pixels(rest, limit, (y, edge_row), &s, side, &mut x, &mut open);
         if let Some(x0) = open {
             self.run(y as u32, x0, x, edge_row || (s.edge.0 && x0 == s.start) || s.edge.1);
+        }
+    }
+
+    /// Goes on pixel by pixel from `x`; `open` is where a run began that has not ended.
+    #[inline(always)]
+    #[allow(clippy::too_many_arguments, reason = "the state of one loop")]
+    fn pixels<T: Sample>(
+        &mut self,
+        values: &[T],
+        limit: T,
+        (y, edge_row): (usize, bool),
+        s: &Segment,
+        side: Side,
+        x: &mut u32,
+        open: &mut Option<u32>,
+    ) {
+        for &v in values {
+            match (v.beyond(limit, side), *open) {
+                (true, None) => *open = Some(*x),
+                (false, Some(x0)) => {
+                    self.run(y as u32, x0, *x, edge_row || (s.edge.0 && x0 == s.start));
+                    *open = None;
+                }
+                _ => {}
+            }
+            *x += 1;
         }
     }
 

@@ -5,6 +5,8 @@
 
 use std::ops::Range;
 
+use multiversion::multiversion;
+
 use super::levels::Side;
 use super::pixels::Pixels;
 use crate::frame::PixelFormat;
@@ -50,7 +52,7 @@ sample!(u8, any_u8);
 sample!(u16, any_u16);
 
 /// Every processor has an instruction for the extreme of bytes.
-#[inline]
+#[inline(always)]
 fn any_u8(values: &[u8], limit: u8, side: Side) -> bool {
     match side {
         Side::Bright => values.iter().fold(0, |a, &v| a.max(v)) > limit,
@@ -59,13 +61,37 @@ fn any_u8(values: &[u8], limit: u8, side: Side) -> bool {
 }
 
 /// Not so for 16 bits, but all have saturating differences.
-#[inline]
+#[inline(always)]
 fn any_u16(values: &[u16], limit: u16, side: Side) -> bool {
     let beyond = match side {
         Side::Bright => values.iter().fold(0, |a, &v| a | v.saturating_sub(limit)),
         Side::Dark => values.iter().fold(0, |a, &v| a | limit.saturating_sub(v)),
     };
     beyond != 0
+}
+
+/// The same for little-endian samples in bytes.
+#[inline(always)]
+fn any_pair(bytes: &[u8], limit: u16, side: Side) -> bool {
+    let values = bytes.as_chunks().0.iter().map(|&b| u16::from_le_bytes(b));
+    let beyond = match side {
+        Side::Bright => values.fold(0, |a, v| a | v.saturating_sub(limit)),
+        Side::Dark => values.fold(0, |a, v| a | limit.saturating_sub(v)),
+    };
+    beyond != 0
+}
+
+/// Bytes from which on the widest instructions of the processor are worth the call.
+const LONG: usize = 1024;
+
+#[multiversion(targets("x86_64+avx2"))]
+fn long_u8(values: &[u8], limit: u8, side: Side) -> bool {
+    any_u8(values, limit, side)
+}
+
+#[multiversion(targets("x86_64+avx2"))]
+fn long_pair(bytes: &[u8], limit: u16, side: Side) -> bool {
+    any_pair(bytes, limit, side)
 }
 
 /// Sixteen-bit words of a packed stretch tested at once: a multiple of the packing's period and of a vector.
@@ -148,19 +174,15 @@ impl Skip {
         let (last, skip) = pixels.start(rows.end - 1, columns.1 as usize);
         let last = last + usize::from(skip > 0);
         match pixels.format {
-            PixelFormat::Gray8 => u8::limit(threshold, side)
-                .is_some_and(|limit| u8::any(&pixels.bytes[from..last], limit, side)),
+            PixelFormat::Gray8 => {
+                let Some(limit) = u8::limit(threshold, side) else { return false };
+                let bytes = &pixels.bytes[from..last];
+                if bytes.len() < LONG { any_u8(bytes, limit, side) } else { long_u8(bytes, limit, side) }
+            }
             PixelFormat::Gray16 => {
                 let Some(limit) = u16::limit(threshold, side) else { return false };
-                let mut beyond = 0;
-                for b in pixels.bytes[from..last].chunks_exact(2) {
-                    let v = u16::from_le_bytes([b[0], b[1]]);
-                    beyond |= match side {
-                        Side::Bright => v.saturating_sub(limit),
-                        Side::Dark => limit.saturating_sub(v),
-                    };
-                }
-                beyond != 0
+                let bytes = &pixels.bytes[from..last];
+                if bytes.len() < LONG { any_pair(bytes, limit, side) } else { long_pair(bytes, limit, side) }
             }
             PixelFormat::Packed10 | PixelFormat::Packed12 => {
                 let bits = pixels.format.bits_per_pixel() as usize;

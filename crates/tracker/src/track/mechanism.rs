@@ -22,6 +22,8 @@ pub struct Link {
     pub area_px: Vec<(f64, f64)>,
     /// Origin in the reference frame, px.
     pub home: Vector2<f64>,
+    /// Standard deviation of what places scatter beyond their stated uncertainty, px.
+    pub excess_px: f64,
 }
 
 /// What a point of a body hangs on.
@@ -76,7 +78,7 @@ impl Mechanism {
                 let slack_px = vec![slack_px; nodes.len()];
                 let whole_px = vec![0.0; nodes.len()];
                 let area_px = vec![(0.0, 0.0); nodes.len()];
-                Link { nodes, template, slack_px, whole_px, area_px, home }
+                Link { nodes, template, slack_px, whole_px, area_px, home, excess_px: 0.0 }
             })
             .collect();
         let mut hinges = Vec::new();

@@ -611,10 +611,11 @@ pub fn observations(mechanism: &Mechanism, seen: &[BodySeen], sky: &[Detection])
                 // A marker half hidden may agree by chance; its own uncertainty is that of a whole one.
                 let doubt = d.flags.has(Flags::PARTIAL | Flags::MERGED | Flags::BORDER)
                     || d.area_px < link.whole_px[j];
+                let sigma_px = d.sigma_px.hypot(link.excess_px as f32);
                 out[node] = Observation {
                     x_px: d.x_px,
                     y_px: d.y_px,
-                    sigma_px: if doubt { d.sigma_px.hypot(0.2) } else { d.sigma_px },
+                    sigma_px: if doubt { sigma_px.hypot(0.2) } else { sigma_px },
                     area_px: d.area_px,
                     status: Status::Seen,
                 };
