@@ -129,7 +129,7 @@ def test_published_constants_are_refused_in_words() -> None:
     from pydpend.model import published
 
     angles = measured(released(7, 8.0, 500.0), 7, 0.05)
-    with pytest.warns(), pytest.raises(FitError, match="rises and falls"):
+    with pytest.warns(), pytest.raises(FitError, match="goes up and down"):
         fit_damping(angles, published())
 
 

@@ -55,7 +55,10 @@ def main(case: str, seeds: int) -> None:
         inside += [abs(s) < 1.96 for s in score]
         ratio_ppm.append(float(np.abs(ppm).max()))
         words = ", ".join(f"{n} {e:+.2f} %" for n, e in error.items())
-        print(f"{seed}: chi2 {result.chi2:.4f}; {words}; ratios within {ratio_ppm[-1]:.1f} ppm", flush=True)
+        print(
+            f"{seed}: {result.status}, chi2 {result.chi2:.4f}; {words}; ratios within {ratio_ppm[-1]:.1f} ppm",
+            flush=True,
+        )
     if z:
         print(
             f"{case}: worst {max(np.abs(worst)):.2f} %, ratios {max(ratio_ppm):.1f} ppm, largest |z| "

@@ -17,6 +17,12 @@ FULL = (*PAPER, "tau_c1", "tau_c2", "strip_drag")
 RATIOS = ("lambda", "sigma", "kappa", "a3")
 """Constants whose ratio to psi free motion determines; psi itself is a common factor that it does not."""
 
+
+def ratios_of(links: int) -> tuple[str, ...]:
+    """The ratios that a pendulum of so many links has."""
+    return RATIOS if links == 2 else ("sigma",)
+
+
 RATIO_UNITS = {"lambda": "1", "sigma": "1/s2", "kappa": "1/s2", "a3": "1"}
 
 LAW_OF = {

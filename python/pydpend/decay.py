@@ -58,8 +58,9 @@ def find_decay(
 ) -> Decay:
     """The longest stretch before the end in which no energy comes in, from release to rest.
 
-    The energy may rise by 15 % of its largest value (noise, and constants that are a little off); a lift by
-    hand is far more. ``start_s``, ``stop_s`` state an end instead of finding it.
+    The energy, averaged over a second, may rise by 30 % of its largest value: constants that are wrong make
+    it go up and down, and are refused for that later; a lift by hand is far more. ``start_s``, ``stop_s``
+    state an end instead of finding it.
 
     Raises FitError when the links do not move, or less than a second of free decay is left.
     """
@@ -79,9 +80,10 @@ def find_decay(
     filled = np.column_stack(
         [np.interp(t, t[np.isfinite(c)], c[np.isfinite(c)]) if np.isfinite(c).any() else 0 * t for c in phi.T]
     )
-    energy = model.energy(filled, w) if phi.shape[1] == 2 else model.energy(filled[:, [0, 0]], w[:, [0, 0]])
+    pad = ((0, 0), (0, 2 - phi.shape[1]))  # a lower link that is not there rests
+    energy = model.energy(np.pad(filled, pad), np.pad(w, pad))
     dt = float(np.median(np.diff(t)))
-    energy = _running_mean(energy, max(1, round(0.1 / dt)))
+    energy = _running_mean(energy, max(1, round(1.0 / dt)))
     stop, at_rest = _rest(t, filled, dt)
     last = t.size - 1 if stop is None else int(np.searchsorted(t, stop))
     if stop_s is not None:
@@ -93,7 +95,7 @@ def find_decay(
         # which is judged later.
         resting = np.abs(w[: last + 1]).max(axis=1) < HELD_RAD_S
         brought_in = bool((resting & (energy[: last + 1] < 0.2 * later)).any())
-        rising = np.flatnonzero(energy[: last + 1] < later - 0.15 * energy[: last + 1].max())
+        rising = np.flatnonzero(energy[: last + 1] < later - 0.3 * energy[: last + 1].max())
         first = int(rising[-1]) + 1 if brought_in else 0
         speed = np.abs(w).max(axis=1)
         held = (speed < HELD_RAD_S) & (energy > 0.5 * energy[first:].max())
@@ -125,7 +127,7 @@ def find_decay(
 
 
 def _running_mean(x: Floats, width: int) -> Floats:
-    kernel = np.ones(width)
+    kernel = np.ones(min(width, x.size))
     out: Floats = np.convolve(x, kernel, "same") / np.convolve(np.ones_like(x), kernel, "same")
     return out
 

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import cumulative_simpson
 from scipy.optimize import lsq_linear, minimize
-from scipy.signal import savgol_coeffs, savgol_filter
 
 from pydpend import _tracker
 from pydpend.coefficients import coefficients, parameters
@@ -22,10 +21,6 @@ from pydpend.errors import FitError, fault
 from pydpend.model import Model
 
 Floats = NDArray[np.float64]
-
-WINDOW_S = 0.041
-ORDER = 5
-"""Smoothing: local quintics over 41 ms."""
 
 TERMS = tuple(name for name, _ in _tracker.term_names())
 
@@ -66,6 +61,8 @@ class EnergyProfile:
     names: tuple[str, ...]
     rectification: tuple[float, float]
     """Mean excess of each joint's normal force from acceleration noise that was taken off, relative."""
+    sigma_j: Floats | None = None
+    """Standard errors of the energies, independent of each other, (T,), where they are known."""
 
 
 @dataclass(frozen=True)
@@ -76,38 +73,15 @@ class EnergyFit:
     values: Floats
     """(C,)"""
     covariance: Floats
-    """(C, C), from the residuals with their autocorrelation."""
+    """(C, C), from the energies' standard errors, or from the residuals with their autocorrelation."""
     e0_j: Floats
     """Energy at the start of each profile, (R,)."""
     residual_j: Floats
     """Model minus measured, (T,), profiles one after the other."""
     status: str
     message: str
-
-
-def smooth(t_s: Floats, phi_rad: Floats, window_s: float = WINDOW_S, order: int = ORDER) -> Motion:
-    """Rates and accelerations by local polynomials (Savitzky-Golay) of evenly timed angles (T, 2) without
-    gaps.
-
-    Raises FitError for uneven times or gaps.
-    """
-    step = np.diff(t_s)
-    if step.size < 20 or np.ptp(step) > 0.01 * float(np.median(step)) or not np.isfinite(phi_rad).all():
-        raise FitError(
-            fault(
-                "angles",
-                "the energy fit's smoothing needs evenly timed angles without gaps, at least 20 of them",
-                "Use the trajectory fit, or hand states to it",
-            )
-        )
-    dt = float(np.mean(step))
-    window = _window(window_s, order, dt)
-
-    def filtered(derivative: int) -> Floats:
-        out: Floats = savgol_filter(phi_rad, window, order, deriv=derivative, delta=dt, axis=0)
-        return out
-
-    return Motion(t_s, filtered(0), filtered(1), filtered(2))
+    chi2: float = float("nan")
+    """Mean squared residual over standard error, where the energies have one."""
 
 
 def energy_profile(
@@ -171,16 +145,25 @@ def fit_profiles(profiles: Sequence[EnergyProfile], *, bounded: bool = True) -> 
         )
     design, scale = _design(profiles)
     energy = np.concatenate([p.energy_j for p in profiles])
+    known = [p.sigma_j for p in profiles if p.sigma_j is not None]
+    sigma = np.concatenate(known) if len(known) == len(profiles) else np.ones(energy.size)
     laws = len(names)
     low = np.concatenate([np.zeros(laws), np.full(len(profiles), -np.inf)]) if bounded else -np.inf
-    result = lsq_linear(design, energy, bounds=(low, np.inf), method="bvls", tol=1e-14)
-    x = result.x / scale
-    residual = design @ result.x - energy
+    weighted = design / sigma[:, None]
+    size = np.linalg.norm(weighted, axis=0)
+    result = lsq_linear(
+        weighted / size, energy / sigma, bounds=(low, np.inf), method="bvls", tol=1e-14, max_iter=100
+    )
+    x = result.x / size / scale
+    residual = design @ (result.x / size) - energy
     n, p = design.shape
-    edges = np.cumsum([q.t_s.size for q in profiles])[:-1]
-    tau = max(correlation_time(r) for r in np.split(residual, edges))
-    variance = float(residual @ residual) / max(n - p, 1) * tau
-    covariance = variance * np.linalg.pinv(design.T @ design) / np.outer(scale, scale)
+    chi2 = float(np.sum((residual / sigma) ** 2)) / max(n - p, 1)
+    growth = max(1.0, chi2)
+    if not known:
+        edges = np.cumsum([q.t_s.size for q in profiles])[:-1]
+        growth = chi2 * max(correlation_time(r) for r in np.split(residual, edges))
+    covariance = growth * np.linalg.pinv(weighted.T @ weighted / np.outer(size, size)) / np.outer(size, size)
+    covariance = covariance / np.outer(scale, scale)
     held = [name for name, v in zip(names, x, strict=False) if bounded and v <= 0]
     return EnergyFit(
         names,
@@ -190,6 +173,7 @@ def fit_profiles(profiles: Sequence[EnergyProfile], *, bounded: bool = True) -> 
         residual,
         "converged" if result.success else "iteration_limit",
         f"held at zero: {', '.join(held)}" if held else "no coefficient at its bound",
+        chi2 if known else float("nan"),
     )
 
 
@@ -224,17 +208,6 @@ def _design(profiles: Sequence[EnergyProfile]) -> tuple[Floats, Floats]:
     return design / scale, scale
 
 
-def acceleration_gain(t_s: Floats, window_s: float = WINDOW_S, order: int = ORDER) -> float:
-    """Standard deviation of `smooth`'s accelerations per standard deviation of the angles, 1/s^2."""
-    dt = float(np.median(np.diff(t_s)))
-    weights = savgol_coeffs(_window(window_s, order, dt), order, deriv=2, delta=dt)
-    return float(np.sqrt(np.sum(weights**2)))
-
-
-def _window(window_s: float, order: int, dt: float) -> int:
-    return max(round(window_s / dt) // 2 * 2 + 1, order + 4 - order % 2)
-
-
 def correlation_time(residual: Floats) -> float:
     """Integrated autocorrelation time in samples (1 for white residuals): the sum of correlations up to the
     first one below 0.05, at most a tenth of the record."""
@@ -255,10 +228,8 @@ __all__ = [
     "EnergyProfile",
     "Motion",
     "States",
-    "acceleration_gain",
     "correlation_time",
     "energy_profile",
     "fit_lbfgsb",
     "fit_profiles",
-    "smooth",
 ]

@@ -25,29 +25,11 @@ pub fn ensemble(cases: &[Case], times: &[f64], settings: &Settings) -> Vec<Resul
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::parameters::{Field, Fixed};
+    use crate::fixture::damped;
 
     #[test]
     fn an_ensemble_is_its_runs_in_order() {
-        let fixed = Fixed {
-            m1_kg: 0.3,
-            m2_kg: 0.12,
-            l1_m: 0.17,
-            g_m_s2: 9.81,
-            lower_inner_m: 0.0,
-            lower_outer_m: 0.15,
-        };
-        let mut p = Parameters::zero(fixed);
-        for (field, value) in [
-            (Field::Psi, 3.4e-3),
-            (Field::Lambda, 4.2e-4),
-            (Field::A3, 1.4e-3),
-            (Field::Sigma, 0.45),
-            (Field::Kappa, 0.08),
-            (Field::TauC1, 1e-4),
-        ] {
-            p.set(field, value);
-        }
+        let p = damped();
         let cases: Vec<Case> =
             (0..7).map(|i| Case { parameters: p, state: [0.3 * f64::from(i), 1.0, 0.0, 0.0] }).collect();
         let times = [0.0, 0.5, 1.0];

@@ -1,7 +1,7 @@
 //! The double pendulum: equations of motion, and everything that integrates them.
 //!
 //! ```text
-//! scalar ──▶ parameters ──▶ terms ──▶ motion ──▶ (simulate, shooting)
+//! scalar ──▶ parameters ──▶ terms ──▶ balance ──▶ motion ──▶ (flight ──▶ simulate, shooting)
 //! ```
 //!
 //! Conventions: SI units and radians. `phi1`, `phi2` are absolute link angles, counter-clockwise positive, zero
@@ -16,9 +16,13 @@
 //! 2 lambda a2 + (zeta + A3 cos d) a1 - A3 sin d w1^2 + kappa sin(phi2) = Q2
 //! ```
 
+mod balance;
 pub mod contact;
 pub mod dop853;
 pub mod ensemble;
+#[cfg(test)]
+mod fixture;
+pub mod flight;
 pub mod lyapunov;
 pub mod motion;
 pub mod parameters;

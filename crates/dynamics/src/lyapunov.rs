@@ -109,25 +109,7 @@ fn size(y: &State<Dual<1>>, time: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::parameters::Fixed;
-
-    fn pendulum() -> Parameters<f64> {
-        let fixed = Fixed {
-            m1_kg: 0.3,
-            m2_kg: 0.12,
-            l1_m: 0.17,
-            g_m_s2: 9.81,
-            lower_inner_m: 0.0,
-            lower_outer_m: 0.15,
-        };
-        let mut p = Parameters::zero(fixed);
-        for (field, value) in [(Field::Psi, 3.4e-3), (Field::Lambda, 4.2e-4), (Field::A3, 1.4e-3)] {
-            p.set(field, value);
-        }
-        p.set(Field::Sigma, 0.45);
-        p.set(Field::Kappa, 0.08);
-        p
-    }
+    use crate::fixture::pendulum;
 
     #[test]
     fn small_swings_do_not_grow_and_the_drop_does() {

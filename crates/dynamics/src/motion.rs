@@ -4,9 +4,10 @@
 //! equations are solved together: Newton's method in `f64`, then one step in the scalar wanted, which carries the
 //! derivatives exactly (implicit function theorem).
 
+use crate::balance::{Balance, joint_forces, masses, norm, signs, solve2, trig};
 use crate::parameters::{Field, Parameters};
-use crate::scalar::Real;
-use crate::terms::{Kind, Kinematics, TERMS};
+use crate::scalar::{Dual, Real};
+use crate::terms::{Kinematics, TERMS};
 
 /// `[phi1, phi2, w1, w2]`, rad and rad/s.
 pub type State<S> = [S; 4];
@@ -35,73 +36,10 @@ pub struct Motion<S> {
     /// What dry friction can hold at each joint, N m: `r mu N + tau_c`.
     pub capacity: [S; 2],
 }
-
-/// Sines and cosines of a state, once.
-#[derive(Clone, Copy)]
-struct Trig<S> {
-    s: [S; 2],
-    c: [S; 2],
-    s_d: S,
-    c_d: S,
-}
-
-fn trig<S: Real>(x: &State<S>) -> Trig<S> {
-    let (s1, c1) = x[0].sin_cos();
-    let (s2, c2) = x[1].sin_cos();
-    Trig { s: [s1, s2], c: [c1, c2], s_d: s1 * c2 - c1 * s2, c_d: c1 * c2 + s1 * s2 }
-}
-
-/// Added-mass constants `(A, B, C)` for an added inertia of one: `T = 1/2 (A c^2 w1^2 + 2 B c w1 w2 + C w2^2)`.
-fn added<S: Real>(p: &Parameters<S>) -> [f64; 3] {
-    let (a, b, l) = (p.fixed.lower_inner_m, p.fixed.lower_outer_m, p.fixed.l1_m);
-    let second = (b.powi(3) - a.powi(3)) / 3.0;
-    if second > 0.0 { [l * l * (b - a) / second, l * (b * b - a * a) / 2.0 / second, 1.0] } else { [0.0; 3] }
-}
-
-fn masses<S: Real>(p: &Parameters<S>, c_d: S) -> [S; 3] {
-    let mut m11 = p.get(Field::Psi) * 2.0;
-    let mut m12 = p.get(Field::Zeta) + p.get(Field::A3) * c_d;
-    let mut m22 = p.get(Field::Lambda) * 2.0;
-    let extra = p.get(Field::AddedInertia);
-    if p.is_active(Field::AddedInertia) {
-        let k = added(p);
-        m11 += extra * c_d * c_d * k[0];
-        m12 += extra * c_d * k[1];
-        m22 += extra * k[2];
-    }
-    [m11, m12, m22]
-}
-
 /// The symmetric mass matrix `[m11, m12, m22]` at these angles, kg m^2 (`T = w' M w / 2`).
 pub fn mass_matrix<S: Real>(p: &Parameters<S>, phi: [S; 2]) -> [S; 3] {
     let (_, c_d) = (phi[0] - phi[1]).sin_cos();
     masses(p, c_d)
-}
-
-/// Joint forces `[Tx1, Ty1, Tx2, Ty2]`, N (Eq. 33 corrected, erratum 15): affine in the accelerations.
-fn joint_forces<S: Real>(p: &Parameters<S>, x: &State<S>, t: &Trig<S>, a: [S; 2]) -> [S; 4] {
-    let g = p.fixed.g_m_s2;
-    let (ga, gk) = (p.get(Field::Sigma) * inverse(g), p.get(Field::Kappa) * inverse(g));
-    let b1 = p.fixed.m2_kg * p.fixed.l1_m;
-    let f = |i: usize| t.c[i] * a[i] - t.s[i] * x[2 + i] * x[2 + i];
-    let h = |i: usize| t.s[i] * a[i] + t.c[i] * x[2 + i] * x[2 + i];
-    let (f1, f2, h1, h2) = (f(0), f(1), h(0), h(1));
-    [
-        ga * f1 + gk * f2,
-        ga * h1 + gk * h2 + (p.fixed.m1_kg + p.fixed.m2_kg) * g,
-        f1 * b1 + gk * f2,
-        h1 * b1 + gk * h2 + p.fixed.m2_kg * g,
-    ]
-}
-
-/// First moments of mass are weight moments over g; without gravity they are not known from them and taken as zero.
-fn inverse(g: f64) -> f64 {
-    if g > 0.0 { 1.0 / g } else { 0.0 }
-}
-
-fn norm<S: Real>(x: S, y: S) -> S {
-    let n2 = x * x + y * y;
-    if n2.value() > 0.0 { n2.sqrt() } else { S::constant(0.0) }
 }
 
 /// Normal forces at both joints for given accelerations, N (Eq. 34 with the constants of erratum 16).
@@ -121,168 +59,6 @@ pub fn energies<S: Real>(p: &Parameters<S>, x: &State<S>) -> [S; 2] {
     [kinetic, potential]
 }
 
-fn signs<S: Real>(x: &State<S>, contact: [Contact; 2]) -> [S; 2] {
-    let rate = [x[2], x[3] - x[2]];
-    [0, 1].map(|j| match contact[j] {
-        Contact::Slip(sign) => S::constant(sign),
-        Contact::Smooth(width) => (rate[j] * (1.0 / width)).tanh(),
-        Contact::Stuck => S::constant(0.0),
-    })
-}
-
-/// Everything of the equations that does not depend on the accelerations, evaluated once per state.
-struct Balance<'a, S> {
-    p: &'a Parameters<S>,
-    x: &'a State<S>,
-    t: Trig<S>,
-    m: [S; 3],
-    /// Forces without the load-dependent ones.
-    q: [S; 2],
-    sign: [S; 2],
-    contact: [Contact; 2],
-    /// Power each term takes out, without the load-dependent ones.
-    power: [S; TERMS.len()],
-}
-
-impl<'a, S: Real> Balance<'a, S> {
-    fn new(p: &'a Parameters<S>, x: &'a State<S>, contact: [Contact; 2]) -> Self {
-        let t = trig(x);
-        let m = masses(p, t.c_d);
-        let (w1, w2) = (x[2], x[3]);
-        let a3s = p.get(Field::A3) * t.s_d;
-        let mut down = t.s;
-        if p.is_active(Field::Tilt) {
-            let (st, ct) = p.get(Field::Tilt).sin_cos();
-            down = [0, 1].map(|i| t.s[i] * ct - t.c[i] * st);
-        }
-        let mut q =
-            [-(a3s * w2 * w2) - p.get(Field::Sigma) * down[0], a3s * w1 * w1 - p.get(Field::Kappa) * down[1]];
-        if p.is_active(Field::AddedInertia) {
-            let k = added(p);
-            let s = p.get(Field::AddedInertia) * t.s_d;
-            q[0] += s * (t.c_d * w1 * (w1 - w2 * 2.0) * k[0] - w2 * w2 * k[1]);
-            q[1] += s * w1 * w1 * (t.c_d * k[0] + k[1]);
-        }
-        let sign = signs(x, contact);
-        let zero = S::constant(0.0);
-        let k = Kinematics { w: [w1, w2], cos_d: t.c_d, normal: [zero, zero], sign };
-        let mut power = [zero; TERMS.len()];
-        for (term, watt) in TERMS.iter().zip(&mut power) {
-            // The load-dependent terms see no load here; they are added with the accelerations.
-            if !p.is_active(term.field)
-                || matches!(term.field, Field::Rmu1 | Field::Rmu2)
-                || !matches!(term.kind, Kind::Drag | Kind::Dry | Kind::Drive)
-            {
-                continue;
-            }
-            let f = term.unit_force(&k, &p.fixed);
-            let c = p.get(term.field);
-            q[0] -= c * f[0];
-            q[1] -= c * f[1];
-            *watt = c * (f[0] * w1 + f[1] * w2);
-        }
-        Self { p, x, t, m, q, sign, contact, power }
-    }
-
-    /// Normal forces and dry torques that belong to these accelerations.
-    fn motion(&self, a: [S; 2]) -> Motion<S> {
-        let (r, normal) = self.imbalance(a);
-        let capacity = [
-            self.p.get(Field::Rmu1) * normal[0] + self.p.get(Field::TauC1),
-            self.p.get(Field::Rmu2) * normal[1] + self.p.get(Field::TauC2),
-        ];
-        // Where a joint is stuck, the imbalance left is what its constraint must give.
-        let sliding = |j: usize| self.sign[j] * capacity[j];
-        let dry = match (self.contact[0] == Contact::Stuck, self.contact[1] == Contact::Stuck) {
-            (false, false) => [sliding(0), sliding(1)],
-            (true, false) => [-r[0], sliding(1)],
-            (false, true) => [sliding(0), -r[1]],
-            (true, true) => [-r[0] - r[1], -r[1]],
-        };
-        Motion { a, normal, dry, capacity }
-    }
-
-    /// Inertia minus force on both links, without constraint torques, and the normal forces.
-    fn imbalance(&self, a: [S; 2]) -> ([S; 2], [S; 2]) {
-        let mut r = [
-            self.m[0] * a[0] + self.m[1] * a[1] - self.q[0],
-            self.m[1] * a[0] + self.m[2] * a[1] - self.q[1],
-        ];
-        let t = joint_forces(self.p, self.x, &self.t, a);
-        let n = [norm(t[0], t[1]), norm(t[2], t[3])];
-        let load =
-            [self.p.get(Field::Rmu1) * n[0] * self.sign[0], self.p.get(Field::Rmu2) * n[1] * self.sign[1]];
-        r[0] += load[0] - load[1];
-        r[1] += load[1];
-        (r, n)
-    }
-
-    /// The two equations that determine the accelerations, given the imbalance.
-    fn equations(&self, r: [S; 2], a: [S; 2]) -> [S; 2] {
-        match (self.contact[0] == Contact::Stuck, self.contact[1] == Contact::Stuck) {
-            (false, false) => r,
-            (true, false) => [a[0], r[1]],
-            (false, true) => [r[0] + r[1], a[1] - a[0]],
-            (true, true) => [a[0], a[1] - a[0]],
-        }
-    }
-}
-
-impl Balance<'_, f64> {
-    /// Derivative of [`Balance::equations`] with respect to the accelerations, `[d1/da1, d1/da2, d2/da1, d2/da2]`.
-    fn slope(&self, a: [f64; 2]) -> [f64; 4] {
-        let f = joint_forces(self.p, self.x, &self.t, a);
-        let (t, p) = (&self.t, self.p);
-        let g = p.fixed.g_m_s2;
-        let (ga, gk) = (p.get(Field::Sigma) * inverse(g), p.get(Field::Kappa) * inverse(g));
-        let b1 = p.fixed.m2_kg * p.fixed.l1_m;
-        let of = |x: f64, y: f64, k1: f64| {
-            let n = x.hypot(y);
-            if n > 0.0 {
-                [(x * t.c[0] + y * t.s[0]) * k1 / n, (x * t.c[1] + y * t.s[1]) * gk / n]
-            } else {
-                [0.0; 2]
-            }
-        };
-        let (n1, n2) = (of(f[0], f[1], ga), of(f[2], f[3], b1));
-        let (c1, c2) = (p.get(Field::Rmu1) * self.sign[0], p.get(Field::Rmu2) * self.sign[1]);
-        let row1 = [0, 1].map(|i| self.m[i] + c1 * n1[i] - c2 * n2[i]);
-        let row2 = [0, 1].map(|i| self.m[1 + i] + c2 * n2[i]);
-        match (self.contact[0] == Contact::Stuck, self.contact[1] == Contact::Stuck) {
-            (false, false) => [row1[0], row1[1], row2[0], row2[1]],
-            (true, false) => [1.0, 0.0, row2[0], row2[1]],
-            (false, true) => [row1[0] + row2[0], row1[1] + row2[1], -1.0, 1.0],
-            (true, true) => [1.0, 0.0, -1.0, 1.0],
-        }
-    }
-
-    fn solve(&self) -> [f64; 2] {
-        let mut a = [0.0; 2];
-        // Without friction by load the equations are linear, and Newton's first step is the solution.
-        let linear = !self.p.is_active(Field::Rmu1) && !self.p.is_active(Field::Rmu2);
-        for _ in 0..50 {
-            let (r, _) = self.imbalance(a);
-            let e = self.equations(r, a);
-            let step = solve2(self.slope(a), e);
-            a = [a[0] - step[0], a[1] - step[1]];
-            if linear {
-                break;
-            }
-            // Newton converges quadratically: after a step of 1e-7 relative the next would be below rounding.
-            if step[0].abs() + step[1].abs() <= 1e-7 * (1.0 + a[0].abs() + a[1].abs()) {
-                break;
-            }
-        }
-        a
-    }
-}
-
-#[inline]
-fn solve2<S: Real>(k: [f64; 4], e: [S; 2]) -> [S; 2] {
-    let inverse = 1.0 / (k[0] * k[3] - k[1] * k[2]);
-    [(e[0] * k[3] - e[1] * k[1]) * inverse, (e[1] * k[0] - e[0] * k[2]) * inverse]
-}
-
 /// Accelerations, normal forces and dry torques in state `x`, with each joint's dry friction as `contact` says.
 ///
 /// Solved to rounding for the implicit normal forces. In a scalar with derivatives these are exact. The mass matrix
@@ -297,6 +73,64 @@ pub fn accelerations<S: Real>(p: &Parameters<S>, x: &State<S>, contact: [Contact
     let step = solve2(values.slope(start), balance.equations(r, a));
     a = [a[0] - step[0], a[1] - step[1]];
     balance.motion(a)
+}
+
+/// The parameters in a scalar, with what [`Flow::accelerations`] needs of them once.
+pub struct Flow<'a, S> {
+    p: &'a Parameters<S>,
+    values: Parameters<f64>,
+    lifted: Parameters<Dual<4>>,
+    varied: Vec<Field>,
+}
+
+impl<'a, S: Real> Flow<'a, S> {
+    /// Looks up which parameters carry derivatives.
+    pub fn new(p: &'a Parameters<S>) -> Self {
+        let values = p.value();
+        let carries = |field: &Field| {
+            let parameter = p.get(*field);
+            S::DIRECTIONS > 0 && !(parameter - S::constant(parameter.value())).vanishes()
+        };
+        let varied = Field::ALL.into_iter().filter(carries).collect();
+        Self { p, lifted: values.lift(), values, varied }
+    }
+
+    /// The parameters without derivatives.
+    #[must_use]
+    pub fn values(&self) -> &Parameters<f64> {
+        &self.values
+    }
+
+    /// The accelerations of [`accelerations`], in a fraction of its time for many directions: the derivatives with
+    /// respect to the four state variables and each parameter are found first, and the chain rule does the rest.
+    #[must_use]
+    pub fn accelerations(&self, x: &State<S>, contact: [Contact; 2]) -> [S; 2] {
+        let at = x.map(|v| v.value());
+        let balance = Balance::new(&self.values, &at, contact);
+        let start = balance.solve();
+        let mut a = start.map(S::constant);
+        if S::DIRECTIONS == 0 {
+            return a;
+        }
+        let slope = balance.slope(start);
+        let state = std::array::from_fn(|i| Dual::<4>::variable(at[i], i));
+        let local = Balance::new(&self.lifted, &state, contact);
+        let held = start.map(Dual::constant);
+        let (r, _) = local.imbalance(held);
+        let by_state = solve2(slope, local.equations(r, held));
+        for (link, out) in a.iter_mut().enumerate() {
+            for (i, variable) in x.iter().enumerate() {
+                out.carry(-by_state[link].d[i], variable);
+            }
+        }
+        for field in &self.varied {
+            let by = solve2(slope, balance.by_parameter(*field, start));
+            for (link, out) in a.iter_mut().enumerate() {
+                out.carry(-by[link], &self.p.get(*field));
+            }
+        }
+        a
+    }
 }
 
 /// [`accelerations`] and [`dissipation`] in plain numbers and one pass: what a simulation evaluates at every stage.
@@ -332,44 +166,7 @@ pub fn dissipation<S: Real>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::parameters::Fixed;
-    use crate::scalar::Dual;
-
-    fn pendulum() -> Parameters<f64> {
-        let fixed = Fixed {
-            m1_kg: 0.3057,
-            m2_kg: 0.1225,
-            l1_m: 0.1719,
-            g_m_s2: 9.81,
-            lower_inner_m: -0.02,
-            lower_outer_m: 0.19,
-        };
-        let mut p = Parameters::zero(fixed);
-        for (field, value) in [
-            (Field::Psi, 3.431e-3),
-            (Field::Lambda, 4.193e-4),
-            (Field::Zeta, 1.86e-8),
-            (Field::A3, 1.4257e-3),
-            (Field::Sigma, 0.4502),
-            (Field::Kappa, 0.08136),
-            (Field::MuV1, 1.76e-5),
-            (Field::MuV2, 5.08e-6),
-            (Field::MuQ1, 1.43e-5),
-            (Field::MuQ2, 3e-7),
-            (Field::Rmu1, 4.5e-5),
-            (Field::Rmu2, 3.7e-5),
-            (Field::TauC1, 1e-4),
-            (Field::TauC2, 2e-5),
-            (Field::StripDrag, 1e-6),
-            (Field::AddedInertia, 1e-5),
-            (Field::Tilt, 0.01),
-            (Field::Offset1, 1e-5),
-            (Field::Offset2, -2e-5),
-        ] {
-            p.set(field, value);
-        }
-        p
-    }
+    use crate::fixture::all_terms as pendulum;
 
     const SLIPS: [[Contact; 2]; 4] = [
         [Contact::Slip(1.0), Contact::Slip(-1.0)],
@@ -446,6 +243,32 @@ mod tests {
                         "{contact:?} direction {i} link {link}: {} {difference}",
                         exact[link].d[i]
                     );
+                }
+            }
+        }
+    }
+
+    /// The two ways to the derivatives are written apart; they must agree to rounding.
+    #[test]
+    fn the_chain_rule_gives_the_same_derivatives() {
+        let mut p = pendulum();
+        p.set(Field::Rmu1, 4e-3);
+        p.set(Field::Rmu2, 2e-3);
+        const N: usize = 4 + Field::COUNT;
+        let mut dual: Parameters<Dual<N>> = p.lift();
+        for (i, field) in Field::ALL.into_iter().enumerate() {
+            dual.set(field, Dual::variable(p.get(field), 4 + i));
+        }
+        for contact in SLIPS.into_iter().chain([[Contact::Stuck; 2]]) {
+            let x = state(contact);
+            let xd: State<Dual<N>> = std::array::from_fn(|i| Dual::variable(x[i], i));
+            let (whole, chained) =
+                (accelerations(&dual, &xd, contact).a, Flow::new(&dual).accelerations(&xd, contact));
+            for link in 0..2 {
+                assert!((whole[link].v - chained[link].v).abs() < 1e-12 * (1.0 + whole[link].v.abs()));
+                for i in 0..N {
+                    let (w, c) = (whole[link].d[i], chained[link].d[i]);
+                    assert!((w - c).abs() < 1e-9 * (1.0 + w.abs()), "{contact:?} {link} {i}: {w} {c}");
                 }
             }
         }

@@ -24,6 +24,10 @@ pub trait Real:
     fn vanishes(&self) -> bool;
     /// A function of this number with the given value and derivative there.
     fn chain(self, value: f64, slope: f64) -> Self;
+    /// How many directions it is differentiated in.
+    const DIRECTIONS: usize;
+    /// Adds `slope` times the derivatives of `inner` to the derivatives, the value left as it is.
+    fn carry(&mut self, slope: f64, inner: &Self);
 
     /// Sine and cosine.
     #[inline]
@@ -67,6 +71,9 @@ impl Real for f64 {
     fn chain(self, value: f64, _slope: f64) -> Self {
         value
     }
+    const DIRECTIONS: usize = 0;
+    #[inline]
+    fn carry(&mut self, _slope: f64, _inner: &Self) {}
 }
 
 /// A value and its derivatives in `N` directions: `v + d·e`, with `e_i e_j = 0`.
@@ -123,6 +130,13 @@ impl<const N: usize> Real for Dual<N> {
     #[inline]
     fn chain(self, value: f64, slope: f64) -> Self {
         self.map(value, |x| x * slope)
+    }
+    const DIRECTIONS: usize = N;
+    #[inline]
+    fn carry(&mut self, slope: f64, inner: &Self) {
+        for (x, y) in self.d.iter_mut().zip(&inner.d) {
+            *x += slope * y;
+        }
     }
 }
 

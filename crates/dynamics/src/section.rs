@@ -2,9 +2,10 @@
 
 use std::f64::consts::TAU;
 
+use crate::flight::Flight;
 use crate::motion::State;
 use crate::parameters::Parameters;
-use crate::simulate::{Failure, Flight, Settings};
+use crate::simulate::{Failure, Settings};
 
 /// Points of each step at which the angle is examined.
 const LOOKS: u32 = 8;
@@ -64,31 +65,21 @@ pub fn poincare(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::parameters::{Field, Fixed};
+    use crate::fixture::pendulum;
+    use crate::parameters::Field;
 
     #[test]
     fn a_pinned_pendulum_passes_its_lowest_point_twice_a_period() {
-        let fixed = Fixed {
-            m1_kg: 0.3,
-            m2_kg: 0.12,
-            l1_m: 0.17,
-            g_m_s2: 9.81,
-            lower_inner_m: 0.0,
-            lower_outer_m: 0.15,
-        };
-        let mut p = Parameters::zero(fixed);
-        for (field, value) in [(Field::Psi, 3.4e-3), (Field::Lambda, 4e-4), (Field::A3, 1.4e-3)] {
-            p.set(field, value);
-        }
-        p.set(Field::Sigma, 0.45);
-        p.set(Field::Kappa, 0.08);
+        let p = pendulum();
         let settings = Settings { pinned: true, ..Settings::default() };
         let section = Section { link: 0, angle_rad: 0.0, direction: 1.0 };
         let amplitude: f64 = 1e-3;
         let found = poincare(&p, [amplitude, amplitude, 0.0, 0.0], 20.0, section, &settings).unwrap();
-        let inertia: f64 = 2.0 * (3.4e-3 + 4e-4 + 1.4e-3);
+        let sum = |fields: [Field; 2]| fields.iter().map(|f| p.get(*f)).sum::<f64>();
+        let inertia = 2.0 * (sum([Field::Psi, Field::Lambda]) + sum([Field::Zeta, Field::A3]));
+        let weight = sum([Field::Sigma, Field::Kappa]);
         // period of a small swing, with the amplitude's first correction
-        let period = TAU * (inertia / 0.53).sqrt() * (1.0 + amplitude * amplitude / 16.0);
+        let period = TAU * (inertia / weight).sqrt() * (1.0 + amplitude * amplitude / 16.0);
         for (k, (t, x)) in found.iter().enumerate() {
             let expected = period * (0.75 + k as f64);
             // the next correction is of order amplitude^4; the rest is the integrator

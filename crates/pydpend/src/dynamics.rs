@@ -45,17 +45,24 @@ struct Angles {
     t_s: Vec<f64>,
     phi: [Vec<f64>; 2],
     sigma: [Vec<f64>; 2],
+    links: usize,
 }
 
 type AnglesIn<'py> = (PyReadonlyArray1<'py, f64>, PyReadonlyArray2<'py, f64>, PyReadonlyArray2<'py, f64>);
 
 fn angles(given: &AnglesIn<'_>) -> PyResult<Angles> {
     let (t, phi, sigma) = (given.0.as_array(), given.1.as_array(), given.2.as_array());
-    if phi.shape() != [t.len(), 2] || sigma.shape() != [t.len(), 2] {
-        return Err(PyValueError::new_err("angles and sigmas must have the shape (T, 2)"));
+    let links = if phi.shape() == [t.len(), 1] { 1 } else { 2 };
+    if phi.shape() != [t.len(), links] || sigma.shape() != [t.len(), links] {
+        return Err(PyValueError::new_err(
+            "angles and sigmas must have the shape (T, 2), or (T, 1) of one link",
+        ));
     }
-    let column = |a: &numpy::ndarray::ArrayView2<'_, f64>, j: usize| a.column(j).to_vec();
+    let column = |a: &numpy::ndarray::ArrayView2<'_, f64>, j: usize| {
+        if j < links { a.column(j).to_vec() } else { vec![f64::NAN; t.len()] }
+    };
     Ok(Angles {
+        links,
         t_s: t.to_vec(),
         phi: [column(&phi, 0), column(&phi, 1)],
         sigma: [column(&sigma, 0), column(&sigma, 1)],
@@ -68,6 +75,7 @@ impl Angles {
             t_s: &self.t_s,
             phi_rad: [&self.phi[0], &self.phi[1]],
             sigma_rad: [&self.sigma[0], &self.sigma[1]],
+            links: self.links,
         }
     }
 }
@@ -212,10 +220,14 @@ pub fn shooting_fit<'py>(
     out.set_item("slack", fit.slack)?;
     out.set_item("own_sigma", fit.own_sigma)?;
     out.set_item("joint_chi2", fit.joint_chi2)?;
+    out.set_item("log_evidence", fit.log_evidence)?;
+    out.set_item("cost", fit.cost)?;
     out.set_item("squares", fit.squares)?;
     out.set_item("counts", fit.counts)?;
     out.set_item("state_freedom", fit.state_freedom)?;
     out.set_item("stuck", fit.stuck)?;
+    let spread: Vec<f64> = fit.state_covariance.iter().flat_map(|m| m.iter().copied()).collect();
+    out.set_item("state_covariance", spread.to_pyarray(py).reshape([fit.state_covariance.len(), 4, 4])?)?;
     out.set_item("iterations", fit.iterations)?;
     let status = match fit.status {
         Status::Converged => "converged",

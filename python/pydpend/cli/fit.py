@@ -47,6 +47,7 @@ def add_arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument(
         "--angle-maps", action="store_true", help="learn repeatable angle-dependent bias of the tracking"
     )
+    p.add_argument("--pinned", action="store_true", help="the elbow is pinned: a single pendulum")
     p.add_argument(
         "--no-prediction", action="store_true", help="do not fit again without each part to predict it"
     )
@@ -139,6 +140,7 @@ def run(args: argparse.Namespace) -> int:
         "ratios": args.ratios == "free",
         "free": [name for name in args.free.split(",") if name],
         "angle_maps": args.angle_maps,
+        "pinned": args.pinned,
     }
     report = progress("fit", args.quiet)
     fit = fit_damping(
@@ -173,6 +175,8 @@ def run(args: argparse.Namespace) -> int:
 
 def describe(fit: DampingFit) -> list[str]:
     """The result in lines for a reader."""
+    from pydpend.damping.prediction import slashed
+
     lines = [fit.message]
     for name, e in fit.coefficients.items():
         lines.append(f"{name:12s} {e.value: .4e} +- {e.sigma:.1e} {e.unit}")
@@ -184,5 +188,6 @@ def describe(fit: DampingFit) -> list[str]:
         )
         lines.append(f"energy by {group}: {parts}")
     for window, p in fit.prediction.items():
-        lines.append(f"prediction, {window} s windows: {p['phi1_deg']:.3f}/{p['phi2_deg']:.3f} deg RMS")
+        errors = slashed([p[key] for key in ("phi1_deg", "phi2_deg") if key in p])
+        lines.append(f"prediction, {window} s windows: {errors} deg RMS")
     return [*lines, *fit.identifiability.sentences, *fit.notes]

@@ -29,6 +29,7 @@ def add_arguments(p: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Predicts and writes."""
+    from pydpend.damping.prediction import slashed
     from pydpend.damping.stored import load_fit, write_json
     from pydpend.errors import FitError, fault
 
@@ -42,9 +43,10 @@ def run(args: argparse.Namespace) -> int:
     result = stored.predict(read(args.angles, args), windows, start_s=args.start, stop_s=args.stop)
     args.output.mkdir(parents=True, exist_ok=True)
     write_json(args.output / "predict.json", result.to_json())
-    lines = ["window_s,start_s,phi1_rms_deg,phi2_rms_deg"]
+    links = next(iter(result.rows.values())).shape[1] - 1
+    lines = [",".join(("window_s", "start_s", *(f"phi{j + 1}_rms_deg" for j in range(links))))]
     for window, rows in result.rows.items():
-        lines += [f"{window},{start:.6f},{a:.6f},{b:.6f}" for start, a, b in rows]
+        lines += [",".join((window, *(f"{v:.6f}" for v in row))) for row in rows]
     (args.output / "windows.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
     from pydpend.plots.damping import windows_columns, windows_figure
     from pydpend.plots.style import save
@@ -57,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
         for title, group in (("in window", result.in_window), ("forecast", result.forecast)):
             for window, w in group.items():
                 print(
-                    f"{title} {window} s: RMS {w.rms_deg[0]:.3f}/{w.rms_deg[1]:.3f} deg, "
-                    f"median {w.median_deg[0]:.3f}/{w.median_deg[1]:.3f} deg, {w.n} windows"
+                    f"{title} {window} s: RMS {slashed(w.rms_deg)} deg, "
+                    f"median {slashed(w.median_deg)} deg, {w.n} windows"
                 )
     return 0

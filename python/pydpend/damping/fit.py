@@ -8,13 +8,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pydpend import energy
 from pydpend.angles import LinkAngles
-from pydpend.coefficients import RATIOS, coefficients, parameters, unit
+from pydpend.coefficients import JOINT_OF, coefficients, parameters, ratios_of, unit
 from pydpend.damping.prediction import held_out
+from pydpend.damping.profile import fit_energy
 from pydpend.damping.result import DampingFit, EnergyCurve, Estimate
 from pydpend.damping.shares import shares
 from pydpend.damping.shooting import Progress
+from pydpend.damping.single import reduced
 from pydpend.damping.trajectory import Recording, fit_trajectory, plausible_or_raise, prepare
 from pydpend.damping.uncertainty import identifiability
 from pydpend.errors import FitError, fault
@@ -35,6 +36,7 @@ def fit_damping(
     free: Sequence[str] = (),
     clock: bool = False,
     angle_maps: bool = False,
+    pinned: bool = False,
     predict: bool = False,
     progress: Progress | None = None,
 ) -> DampingFit:
@@ -45,19 +47,30 @@ def fit_damping(
     ``"full"``, ``"paper"`` or names of coefficients. ``ratios``: whether lambda, sigma, kappa and a3 over
     psi are free too (trajectory only; the energy method uses the model's). ``free``: further parameters
     (``added_inertia``, ``tilt``, ``offset1``, ``offset2``); ``clock``: the camera clock's scale.
-    ``angle_maps``: learn repeatable angle bias. ``predict``: also fit without each part in turn and predict
-    it. The free decay is found unless ``start_s`` and ``stop_s`` state it.
+    ``pinned``: the elbow is pinned, and the pendulum a single one; angles of one link are a single pendulum's too,
+    and ``model``'s upper link alone is theirs. ``angle_maps``: learn repeatable angle bias. ``predict``: also
+    fit without each part in turn and predict it. The free decay is found unless ``start_s`` and ``stop_s`` state it.
 
     Raises FitError for recordings without a free decay and models the recordings refute.
     """
     names = coefficients(laws)
-    recordings = [
-        prepare(a, model, start_s, stop_s) for a in ([angles] if isinstance(angles, LinkAngles) else angles)
-    ]
-    if not recordings:
+    given = [angles] if isinstance(angles, LinkAngles) else list(angles)
+    if not given:
         raise FitError(fault("fit", "there is no recording", "Give at least one"))
+    if pinned or any(a.links == 1 for a in given):
+        given, model = reduced(given, model, pinned)
+        names = tuple(name for name in names if JOINT_OF[name] == "upper")
+        if not names or angle_maps:
+            raise FitError(
+                fault(
+                    "fit",
+                    "angle maps are of two links" if names else "no law of the upper joint is asked for",
+                    "A single pendulum has mu_v1, mu_q1, rmu1 and tau_c1, and no maps",
+                )
+            )
+    recordings = [prepare(a, model, start_s, stop_s) for a in given]
     if method == "energy":
-        return _energy(recordings, model, names)
+        return _energy(recordings, model, names, progress)
     if method != "trajectory":
         raise FitError(fault("fit", f"method {method!r} is not known", "Use trajectory or energy"))
 
@@ -80,21 +93,14 @@ def fit_damping(
     return fit
 
 
-def _energy(recordings: Sequence[Recording], model: Model, names: Sequence[str]) -> DampingFit:
+def _energy(
+    recordings: Sequence[Recording], model: Model, names: Sequence[str], progress: Progress | None
+) -> DampingFit:
     """The paper's fit, to all recordings at once: common coefficients, an E0 each."""
-    profiles, spans = [], []
     for r in recordings:
         plausible_or_raise(r, model)
-        here = (r.angles.t_s >= r.span[0]) & (r.angles.t_s <= r.span[1])
-        t, phi = r.angles.t_s[here], r.angles.phi_rad[here]
-        motion = energy.smooth(t, phi)
-        noise = (r.noise.measured_rad[0], r.noise.measured_rad[1])
-        gain = energy.acceleration_gain(t)
-        profiles.append(
-            energy.energy_profile(motion, model, names, sigma_a_rad_s2=(noise[0] * gain, noise[1] * gain))
-        )
-        spans.append(float(t[-1] - t[0]))
-    fit = energy.fit_profiles(profiles)
+    tracks = [r.track for r in recordings]
+    fit, profiles, smoothed = fit_energy(tracks, [r.span for r in recordings], model, names, progress)
     values = dict(zip(names, fit.values.tolist(), strict=True))
     sigma = np.sqrt(np.diag(fit.covariance))
     works = np.sum([p.unit_works[-1] for p in profiles], axis=0)
@@ -109,17 +115,22 @@ def _energy(recordings: Sequence[Recording], model: Model, names: Sequence[str])
         for p, e0 in zip(profiles, fit.e0_j, strict=True)
     )
     excess = np.max([p.rectification for p in profiles], axis=0)
+    duration = float(np.diff(smoothed.segments.times_s, axis=1).sum())
     return DampingFit(
         method="energy",
         status=fit.status,
-        message=f"{fit.message}; RMS misfit {1e3 * np.sqrt(np.mean(fit.residual_j**2)):.3g} mJ",
-        chi2=float("nan"),
+        message=f"{fit.message}; chi-square of the angles {smoothed.chi2:.3f}, of {fit.residual_j.size} energies "
+        f"{fit.chi2:.3f}; RMS misfit {1e6 * np.sqrt(np.mean(fit.residual_j**2)):.3g} uJ",
+        chi2=fit.chi2,
         n=int(fit.residual_j.size),
         coefficients={n: Estimate(values[n], float(s), unit(n)) for n, s in zip(names, sigma, strict=True)},
-        ratios={n: Estimate(ratios[n] / model.psi_kg_m2, 0.0, unit(n)) for n in RATIOS},
+        ratios={
+            n: Estimate(ratios[n] / model.psi_kg_m2, 0.0, unit(n))
+            for n in ratios_of(recordings[0].angles.links)
+        },
         shares=shares(names, values, fit.covariance, works),
         identifiability=identifiability(
-            names, fit.covariance, values, [n for n in names if values[n] <= 0], sum(spans)
+            names, fit.covariance, values, [n for n in names if values[n] <= 0], duration
         ),
         parameters=parameters(model) | values,
         names=tuple(names),
@@ -132,14 +143,15 @@ def _energy(recordings: Sequence[Recording], model: Model, names: Sequence[str])
                 "stop_s": r.span[1],
                 "samples": int(r.angles.t_s.size),
                 "noise_deg": [float(v) for v in np.degrees(r.noise.measured_rad)],
+                "zeros_deg": [float(v) for v in np.degrees(zeros)],
                 "e0_j": float(e0),
             }
-            for r, e0 in zip(recordings, fit.e0_j, strict=True)
+            for r, e0, zeros in zip(recordings, fit.e0_j, smoothed.zeros_rad, strict=True)
         ),
         energy=curves,
         notes=(
             *(f"{r.angles.name}: {r.decay.message}" for r in recordings),
-            f"acceleration noise raises |N| by {100 * excess[0]:.2g} and {100 * excess[1]:.2g} % on average; "
+            f"acceleration noise raises |N| by {100 * excess[0]:.1g} and {100 * excess[1]:.1g} % on average; "
             "taken off",
         ),
     )

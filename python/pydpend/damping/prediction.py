@@ -36,13 +36,18 @@ HELD_OUT = 0.3
 """Last part of a single recording that is left out of a fit and predicted."""
 
 
+def slashed(values: Sequence[float]) -> str:
+    """One number per link: ``0.105/0.139``."""
+    return "/".join(f"{v:.3f}" for v in values)
+
+
 @dataclass(frozen=True)
 class Window:
     """Prediction errors over all windows of one length, degrees, per link."""
 
-    rms_deg: tuple[float, float]
+    rms_deg: tuple[float, ...]
     """Over all samples."""
-    median_deg: tuple[float, float]
+    median_deg: tuple[float, ...]
     """Median of the windows' RMS."""
     n: int
     """Number of windows."""
@@ -136,7 +141,7 @@ def predict(
                 late = start >= after
                 if late.any():
                     calm[f"{window:g}"] = _summary(errors.take(late))
-    words = ", ".join(f"{k} s: {w.rms_deg[0]:.3f}/{w.rms_deg[1]:.3f} deg" for k, w in in_window.items())
+    words = ", ".join(f"{k} s: {slashed(w.rms_deg)} deg" for k, w in in_window.items())
     return Prediction(
         recording.angles.name,
         in_window,
@@ -167,9 +172,7 @@ class _Errors:
 def _summary(errors: _Errors) -> Window:
     total = np.sqrt(errors.squares.sum(axis=0) / np.maximum(errors.counts.sum(axis=0), 1))
     middle = np.median(errors.rms, axis=0)
-    return Window(
-        (float(total[0]), float(total[1])), (float(middle[0]), float(middle[1])), len(errors.counts)
-    )
+    return Window(tuple(total.tolist()), tuple(middle.tolist()), len(errors.counts))
 
 
 def _errors(
@@ -188,21 +191,17 @@ def _errors(
     window = label[path.segment]
     if since is not None:
         r[track[0][path.sample] < since[path.segment]] = np.nan
-    squares, counts = np.zeros((count, 2)), np.zeros((count, 2))
-    for j in range(2):
+    squares, counts = np.zeros((count, r.shape[1])), np.zeros((count, r.shape[1]))
+    for j in range(r.shape[1]):
         good = np.isfinite(r[:, j])
         squares[:, j] = np.bincount(window[good], r[good, j] ** 2, count)
         counts[:, j] = np.bincount(window[good], minlength=count)
     return _Errors(squares, counts)
 
 
-def _whole(segments: Segments, size: int) -> Segments:
-    """Each window of ``size`` segments as one segment."""
-    rows = segments.rows[::size].copy()
-    rows[:, 2] = segments.rows[size - 1 :: size, 2]
-    rows[:, 3] = 0
-    times = np.column_stack([segments.times_s[::size, 0], segments.times_s[size - 1 :: size, 1]])
-    return Segments(rows, times, segments.states[::size])
+def _none(track: Track) -> tuple[_Errors, Floats]:
+    empty = np.zeros((0, track[1].shape[1]))
+    return _Errors(empty, empty), np.zeros(0)
 
 
 def _windows(
@@ -211,12 +210,12 @@ def _windows(
     """Errors in windows of ``size`` segments with the initial state fitted in each."""
     chains = base.grouped(size)
     if len(chains) == 0:
-        return _Errors(np.zeros((0, 2)), np.zeros((0, 2))), np.zeros(0)
+        return _none(track)
     # Staged: the pieces are tied ever more tightly, then each window is one motion from one state.
     solution = shooting.solve(
         [track], chains, parameters, zeros, slack=NO_SLACK, learned=False, max_iterations=40, huber=1e3
     )
-    whole = _whole(solution.segments, size)
+    whole = solution.segments.merged(size)
     count = len(whole)
     errors = _errors(track, whole, parameters, solution.zeros_rad, np.arange(count), count)
     return errors, whole.times_s[:, 0]
@@ -229,7 +228,7 @@ def _forecast(
     size = max(1, round(PAST_S / PIECE_S))
     chains = base.grouped(size)
     if len(chains) == 0:
-        return _Errors(np.zeros((0, 2)), np.zeros((0, 2))), np.zeros(0)
+        return _none(track)
     past = shooting.solve(
         [track],
         chains,
@@ -241,7 +240,7 @@ def _forecast(
         max_iterations=40,
         huber=1e3,
     )
-    whole = _whole(past.segments, size)
+    whole = past.segments.merged(size)
     now = whole.times_s[:, 1]
     inside = now + ahead_s <= base.times_s[-1, 1] + 1e-9
     rows, times = whole.rows[inside].copy(), whole.times_s[inside].copy()
@@ -256,7 +255,7 @@ def _forecast(
 
 def _tumbling_stops(recording: Recording) -> float:
     """When the lower link has passed the top for the last time, s."""
-    t, phi = recording.angles.t_s, recording.angles.phi_rad[:, 1]
+    t, phi = recording.angles.t_s, recording.angles.phi_rad[:, -1]
     here = (t >= recording.span[0]) & (t <= recording.span[1]) & np.isfinite(phi)
     turns = np.floor((phi[here] + np.pi) / (2 * np.pi))
     passed = np.flatnonzero(np.diff(turns))
@@ -302,11 +301,7 @@ def held_out(
         n = np.array([w.n for w in windows], dtype=np.float64)
         rms = np.sqrt(np.average([np.square(w.rms_deg) for w in windows], axis=0, weights=n))
         middle = np.average([w.median_deg for w in windows], axis=0, weights=n)
-        out[key] = {
-            "phi1_deg": float(rms[0]),
-            "phi2_deg": float(rms[1]),
-            "phi1_median_deg": float(middle[0]),
-            "phi2_median_deg": float(middle[1]),
-            "n": int(n.sum()),
-        }
+        out[key] = {"n": int(n.sum())}
+        for j, (value, typical) in enumerate(zip(rms, middle, strict=True), 1):
+            out[key] |= {f"phi{j}_deg": float(value), f"phi{j}_median_deg": float(typical)}
     return out, words

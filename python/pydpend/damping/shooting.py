@@ -55,6 +55,23 @@ class Segments:
         rows[:, 3] = (np.arange(len(rows)) % size != size - 1).astype(np.int64)
         return replace(out, rows=rows)
 
+    def merged(self, size: int) -> Segments:
+        """Every ``size`` consecutive segments of a chain as one, from the first one's state; what is left over at
+        a chain's end is one too."""
+        rows: list[list[int]] = []
+        times: list[list[float]] = []
+        first: list[int] = []
+        run = 0
+        for k in range(len(self)):
+            if run == 0:
+                first.append(k)
+                rows.append(self.rows[k].tolist())
+                times.append(self.times_s[k].tolist())
+            rows[-1][2:] = self.rows[k, 2:].tolist()
+            times[-1][1] = float(self.times_s[k, 1])
+            run = (run + 1) % size if self.rows[k, 3] else 0
+        return Segments(np.array(rows, dtype=np.int64), np.array(times), self.states[first])
+
 
 @dataclass(frozen=True)
 class Solution:
@@ -73,9 +90,13 @@ class Solution:
     slack: Floats
     own_sigma: Floats
     joint_chi2: Floats
+    log_evidence: float
+    cost: float
     squares: Floats
     counts: NDArray[np.int64]
     state_freedom: float
+    state_covariance: Floats
+    """Of each segment's state, (K, 4, 4)."""
     stuck: int
     iterations: int
     status: str
@@ -164,25 +185,65 @@ def solve(
     names = (*free, *(("clock",) if clock else ()))
     if zeros:
         names += tuple(f"zero{j}[{r}]" for r in range(len(tracks)) for j in (1, 2))
+    # One link's recordings have one zero each; the other's column says nothing.
+    known = np.array([not (n.startswith("zero2") and tracks[0][1].shape[1] == 1) for n in names], dtype=bool)
     return Solution(
         {**parameters, **{k: v for k, v in sorted(out["parameters"].items()) if k in parameters or v != 0.0}},
         out["zeros_rad"],
         replace(segments, states=out["states"]),
-        names,
-        out["information"],
-        out["gradient"],
-        out["scores"],
+        tuple(n for n, k in zip(names, known, strict=True) if k),
+        out["information"][np.ix_(known, known)],
+        out["gradient"][known],
+        out["scores"][:, known],
         np.array(out["slack"]),
         np.array(out["own_sigma"]),
         np.array(out["joint_chi2"]),
+        out["log_evidence"],
+        out["cost"],
         np.array(out["squares"]),
         np.array(out["counts"]),
         out["state_freedom"],
+        out["state_covariance"],
         out["stuck"],
         out["iterations"],
         out["status"],
         out["stretch"],
     )
+
+
+PIECE_S = 0.25
+"""Pieces that motions are settled in before they are followed for longer: in a second near the upright the error of
+a first guess from a few samples grows beyond what Gauss-Newton steps come back from."""
+
+
+def settled(
+    tracks: Sequence[Track],
+    spans: Sequence[tuple[float, float]],
+    length_s: float,
+    parameters: dict[str, float],
+    zeros_rad: Floats,
+    *,
+    free: Sequence[str] = (),
+    bounded: Sequence[str] = (),
+    progress: Progress | None = None,
+) -> Solution:
+    """Segments of about ``length_s`` whose states are near the solution, with the parameters found on the way: the
+    fit of pieces, loosely tied."""
+    size = max(1, round(length_s / PIECE_S))
+    pieces = cut(tracks, spans, length_s / size)
+    loose = solve(
+        tracks,
+        pieces,
+        parameters,
+        zeros_rad,
+        free=free,
+        bounded=bounded,
+        slack=1.0,
+        learned=False,
+        max_iterations=30,
+        progress=progress,
+    )
+    return replace(loose, segments=loose.segments.merged(size))
 
 
 @dataclass(frozen=True)
@@ -210,8 +271,8 @@ def trace(
 
 def residuals(tracks: Sequence[Track], path: Trace, zeros_rad: Floats) -> Floats:
     """Measured minus model, (M, 2), rad."""
-    out = np.empty((path.sample.size, 2))
+    out = np.empty((path.sample.size, tracks[0][1].shape[1]))
     for r, (_, phi, _) in enumerate(tracks):
         here = path.recording == r
-        out[here] = phi[path.sample[here]] - path.state[here, :2] - zeros_rad[r]
+        out[here] = phi[path.sample[here]] - (path.state[here, :2] + zeros_rad[r])[:, : phi.shape[1]]
     return out

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pydpend.angles import LinkAngles
-from pydpend.coefficients import FULL, RATIOS, parameters, unit
+from pydpend.coefficients import FULL, RATIOS, parameters, ratios_of, unit
 from pydpend.damping import maps, plausible, shooting
 from pydpend.damping.noise import Noise, noise
 from pydpend.damping.result import DampingFit, Estimate
 from pydpend.damping.shares import energy_curve, shares, unit_works
-from pydpend.damping.shooting import Progress, Segments, Solution, Track
+from pydpend.damping.shooting import Progress, Solution, Track
 from pydpend.damping.uncertainty import covariance, identifiability
 from pydpend.decay import Decay, find_decay
 from pydpend.errors import FitError, fault
@@ -51,14 +51,6 @@ def prepare(
     angles: LinkAngles, model: Model, start_s: float | None = None, stop_s: float | None = None
 ) -> Recording:
     """Finds the free decay and the noise. Raises FitError where there is no decay to fit."""
-    if angles.links != 2:
-        raise FitError(
-            fault(
-                angles.name,
-                "the angles are of one link",
-                "Damping is fitted to the angles of both links; one link alone is not fitted yet",
-            )
-        )
     decay = find_decay(angles, model, start_s, stop_s)
     level = noise(angles.t_s, angles.phi_rad, angles.sigma_rad, (decay.start_s, decay.stop_s))
     if not all(
@@ -93,17 +85,34 @@ def fit_trajectory(
     constants the recordings refute, and where nothing is determined.
     """
     tracks = [r.track for r in recordings]
-    segments = _segments(recordings, tracks, segment_s)
+    length = _length(recordings, segment_s)
     if not ratios:
         _refuse(recordings, model, None)
     else:
         for r in recordings:
             plausible_or_raise(r, model)
-    wanted = [*(RATIOS if ratios else ()), *names, *free]
+    wanted = [*(ratios_of(recordings[0].angles.links) if ratios else ()), *names, *free]
     bounded = [n for n in wanted if n in FULL]
-    start = parameters(model)
-    zeros = np.zeros((len(tracks), 2))
     bias = None
+    settled = shooting.settled(
+        tracks,
+        [r.span for r in recordings],
+        length,
+        parameters(model),
+        np.zeros((len(tracks), 2)),
+        free=wanted,
+        bounded=bounded,
+        progress=progress,
+    )
+    segments, start, zeros = settled.segments, settled.parameters, settled.zeros_rad
+    if len(segments) < 4:
+        raise FitError(
+            fault(
+                ", ".join(r.angles.name for r in recordings),
+                f"only {len(segments)} segments of {length:.2g} s have enough samples of both links",
+                "Give angles with fewer gaps",
+            )
+        )
     for pass_ in range(3 if angle_maps else 1):
         solution = shooting.solve(
             tracks if bias is None else maps.corrected(tracks, bias),
@@ -159,21 +168,11 @@ def _refuse(recordings: Sequence[Recording], model: Model, first_s: float | None
         plausible.check_model(r.track, r.span, model, r.angles.name, chi2)
 
 
-def _segments(recordings: Sequence[Recording], tracks: Sequence[Track], segment_s: float) -> Segments:
+def _length(recordings: Sequence[Recording], segment_s: float) -> float:
+    """A short motion is cut finer, so that the joints still say how well it is described."""
     longest = max(float(np.median(np.diff(r.angles.t_s))) for r in recordings)
     shortest = min(r.span[1] - r.span[0] for r in recordings)
-    # A short motion is cut finer, so that the joints still say how well it is described.
-    segment_s = max(min(segment_s, shortest / 12), 12 * longest)
-    segments = shooting.cut(tracks, [r.span for r in recordings], segment_s)
-    if len(segments) < 4:
-        raise FitError(
-            fault(
-                ", ".join(r.angles.name for r in recordings),
-                f"only {len(segments)} segments of {segment_s:.2g} s have enough samples of both links",
-                "Give angles with fewer gaps",
-            )
-        )
-    return segments
+    return max(min(segment_s, shortest / 12), 12 * longest)
 
 
 def tightened(
@@ -226,7 +225,8 @@ def _judge(
         n: solution.parameters[n] / psi for n in RATIOS
     }
     coefficients = {n: Estimate(values[n], float(sigma[n]), unit(n)) for n in names}
-    ratios = {n: Estimate(values[n], float(sigma.get(n, 0.0)), unit(n)) for n in RATIOS}
+    links = recordings[0].angles.links
+    ratios = {n: Estimate(values[n], float(sigma.get(n, 0.0)), unit(n)) for n in ratios_of(links)}
     path = shooting.trace(tracks, solution.segments, solution.parameters, solution.stretch)
     c_rows = [kept.index(n) for n in names]
     c_cov = cov[np.ix_(c_rows, c_rows)]

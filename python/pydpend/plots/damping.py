@@ -99,8 +99,10 @@ def coefficients_figure(coefficients: Mapping[str, Mapping[str, Any]]) -> Figure
 def windows_columns(prediction: Prediction) -> dict[str, Floats]:
     """The windows of a prediction as columns: length and start in s, RMS of each link in degrees."""
     rows = [(w, *r) for w, found in prediction.rows.items() for r in found]
-    table = np.array(rows, dtype=np.float64).reshape(-1, 4)
-    return dict(zip(("window_s", "start_s", "phi1_rms_deg", "phi2_rms_deg"), table.T, strict=True))
+    links = next((found.shape[1] - 1 for found in prediction.rows.values()), 2)
+    table = np.array(rows, dtype=np.float64).reshape(-1, 2 + links)
+    names = ("window_s", "start_s", "phi1_rms_deg", "phi2_rms_deg")[: 2 + links]
+    return dict(zip(names, table.T, strict=True))
 
 
 def windows_figure(windows: Mapping[str, Floats]) -> Figure:
@@ -111,8 +113,8 @@ def windows_figure(windows: Mapping[str, Floats]) -> Figure:
         grid = figure.subplots(max(1, lengths.size), 1, squeeze=False, sharex=True).ravel()
         for axes, length in zip(grid, lengths, strict=False):
             here = windows["window_s"] == length
-            for j in range(2):
-                rms = windows[f"phi{j + 1}_rms_deg"][here]
+            for j, name in enumerate(n for n in ("phi1_rms_deg", "phi2_rms_deg") if n in windows):
+                rms = windows[name][here]
                 axes.plot(windows["start_s"][here], rms, ".", color=COLORS[j], label=f"phi{j + 1}")
             axes.set_ylabel(f"RMS in {length:g} s (deg)")
             axes.set_ylim(bottom=0)

@@ -121,6 +121,18 @@ impl Eliminated {
         steps
     }
 
+    /// Logarithm of the determinant of the whole matrix.
+    #[must_use]
+    pub fn log_determinant(&self) -> f64 {
+        let states: f64 = self.inverse.iter().map(|m| -m.determinant().ln()).sum();
+        let scale = self.corner.diagonal().map(|d| d.max(f64::MIN_POSITIVE).sqrt());
+        let n = scale.len();
+        let scaled = DMatrix::from_fn(n, n, |r, c| self.corner[(r, c)] / (scale[r] * scale[c]));
+        let values = scaled.symmetric_eigenvalues();
+        let border: f64 = values.iter().map(|v| v.max(1e-14).ln()).sum();
+        states + border + scale.iter().map(|s| 2.0 * s.ln()).sum::<f64>()
+    }
+
     /// Covariance blocks of the states: for each segment its own block, and the block with the next segment's state,
     /// both for a known border; and how the states move with the border, (4, G).
     #[must_use]
@@ -208,6 +220,8 @@ mod tests {
         let done = arrow.eliminate(0.0);
         assert!(done.is_some());
         let Some(done) = done else { return };
+        let determinant = dense.clone().cholesky().map(|c| c.determinant().ln());
+        assert!(determinant.is_some_and(|d| (done.log_determinant() - d).abs() < 1e-10));
         let corner = done.corner.clone().try_inverse().ok_or("singular").unwrap_or(DMatrix::zeros(g, g));
         let border = -(&corner * &done.corner_gradient);
         // rounding of a well-conditioned 23x23 system

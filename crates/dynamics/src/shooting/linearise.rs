@@ -77,6 +77,9 @@ pub fn trial(recording: &Recording<'_>, segment: &Segment, k: usize, point: &Poi
     Trial { cost: if end.iter().all(|v| v.is_finite()) { cost } else { f64::INFINITY }, end }
 }
 
+/// Information on the state of a link that is not there, that holds it where it is: of the size of a milliradian's.
+const HELD: f64 = 1e6;
+
 /// Everything of one segment at a point, with `N` directions: the state and up to `N - 4` common unknowns.
 pub fn linearise<const N: usize>(
     recording: &Recording<'_>,
@@ -152,6 +155,12 @@ pub fn linearise<const N: usize>(
                 hessian[(a, z)] += slopes[j][a];
                 hessian[(z, a)] += slopes[j][a];
             }
+        }
+    }
+    for i in recording.links..2 {
+        // A link that is not there rests at zero; nothing else depends on its state.
+        for a in [i, 2 + i] {
+            hessian[(a, a)] += HELD;
         }
     }
     Local {

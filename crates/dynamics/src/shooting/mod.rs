@@ -15,7 +15,9 @@ mod fit;
 mod linearise;
 mod path;
 mod problem;
+mod slack;
 mod start;
+mod system;
 mod trace;
 
 pub use fit::{Fit, fit};

@@ -4,7 +4,7 @@
 //! Where a joint's rate changes sign the step is cut at the crossing. The crossing's time is itself a scalar with
 //! derivatives, so the jump of the sensitivities there is exact. A joint that dry friction can hold sticks.
 
-use crate::motion::{Contact, Motion, State, accelerations};
+use crate::motion::{Contact, Flow, Motion, State, accelerations};
 use crate::parameters::{Field, Parameters};
 use crate::scalar::Real;
 
@@ -30,15 +30,20 @@ struct Knot<S> {
 }
 
 struct Path<'a, S> {
-    p: &'a Parameters<S>,
+    flow: Flow<'a, S>,
     contact: [Contact; 2],
     dry: bool,
     stuck: bool,
 }
 
 impl<S: Real> Path<'_, S> {
-    fn motion(&self, x: &State<S>) -> Motion<S> {
-        accelerations(self.p, x, self.contact)
+    fn accelerations(&self, x: &State<S>) -> [S; 2] {
+        self.flow.accelerations(x, self.contact)
+    }
+
+    /// Torques and what friction can hold, without derivatives.
+    fn motion(&self, x: &State<S>) -> Motion<f64> {
+        accelerations(self.flow.values(), &x.map(|v| v.value()), self.contact)
     }
 
     /// One RK4 step of length `h`.
@@ -46,7 +51,7 @@ impl<S: Real> Path<'_, S> {
         let half = h * 0.5;
         let shift = |dx: [S; 4], h: S| -> State<S> { std::array::from_fn(|i| k.x[i] + dx[i] * h) };
         let slope = |x: &State<S>| -> [S; 4] {
-            let a = self.motion(x).a;
+            let a = self.accelerations(x);
             [x[2], x[3], a[0], a[1]]
         };
         let k1 = [k.x[2], k.x[3], k.a[0], k.a[1]];
@@ -55,7 +60,7 @@ impl<S: Real> Path<'_, S> {
         let k4 = slope(&shift(k3, h));
         let sixth = h * (1.0 / 6.0);
         let x = std::array::from_fn(|i| k.x[i] + (k1[i] + (k2[i] + k3[i]) * 2.0 + k4[i]) * sixth);
-        Knot { x, a: self.motion(&x).a }
+        Knot { x, a: self.accelerations(&x) }
     }
 
     fn rates(x: &State<S>) -> [f64; 2] {
@@ -114,14 +119,13 @@ impl<S: Real> Path<'_, S> {
         }
         self.contact[j] = Contact::Stuck;
         let held = self.motion(&there.x);
-        let torque = held.dry[j].value();
-        if torque.abs() > held.capacity[j].value() {
+        if held.dry[j].abs() > held.capacity[j] {
             // The torque needed to hold it is more than friction has: it goes the way the torque pushes back from.
             self.contact[j] = Contact::Slip(-start.signum());
         } else {
             self.stuck = true;
         }
-        there.a = self.motion(&there.x).a;
+        there.a = self.accelerations(&there.x);
         (there, used)
     }
 
@@ -130,10 +134,9 @@ impl<S: Real> Path<'_, S> {
         for j in 0..2 {
             if self.contact[j] == Contact::Stuck {
                 let held = self.motion(&k.x);
-                let torque = held.dry[j].value();
-                if torque.abs() > held.capacity[j].value() {
-                    self.contact[j] = Contact::Slip(torque.signum());
-                    k.a = self.motion(&k.x).a;
+                if held.dry[j].abs() > held.capacity[j] {
+                    self.contact[j] = Contact::Slip(held.dry[j].signum());
+                    k.a = self.accelerations(&k.x);
                 }
             }
         }
@@ -162,10 +165,10 @@ pub fn follow<S: Real>(
     mut sink: impl FnMut(usize, &State<S>),
 ) -> End<S> {
     let dry = [Field::Rmu1, Field::Rmu2, Field::TauC1, Field::TauC2].iter().any(|f| p.is_active(*f));
-    let mut path = Path { p, contact: [Contact::Slip(1.0); 2], dry, stuck: false };
+    let mut path = Path { flow: Flow::new(p), contact: [Contact::Slip(1.0); 2], dry, stuck: false };
     let start = Path::<S>::rates(&x0);
     path.contact = start.map(|r| Contact::Slip(if r < 0.0 { -1.0 } else { 1.0 }));
-    let mut k = Knot { x: x0, a: path.motion(&x0).a };
+    let mut k = Knot { x: x0, a: path.accelerations(&x0) };
     let Span { start_s, end_s, times_s } = *span;
     let mut t = start_s;
     let mut next = 0;

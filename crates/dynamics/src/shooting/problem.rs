@@ -11,6 +11,9 @@ pub struct Recording<'a> {
     pub phi_rad: [&'a [f64]; 2],
     /// Standard uncertainties, rad; a sample without a positive one is left out.
     pub sigma_rad: [&'a [f64]; 2],
+    /// How many links were measured. With one, the lower link is not there (its constants in the model must not
+    /// couple to the upper one's) and rests at zero.
+    pub links: usize,
 }
 
 impl Recording<'_> {
@@ -60,7 +63,7 @@ pub fn cut(
         let first = recording.t_s.partition_point(|&t| t < start_s);
         let last = recording.t_s.partition_point(|&t| t < end_s);
         let enough = |j: usize| (first..last).filter(|&i| recording.seen(i, j)).count() >= MIN_SAMPLES;
-        if enough(0) && enough(1) {
+        if (0..recording.links).all(enough) {
             out.push(Segment { recording: index, first, last, start_s, end_s, chained });
         } else if let Some(before) = out.last_mut() {
             before.chained = false;

@@ -15,7 +15,7 @@ const FEWEST: usize = 9;
 pub fn local_state(recording: &Recording<'_>, t_s: f64) -> Option<State<f64>> {
     let mut state = [0.0; 4];
     let t = recording.t_s;
-    for j in 0..2 {
+    for j in 0..recording.links {
         let centre = t.partition_point(|&x| x < t_s);
         let (mut low, mut high) = (centre, centre);
         let mut count = 0;

@@ -1,0 +1,109 @@
+//! The slack: how far a segment's end may be from the next one's start.
+
+use nalgebra::{DVector, Matrix4, Vector4};
+
+use super::arrow::Eliminated;
+use super::linearise::{Local, Point};
+use super::system::{Problem, pseudo_inverse};
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+}
+
+/// Standard deviations of the segments' states from their own samples alone: the median of each component.
+pub(super) fn own_sigma(locals: &[Local]) -> Option<[f64; 4]> {
+    let covariances: Vec<Matrix4<f64>> = locals
+        .iter()
+        .filter_map(|l| {
+            let own: Matrix4<f64> = l.hessian.fixed_view::<4, 4>(0, 0).into();
+            let scale = own.diagonal().map(|d| 1.0 / d.sqrt());
+            let s = Matrix4::from_diagonal(&scale);
+            (s * own * s).try_inverse().map(|m| s * m * s)
+        })
+        .filter(|m| m.diagonal().iter().all(|v| *v > 0.0))
+        .collect();
+    if covariances.is_empty() {
+        return None;
+    }
+    Some(std::array::from_fn(|i| median(covariances.iter().map(|m| m[(i, i)].sqrt()).collect())))
+}
+
+/// Jumps squared and their degrees of freedom, per component, after the step that minimises the linear problem.
+fn joints(
+    problem: &Problem<'_>,
+    point: &Point,
+    locals: &[Local],
+    done: &Eliminated,
+    border: &DVector<f64>,
+    slack: [f64; 4],
+) -> ([f64; 4], [f64; 4]) {
+    let states = done.states(border);
+    let parameters = border.rows(0, problem.common);
+    let spreads = done.covariances();
+    let corner = pseudo_inverse(&done.corner);
+    let (mut squares, mut freedom) = ([0.0; 4], [0.0; 4]);
+    for (k, jump) in problem.jumps(point, locals) {
+        let (a, b) = (&locals[k].end_state, &locals[k].end_common);
+        let moved = Vector4::from_iterator((b * parameters).iter().copied());
+        let d: Vector4<f64> = jump + states[k + 1] - a * states[k] - moved;
+        let (here, after) = (&spreads[k], &spreads[k + 1]);
+        let cross = a * here.with_next;
+        let mut pull = &after.with_border - a * &here.with_border;
+        let mut common = pull.columns_mut(0, problem.common);
+        common -= b;
+        let through = &pull * &corner;
+        for i in 0..4 {
+            let known = after.own[(i, i)] - 2.0 * cross[(i, i)] + (a * here.own * a.transpose())[(i, i)];
+            let variance = known + through.row(i).dot(&pull.row(i));
+            squares[i] += d[i] * d[i];
+            freedom[i] += (1.0 - variance / (slack[i] * slack[i])).clamp(0.0, 1.0);
+        }
+    }
+    (squares, freedom)
+}
+
+/// A learned slack, and the chi-square of the jumps it was learned from.
+#[derive(Clone, Copy)]
+pub(super) struct Learned {
+    pub(super) slack: [f64; 4],
+    pub(super) chi2: [f64; 4],
+}
+
+/// The slack that makes the jumps' chi-square one, not below `lowest`, with the problem taken as linear where it
+/// stands: the motion need not be followed again for every guess. `None` when the states are not determined.
+pub(super) fn learned(
+    problem: &Problem<'_>,
+    point: &Point,
+    locals: &[Local],
+    start: [f64; 4],
+    lowest: [f64; 4],
+) -> Option<Learned> {
+    let mut now = Learned { slack: start, chi2: [f64::NAN; 4] };
+    for _ in 0..MOST_GUESSES {
+        let slack = now.slack;
+        let weight = Vector4::from(slack.map(|s| 1.0 / (s * s)));
+        let done = problem.assemble(point, locals, Some(weight)).eliminate(0.0)?;
+        let border = problem.border_step(point, &done)?;
+        let (squares, freedom) = joints(problem, point, locals, &done, &border, slack);
+        now.chi2 = std::array::from_fn(|i| squares[i] / (freedom[i].max(1e-9) * slack[i] * slack[i]));
+        now.slack = std::array::from_fn(|i| {
+            let wanted = (squares[i] / freedom[i].max(1e-3)).sqrt();
+            wanted.clamp(slack[i] / 10.0, slack[i] * 10.0).max(lowest[i])
+        });
+        if apart(now.slack, slack) < KNOWN {
+            break;
+        }
+    }
+    Some(now)
+}
+
+/// A slack known to 2 % changes no standard error that is quoted to two digits.
+pub(super) const KNOWN: f64 = 0.02;
+/// Most guesses at the slack; ten are enough where it is determined.
+const MOST_GUESSES: usize = 40;
+
+/// Largest difference of two slacks, as a logarithm.
+pub(super) fn apart(a: [f64; 4], b: [f64; 4]) -> f64 {
+    (0..4).map(|i| (a[i] / b[i]).ln().abs()).fold(0.0, f64::max)
+}

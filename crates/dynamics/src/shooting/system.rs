@@ -1,0 +1,242 @@
+//! The whole problem: cost, normal equations, the step within the bounds.
+
+use nalgebra::{DMatrix, DVector, Matrix4, Matrix4xX, Vector4};
+use rayon::prelude::*;
+
+use super::arrow::{Arrow, Block, Eliminated, Spread};
+use super::linearise::{Local, Point, linearise, trial};
+use super::problem::{Recording, Segment, Settings};
+
+/// Number of directions the largest dual number has.
+pub(super) const MOST: usize = 24;
+
+/// Recordings, segments, what is free, and how many common unknowns (`common` those of the motion).
+pub(super) struct Problem<'a> {
+    pub(super) recordings: &'a [Recording<'a>],
+    pub(super) segments: &'a [Segment],
+    pub(super) settings: &'a Settings,
+    pub(super) common: usize,
+    pub(super) border: usize,
+}
+
+impl Problem<'_> {
+    pub(super) fn locals(&self, point: &Point) -> Vec<Local> {
+        let one = |(k, segment): (usize, &Segment)| {
+            let recording = &self.recordings[segment.recording];
+            match 4 + self.common {
+                0..=4 => linearise::<4>(recording, segment, k, point, self.settings),
+                5..=12 => linearise::<12>(recording, segment, k, point, self.settings),
+                13..=16 => linearise::<16>(recording, segment, k, point, self.settings),
+                17..=20 => linearise::<20>(recording, segment, k, point, self.settings),
+                _ => linearise::<MOST>(recording, segment, k, point, self.settings),
+            }
+        };
+        self.segments.par_iter().enumerate().map(one).collect()
+    }
+
+    /// Half the robust sum of squares with the jumps, without derivatives.
+    pub(super) fn cost(&self, point: &Point, weight: Option<Vector4<f64>>) -> f64 {
+        let trials: Vec<_> = self
+            .segments
+            .par_iter()
+            .enumerate()
+            .map(|(k, s)| trial(&self.recordings[s.recording], s, k, point, self.settings.huber))
+            .collect();
+        let mut cost: f64 = trials.iter().map(|t| t.cost).sum();
+        if let Some(weight) = weight {
+            for (k, t) in trials.iter().enumerate() {
+                if self.segments[k].chained {
+                    let d = Vector4::from(point.states[k + 1]) - t.end;
+                    cost += 0.5 * d.component_mul(&d).dot(&weight);
+                }
+            }
+        }
+        if cost.is_finite() { cost } else { f64::INFINITY }
+    }
+
+    pub(super) fn local_cost(&self, point: &Point, locals: &[Local], weight: Option<Vector4<f64>>) -> f64 {
+        let mut cost: f64 = locals.iter().map(|l| l.cost).sum();
+        if let Some(weight) = weight {
+            for (k, d) in self.jumps(point, locals) {
+                debug_assert!(self.segments[k].chained);
+                cost += 0.5 * d.component_mul(&d).dot(&weight);
+            }
+        }
+        cost
+    }
+
+    pub(super) fn jumps<'b>(
+        &'b self,
+        point: &'b Point,
+        locals: &'b [Local],
+    ) -> impl Iterator<Item = (usize, Vector4<f64>)> + 'b {
+        (0..self.segments.len())
+            .filter(|&k| self.segments[k].chained)
+            .map(|k| (k, Vector4::from(point.states[k + 1]) - locals[k].end))
+    }
+
+    /// Column in the border of each of a segment's local unknowns after its state.
+    fn columns(&self, segment: &Segment) -> impl Fn(usize) -> usize + use<> {
+        let (common, recording) = (self.common, segment.recording);
+        move |c| if c < common { c } else { common + 2 * recording + (c - common) }
+    }
+
+    pub(super) fn assemble(&self, point: &Point, locals: &[Local], weight: Option<Vector4<f64>>) -> Arrow {
+        let g = self.border;
+        let mut arrow = Arrow {
+            blocks: Vec::with_capacity(locals.len()),
+            corner: DMatrix::zeros(g, g),
+            gradient: DVector::zeros(g),
+        };
+        for (segment, local) in self.segments.iter().zip(locals) {
+            let column = self.columns(segment);
+            let extra = local.gradient.len() - 4;
+            let mut border = Matrix4xX::zeros(g);
+            for c in 0..extra {
+                let to = column(c);
+                arrow.gradient[to] += local.gradient[4 + c];
+                for r in 0..4 {
+                    border[(r, to)] += local.hessian[(r, 4 + c)];
+                }
+                for r in 0..extra {
+                    arrow.corner[(column(r), to)] += local.hessian[(4 + r, 4 + c)];
+                }
+            }
+            arrow.blocks.push(Block {
+                own: local.hessian.fixed_view::<4, 4>(0, 0).into(),
+                next: None,
+                border,
+                gradient: local.gradient.fixed_rows::<4>(0).into(),
+            });
+        }
+        if let Some(weight) = weight {
+            let w = Matrix4::from_diagonal(&weight);
+            for (k, d) in self.jumps(point, locals) {
+                let (a, b) = (&locals[k].end_state, &locals[k].end_common);
+                let wd = weight.component_mul(&d);
+                let (aw, bw) = (a.transpose() * w, b.transpose() * w);
+                let mut common = arrow.corner.view_mut((0, 0), (self.common, self.common));
+                common += &bw * b;
+                let mut gradient = arrow.gradient.rows_mut(0, self.common);
+                gradient -= b.transpose() * wd;
+                let block = &mut arrow.blocks[k];
+                block.own += aw * a;
+                block.next = Some(-aw);
+                block.gradient -= a.transpose() * wd;
+                let mut left = block.border.columns_mut(0, self.common);
+                left += aw * b;
+                let after = &mut arrow.blocks[k + 1];
+                after.own += w;
+                after.gradient += wd;
+                let mut right = after.border.columns_mut(0, self.common);
+                right -= w * b;
+            }
+        }
+        arrow
+    }
+
+    /// The border's step: the minimiser of the quadratic model with the bounds kept (active set).
+    pub(super) fn border_step(&self, point: &Point, done: &Eliminated) -> Option<DVector<f64>> {
+        let g = self.border;
+        let mut fixed: Vec<Option<f64>> = vec![None; g];
+        for _ in 0..=g {
+            let free: Vec<usize> = (0..g).filter(|&i| fixed[i].is_none()).collect();
+            let mut step = DVector::from_iterator(g, fixed.iter().map(|f| f.unwrap_or(0.0)));
+            let right = -(&done.corner_gradient + &done.corner * &step);
+            let scale: Vec<f64> =
+                free.iter().map(|&i| 1.0 / done.corner[(i, i)].max(f64::MIN_POSITIVE).sqrt()).collect();
+            let m = DMatrix::from_fn(free.len(), free.len(), |r, c| {
+                done.corner[(free[r], free[c])] * scale[r] * scale[c] + if r == c { 1e-13 } else { 0.0 }
+            });
+            let v = DVector::from_iterator(free.len(), free.iter().zip(&scale).map(|(&i, s)| right[i] * s));
+            let solved = m.cholesky()?.solve(&v);
+            for (n, &i) in free.iter().enumerate() {
+                step[i] = solved[n] * scale[n];
+            }
+            let mut held = false;
+            for (i, field) in self.settings.free.iter().enumerate() {
+                let now = point.parameters.get(*field);
+                if fixed[i].is_none() && self.settings.bounded.contains(field) && now + step[i] < 0.0 {
+                    fixed[i] = Some(-now);
+                    held = true;
+                }
+            }
+            if !held {
+                return Some(step);
+            }
+        }
+        None
+    }
+
+    pub(super) fn moved(&self, point: &Point, border: &DVector<f64>, states: &[Vector4<f64>]) -> Point {
+        let mut next = point.clone();
+        for (i, field) in self.settings.free.iter().enumerate() {
+            let mut value = point.parameters.get(*field) + border[i];
+            if self.settings.bounded.contains(field) {
+                value = value.max(0.0);
+            }
+            next.parameters.set(*field, value);
+        }
+        if self.settings.clock {
+            next.stretch += border[self.settings.free.len()];
+        }
+        if self.settings.zeros {
+            for (r, zeros) in next.zeros_rad.iter_mut().enumerate() {
+                zeros[0] += border[self.common + 2 * r];
+                zeros[1] += border[self.common + 2 * r + 1];
+            }
+        }
+        for (x, dx) in next.states.iter_mut().zip(states) {
+            for i in 0..4 {
+                x[i] += dx[i];
+            }
+        }
+        next
+    }
+}
+
+/// Inverse of a symmetric matrix scaled to a unit diagonal, directions below 1e-12 left out.
+pub(super) fn pseudo_inverse(m: &DMatrix<f64>) -> DMatrix<f64> {
+    let n = m.nrows();
+    if n == 0 {
+        return m.clone();
+    }
+    let scale =
+        DVector::from_iterator(n, (0..n).map(|i| 1.0 / m[(i, i)].abs().max(f64::MIN_POSITIVE).sqrt()));
+    let scaled = DMatrix::from_fn(n, n, |r, c| m[(r, c)] * scale[r] * scale[c]);
+    let eigen = scaled.symmetric_eigen();
+    let inverse = eigen.eigenvalues.map(|v| if v > 1e-12 { 1.0 / v } else { 0.0 });
+    let core = &eigen.eigenvectors * DMatrix::from_diagonal(&inverse) * eigen.eigenvectors.transpose();
+    DMatrix::from_fn(n, n, |r, c| core[(r, c)] * scale[r] * scale[c])
+}
+
+/// See [`super::Fit::scores`]; a jump counts with the segment before it.
+pub(super) fn scores(
+    problem: &Problem<'_>,
+    point: &Point,
+    locals: &[Local],
+    spreads: &[Spread],
+    weight: Option<Vector4<f64>>,
+) -> DMatrix<f64> {
+    let mut out = DMatrix::zeros(locals.len(), problem.border);
+    for (k, (segment, local)) in problem.segments.iter().zip(locals).enumerate() {
+        let column = problem.columns(segment);
+        for c in 4..local.gradient.len() {
+            out[(k, column(c - 4))] += local.gradient[c];
+        }
+        let through = spreads[k].with_border.transpose() * local.gradient.fixed_rows::<4>(0);
+        let mut row = out.row_mut(k);
+        row += through.transpose();
+    }
+    if let Some(weight) = weight {
+        for (k, d) in problem.jumps(point, locals) {
+            let mut pull = &spreads[k + 1].with_border - locals[k].end_state * &spreads[k].with_border;
+            let mut common = pull.columns_mut(0, problem.common);
+            common -= &locals[k].end_common;
+            let part = pull.transpose() * weight.component_mul(&d);
+            let mut row = out.row_mut(k);
+            row += part.transpose();
+        }
+    }
+    out
+}

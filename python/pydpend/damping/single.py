@@ -1,0 +1,114 @@
+"""The single pendulum: a one-link rig, or the double pendulum with its elbow pinned (Section 3.1).
+
+It is fitted as a double pendulum whose lower link is not there: nothing couples to it and it rests.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pydpend.angles import LinkAngles
+from pydpend.errors import FitError, fault
+from pydpend.model import Model
+
+Floats = NDArray[np.float64]
+
+
+def alone(model: Model, name: str | None = None) -> Model:
+    """The upper link of ``model`` alone (inertia 2 psi, weight moment sigma, mass m1). What stands for the lower
+    one swings as the upper does and touches nothing."""
+    return replace(
+        model,
+        lambda_kg_m2=model.psi_kg_m2,
+        kappa_j=model.sigma_j,
+        zeta_kg_m2=0.0,
+        a3_kg_m2=0.0,
+        m2_kg=0.0,
+        lower_inner_m=0.0,
+        lower_outer_m=0.0,
+        covariance=None,
+        name=name or model.name,
+    )
+
+
+def one_body(angles: LinkAngles, elbow_rad: float = 0.0) -> tuple[LinkAngles, float]:
+    """Angles (T, 1) of the upper link of a pinned pendulum, and the angle phi2 - phi1 at which it is pinned.
+
+    Where both links were measured, both say where the body is, each with its own weight; with one link the
+    pinned angle is ``elbow_rad``. Raises FitError when the links move against each other.
+    """
+    if angles.links == 1:
+        return angles, elbow_rad
+    between = angles.phi_rad[:, 1] - angles.phi_rad[:, 0]
+    both = np.isfinite(between)
+    if not both.any():
+        raise FitError(fault(angles.name, "the two links are never seen together", "Give one link's angles"))
+    elbow = float(np.median(between[both]))
+    spread = float(1.4826 * np.median(np.abs(between[both] - elbow)))
+    if spread > np.radians(1.0) or np.abs(between[both] - elbow).max() > np.radians(10.0):
+        low, high = np.degrees([between[both].min(), between[both].max()])
+        raise FitError(
+            fault(
+                angles.name,
+                f"the elbow is not pinned: phi2 - phi1 goes from {low:.3g} to {high:.3g} deg",
+                "Fit it as a double pendulum",
+            )
+        )
+    phi = angles.phi_rad - [0.0, elbow]
+    sigma = np.where(angles.sigma_rad > 0, angles.sigma_rad, np.nan)
+    # A link without uncertainties counts as one whose are equal.
+    weight = (
+        np.where(
+            np.isfinite(phi), np.where(np.isfinite(sigma), sigma, np.nanmedian(np.append(sigma, 1.0))), np.inf
+        )
+        ** -2.0
+    )
+    total = weight.sum(axis=1)
+    mean = np.divide(
+        np.where(weight > 0, weight * phi, 0.0).sum(axis=1),
+        total,
+        out=np.full(total.size, np.nan),
+        where=total > 0,
+    )
+    with np.errstate(divide="ignore"):
+        error = np.where(np.isfinite(sigma).any(axis=1) & (total > 0), total**-0.5, np.nan)
+    return replace(angles, phi_rad=mean[:, None], sigma_rad=error[:, None]), elbow
+
+
+def pinned(model: Model, elbow_rad: float) -> tuple[Model, float]:
+    """The double pendulum with its elbow pinned at phi2 - phi1 as one link, and the angle of the upper link at which
+    that hangs at rest, rad."""
+    c, s = np.cos(elbow_rad), np.sin(elbow_rad)
+    along, across = model.sigma_j + model.kappa_j * c, model.kappa_j * s
+    body = replace(
+        model,
+        psi_kg_m2=model.psi_kg_m2 + model.lambda_kg_m2 + model.zeta_kg_m2 + model.a3_kg_m2 * c,
+        sigma_j=float(np.hypot(along, across)),
+        m1_kg=model.m1_kg + model.m2_kg,
+        covariance=None,
+    )
+    return alone(body, f"{model.name}, elbow pinned at {np.degrees(elbow_rad):.3g} deg"), -float(
+        np.arctan2(across, along)
+    )
+
+
+def reduced(recordings: list[LinkAngles], model: Model, elbow_pinned: bool) -> tuple[list[LinkAngles], Model]:
+    """Recordings of one body, their angles zero where it hangs, and its model.
+
+    Raises FitError when recordings of one and of two links are mixed, or were pinned at different angles.
+    """
+    if not elbow_pinned:
+        if any(a.links != 1 for a in recordings):
+            raise FitError(fault("fit", "some recordings have one link and some two", "Fit them apart"))
+        return recordings, alone(model)
+    bodies = [one_body(a) for a in recordings]
+    elbows = np.array([elbow for _, elbow in bodies])
+    if np.ptp(elbows) > np.radians(2.0):
+        raise FitError(
+            fault("fit", f"the elbow was pinned at {np.degrees(elbows).round(1)} deg", "Fit each alone")
+        )
+    body, hanging = pinned(model, float(elbows.mean()))
+    return [replace(a, phi_rad=a.phi_rad - hanging) for a, _ in bodies], body
