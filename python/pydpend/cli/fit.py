@@ -182,6 +182,12 @@ def describe(fit: DampingFit) -> list[str]:
         lines.append(f"{name:12s} {e.value: .4e} +- {e.sigma:.1e} {e.unit}")
     for name, e in fit.ratios.items():
         lines.append(f"{name + '/psi':12s} {e.value: .6g} +- {e.sigma:.1e} {e.unit}")
+    swings = ", ".join(f"{f:.4f}" for f in fit.modes_hz)
+    lines.append(f"small oscillations of the fitted pendulum: {swings} Hz")
+    for given in fit.inputs:
+        if given.get("tail_modes_hz"):
+            seen = ", ".join(f"{f:.4f}" for f in given["tail_modes_hz"])
+            lines.append(f"measured in the last seconds of {given['name']}: {seen} Hz")
     for group in ("law", "joint"):
         parts = ", ".join(
             f"{k} {100 * e.value:.1f} +- {100 * e.sigma:.1f} %" for k, e in fit.shares[group].items()

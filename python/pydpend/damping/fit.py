@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from pydpend.angles import LinkAngles
 from pydpend.coefficients import JOINT_OF, coefficients, parameters, ratios_of, unit
+from pydpend.damping.plausible import modes_hz
 from pydpend.damping.prediction import held_out
 from pydpend.damping.profile import fit_energy
 from pydpend.damping.result import DampingFit, EnergyCurve, Estimate
@@ -132,6 +133,7 @@ def _energy(
         identifiability=identifiability(
             names, fit.covariance, values, [n for n in names if values[n] <= 0], duration
         ),
+        modes_hz=modes_hz(model)[: recordings[0].angles.links],
         parameters=parameters(model) | values,
         names=tuple(names),
         covariance=fit.covariance,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import isotonic_regression
+from scipy.optimize import isotonic_regression, least_squares
 
 from pydpend.damping.shooting import Track
 from pydpend.errors import FitError, fault
@@ -114,3 +114,35 @@ def check_model(track: Track, span: tuple[float, float], model: Model, name: str
                 "these would mean anything",
             )
         )
+
+
+TAIL_S = 8.0
+"""Length of the end of the motion in which its small oscillations are looked at, s."""
+
+
+def tail_modes_hz(track: Track, span: tuple[float, float], model: Model) -> tuple[float, ...]:
+    """Frequencies of the last small oscillations as measured, Hz: damped sines common to the links, fitted to the last
+    8 s from the model's frequencies. Empty when less of the motion was seen.
+
+    They lie below the small-swing limit by the amplitude that is left (1.3e-3 of it at 8 deg).
+    """
+    t, phi, _ = track
+    keep = (t >= span[1] - TAIL_S) & (t <= span[1]) & np.isfinite(phi).all(axis=1)
+    t, phi = t[keep] - span[1], phi[keep]
+    if t.size < 200 or np.ptp(t) < 0.5 * TAIL_S:
+        return ()
+    start = np.array(modes_hz(model)[: phi.shape[1]])
+
+    def parts(x: Floats) -> Floats:
+        f, rate = x.reshape(2, -1)
+        angle = 2 * np.pi * np.outer(t, f)
+        fall = np.exp(-np.outer(t, rate))
+        return np.column_stack([np.ones(t.size), fall * np.cos(angle), fall * np.sin(angle)])
+
+    def misfit(x: Floats) -> Floats:
+        basis = parts(x)
+        left: Floats = phi - basis @ np.linalg.lstsq(basis, phi, rcond=None)[0]
+        return left.ravel()
+
+    found = least_squares(misfit, np.concatenate([start, np.full(start.size, 0.1)]), x_scale=0.1)
+    return tuple(found.x[: start.size].tolist())

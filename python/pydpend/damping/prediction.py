@@ -262,6 +262,23 @@ def _tumbling_stops(recording: Recording) -> float:
     return float(t[here][passed[-1] + 1]) if passed.size else recording.span[0]
 
 
+def split(recordings: Sequence[Recording]) -> tuple[list[Recording], Recording]:
+    """What to fit and what to leave out for prediction: the last recording, or the last part of the only one.
+
+    Raises FitError when it is too short for that.
+    """
+    if len(recordings) > 1:
+        return list(recordings[:-1]), recordings[-1]
+    only = recordings[0]
+    edge = only.span[1] - HELD_OUT * (only.span[1] - only.span[0])
+    if edge - only.span[0] < 2.0 or only.span[1] - edge < 1.0:
+        raise FitError(
+            fault(only.angles.name, "too short to leave a part out for prediction", "Record longer than 4 s")
+        )
+    early = replace(only, decay=replace(only.decay, stop_s=edge))
+    return [early], replace(only, decay=replace(only.decay, start_s=edge))
+
+
 def held_out(
     recordings: Sequence[Recording], run: Callable[[Sequence[Recording]], DampingFit]
 ) -> tuple[dict[str, dict[str, Any]], str]:
@@ -271,21 +288,16 @@ def held_out(
     Returns RMS by window for ``fit.json`` and a sentence. Too short a recording gives none, and the
     sentence why.
     """
-    parts: list[tuple[list[Recording], Recording]] = []
     if len(recordings) > 1:
         parts = [([o for o in recordings if o is not r], r) for r in recordings]
         words = "each recording predicted from a fit to the others"
     else:
-        only = recordings[0]
-        edge = only.span[1] - HELD_OUT * (only.span[1] - only.span[0])
-        if edge - only.span[0] < 2.0 or only.span[1] - edge < 1.0:
+        try:
+            known, late = split(recordings)
+        except FitError:
             return {}, "too short to leave a part out: no prediction of unseen data"
-        early = replace(only, decay=replace(only.decay, stop_s=edge))
-        late = replace(only, decay=replace(only.decay, start_s=edge))
-        parts = [([early], late)]
-        words = (
-            f"the last {100 * HELD_OUT:.0f} % (from {edge:.2f} s) predicted from a fit to what comes before"
-        )
+        parts = [(known, late)]
+        words = f"the last {100 * HELD_OUT:.0f} % (from {late.span[0]:.2f} s) predicted from a fit to what comes before"
     collected: dict[str, list[Window]] = {}
     for known, unknown in parts:
         try:

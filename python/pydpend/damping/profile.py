@@ -25,13 +25,15 @@ from pydpend.model import Model
 
 Floats = NDArray[np.float64]
 
-PIECE_S = 1.0
-"""Length of the pieces. The information on the energy grows with its square; beyond a second the motion near the
-upright forgets its state."""
+DOUBLINGS = 2
+"""From pieces of `shooting.PIECE_S` to a second in two doublings. The information on the energy grows with the square
+of their length; beyond a second the motion near the upright forgets its state."""
+ROUNDS = 5
+"""Most Gauss-Newton steps at the end; one or two are enough."""
+CLOSE = 0.1
+"""Standard errors that a coefficient may still move by."""
 UNTIED = (1e3, 1e3, 1e3, 1e3)
 """Slack at which a piece knows nothing of the next, rad and rad/s."""
-ROUNDS = 8
-"""Most times the losses are handed back; two or three are enough."""
 
 
 @dataclass(frozen=True)
@@ -107,20 +109,6 @@ def profile(
     return few, whole
 
 
-def _profiles(
-    tracks: Sequence[Track],
-    smoothed: Smoothed,
-    constants: dict[str, float],
-    model: Model,
-    names: Sequence[str],
-    *,
-    corrected: bool,
-) -> list[tuple[EnergyProfile, EnergyProfile]]:
-    return [
-        profile(tracks, smoothed, constants, model, names, r, corrected=corrected) for r in range(len(tracks))
-    ]
-
-
 def fit_energy(
     tracks: Sequence[Track],
     spans: Sequence[tuple[float, float]],
@@ -130,24 +118,65 @@ def fit_energy(
 ) -> tuple[EnergyFit, list[EnergyProfile], Smoothed]:
     """Coefficients common to all recordings, their energy profiles at every sample, and the smoothed motion."""
     constants = parameters(model)
-    size = round(PIECE_S / shooting.PIECE_S)
     segments = shooting.cut(tracks, spans, shooting.PIECE_S)
     zeros = np.zeros((len(tracks), 2))
     values = np.zeros(len(names))
-    for round_ in range(ROUNDS + 1):
-        current = constants | dict(zip(names, values.tolist(), strict=True))
-        smoothed = smooth(tracks, segments, zeros, current)
 
-        both = _profiles(tracks, smoothed, current, model, names, corrected=False)
-        fit = fit_profiles([few for few, _ in both])
-        moved = np.abs(fit.values - values) / np.sqrt(np.diag(fit.covariance))
+    def along(
+        given: Floats, *, corrected: bool = False
+    ) -> tuple[list[EnergyProfile], list[EnergyProfile], Smoothed]:
+        """Profiles at the middle of the pieces and at every sample when the pieces lose by ``given``."""
+        now = constants | dict(zip(names, given.tolist(), strict=True))
+        smoothed = smooth(tracks, segments, zeros, now)
+        both = [
+            profile(tracks, smoothed, now, model, names, r, corrected=corrected) for r in range(len(tracks))
+        ]
+        return [few for few, _ in both], [whole for _, whole in both], smoothed
+
+    for round_ in range(DOUBLINGS + 1):
+        few, _, smoothed = along(values)
+        fit = fit_profiles(few)
         values, segments, zeros = fit.values, smoothed.segments, smoothed.zeros_rad
+        if round_ < DOUBLINGS:
+            # Short pieces hardly know of losses, but cannot lose their way; each says enough for twice its length.
+            segments = segments.merged(2)
         if progress is not None:
-            progress(round_ + 1, ROUNDS + 1, fit.chi2)
-        if round_ == 0:
-            # Short pieces hardly know of losses; with what they say of them, longer ones can be followed.
-            segments = segments.merged(size)
-        elif moved.max() < 0.05:
+            progress(round_ + 1, DOUBLINGS + 1 + ROUNDS, fit.chi2)
+    # The energies and works themselves depend a little on the losses that the pieces were followed with.
+    few, _, _ = along(values)
+    steps = np.sqrt(np.diag(fit.covariance))
+    moved = [along(values + row)[0] for row in np.diag(steps)]
+    slopes = [
+        np.column_stack(
+            [
+                (_start(m[r], values + row) - _start(f, values)) / h
+                for m, row, h in zip(moved, np.diag(steps), steps, strict=True)
+            ]
+        )
+        for r, f in enumerate(few)
+    ]
+
+    def linear(now: Sequence[EnergyProfile]) -> list[EnergyProfile]:
+        return [
+            replace(f, energy_j=_start(f, values) - slope @ values, unit_works=slope)
+            for f, slope in zip(now, slopes, strict=True)
+        ]
+
+    for round_ in range(ROUNDS):
+        fit = fit_profiles(linear(few))
+        change = float((np.abs(fit.values - values) / np.sqrt(np.diag(fit.covariance))).max())
+        values = fit.values
+        few, _, _ = along(values)
+        if progress is not None:
+            progress(DOUBLINGS + 2 + round_, DOUBLINGS + 1 + ROUNDS, fit.chi2)
+        if change < CLOSE:
             break
-    both = _profiles(tracks, smoothed, current, model, names, corrected=True)
-    return fit_profiles([few for few, _ in both]), [whole for _, whole in both], smoothed
+    few, whole, smoothed = along(values, corrected=True)
+    fit = fit_profiles(linear(few))
+    return fit if change < CLOSE else replace(fit, status="iteration_limit"), whole, smoothed
+
+
+def _start(profile: EnergyProfile, values: Floats) -> Floats:
+    """The energies with the losses up to then put back: the energy at the start, were all exact."""
+    out: Floats = profile.energy_j + profile.unit_works @ values
+    return out

@@ -86,6 +86,9 @@ class DampingFit:
     slack: dict[str, float] = field(default_factory=dict)
     """Jump allowed at the joints per state component, and relative to what noise alone would need."""
     iterations: int = 0
+    modes_hz: tuple[float, ...] = ()
+    """Small oscillations of the fitted pendulum about hanging, Hz; those measured at the end of each recording are in
+    `inputs`."""
     maps: dict[str, Any] | None = None
     """Angle-bias maps, if asked for."""
     notes: tuple[str, ...] = ()
@@ -117,6 +120,7 @@ class DampingFit:
             "chi2_slack": self.chi2_slack,
             "slack": self.slack,
             "iterations": self.iterations,
+            "modes_hz": list(self.modes_hz),
             "parameters": self.parameters,
             "covariance": {"names": list(self.names), "matrix": self.covariance.tolist()},
             "maps": self.maps,

@@ -42,9 +42,12 @@ def cumulative(
     step = np.diff(t)
     # Over a gap between chains nothing is known; its energy is not counted.
     step[step > 20 * np.median(step)] = 0.0
-    works = np.vstack(
-        [np.zeros(len(names)), np.cumsum(0.5 * (powers[1:] + powers[:-1]) * step[:, None], axis=0)]
+    # The trapezoid with its first Euler-Maclaurin correction.
+    slope = np.gradient(powers, t, axis=0) if t.size > 1 else np.zeros_like(powers)
+    pieces = (
+        0.5 * (powers[1:] + powers[:-1]) * step[:, None] - np.diff(slope, axis=0) * step[:, None] ** 2 / 12
     )
+    works = np.vstack([np.zeros(len(names)), np.cumsum(pieces, axis=0)])
     return t, works, path.state[here]
 
 

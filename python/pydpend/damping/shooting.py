@@ -109,6 +109,9 @@ class Solution:
         return float(self.squares.sum()) / max(freedom, 1.0)
 
 
+FASTEST_RAD_S = 300.0
+"""A first guess that turns faster is one from a handful of samples beside a gap; its segment is left out."""
+
 GAP_S = 0.2
 """A segment with a longer gap than this in either link is left out: the motion on the other side of the gap is not
 known well enough to start from."""
@@ -129,6 +132,7 @@ def cut(
     """Segments of about ``length_s`` over each recording's span, with states from local cubics."""
     rows, times, states = _tracker.shooting_segments(tracks, spans, length_s, chained)
     good: NDArray[np.bool_] = np.asarray(np.isfinite(states).all(axis=1))
+    good &= np.abs(states[:, 2:]).max(axis=1, initial=0.0) < FASTEST_RAD_S
     for k, (r, first, last, _) in enumerate(rows.tolist()):
         t, phi, _ = tracks[r]
         good[k] &= _longest_gap(t[first:last], phi[first:last], times[k]) <= GAP_S

@@ -85,7 +85,7 @@ def fit_trajectory(
     constants the recordings refute, and where nothing is determined.
     """
     tracks = [r.track for r in recordings]
-    length = _length(recordings, segment_s)
+    length = length_of(recordings, segment_s)
     if not ratios:
         _refuse(recordings, model, None)
     else:
@@ -168,7 +168,7 @@ def _refuse(recordings: Sequence[Recording], model: Model, first_s: float | None
         plausible.check_model(r.track, r.span, model, r.angles.name, chi2)
 
 
-def _length(recordings: Sequence[Recording], segment_s: float) -> float:
+def length_of(recordings: Sequence[Recording], segment_s: float) -> float:
     """A short motion is cut finer, so that the joints still say how well it is described."""
     longest = max(float(np.median(np.diff(r.angles.t_s))) for r in recordings)
     shortest = min(r.span[1] - r.span[0] for r in recordings)
@@ -247,7 +247,7 @@ def _judge(
         parameters=solution.parameters,
         names=kept,
         covariance=cov,
-        inputs=tuple(_input(r, solution.zeros_rad[k]) for k, r in enumerate(recordings)),
+        inputs=tuple(_input(r, fitted, solution.zeros_rad[k]) for k, r in enumerate(recordings)),
         energy=tuple(energy_curve(tracks, path, names, values, fitted, k) for k in range(len(recordings))),
         chi2_slack=solution.chi2,
         slack={
@@ -261,6 +261,7 @@ def _judge(
             for quantity, s in zip(("phi1", "phi2", "w1", "w2"), relative, strict=True)
         },
         iterations=solution.iterations,
+        modes_hz=plausible.modes_hz(fitted)[:links],
         maps=None if bias is None else bias.to_json(),
         notes=notes,
     )
@@ -310,7 +311,7 @@ def _notes(recordings: Sequence[Recording], solution: Solution, relative: Floats
     return tuple(out)
 
 
-def _input(recording: Recording, zeros: Floats) -> dict[str, Any]:
+def _input(recording: Recording, fitted: Model, zeros: Floats) -> dict[str, Any]:
     return {
         "name": recording.angles.name,
         "source": recording.angles.meta.get("source"),
@@ -320,4 +321,5 @@ def _input(recording: Recording, zeros: Floats) -> dict[str, Any]:
         "noise_deg": [float(v) for v in np.degrees(recording.noise.measured_rad)],
         "noise_source": list(recording.noise.source),
         "zeros_deg": [float(v) for v in np.degrees(zeros)],
+        "tail_modes_hz": list(plausible.tail_modes_hz(recording.track, recording.span, fitted)),
     }

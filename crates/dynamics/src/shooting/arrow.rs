@@ -125,6 +125,9 @@ impl Eliminated {
     #[must_use]
     pub fn log_determinant(&self) -> f64 {
         let states: f64 = self.inverse.iter().map(|m| -m.determinant().ln()).sum();
+        if self.corner.nrows() == 0 {
+            return states;
+        }
         let scale = self.corner.diagonal().map(|d| d.max(f64::MIN_POSITIVE).sqrt());
         let n = scale.len();
         let scaled = DMatrix::from_fn(n, n, |r, c| self.corner[(r, c)] / (scale[r] * scale[c]));

@@ -13,6 +13,9 @@ const ANGLE_PER_STEP: f64 = 0.06;
 /// Rate of the pendulum's own swinging, added to the links' rates when a step is sized, rad/s.
 const SWING_RATE: f64 = 8.0;
 
+/// No link turns this fast, rad/s; a guess that does is as good as not finite, and would take for ever to follow.
+const FASTEST: f64 = 1e4;
+
 /// The end of a segment.
 #[derive(Clone, Copy, Debug)]
 pub struct End<S> {
@@ -32,7 +35,8 @@ struct Knot<S> {
 struct Path<'a, S> {
     flow: Flow<'a, S>,
     contact: [Contact; 2],
-    dry: bool,
+    /// Whether the joint has dry friction.
+    dry: [bool; 2],
     stuck: bool,
 }
 
@@ -77,7 +81,7 @@ impl<S: Real> Path<'_, S> {
     }
 
     fn crosses(&self, joint: usize, rate: f64) -> bool {
-        self.dry && matches!(self.contact[joint], Contact::Slip(sign) if sign * rate < 0.0)
+        self.dry[joint] && matches!(self.contact[joint], Contact::Slip(sign) if sign * rate < 0.0)
     }
 
     /// Moves to exactly where joint `j`'s rate is zero within a step `h`, sets how it goes on, and returns the time
@@ -164,7 +168,8 @@ pub fn follow<S: Real>(
     rates: bool,
     mut sink: impl FnMut(usize, &State<S>),
 ) -> End<S> {
-    let dry = [Field::Rmu1, Field::Rmu2, Field::TauC1, Field::TauC2].iter().any(|f| p.is_active(*f));
+    let dry = [[Field::Rmu1, Field::TauC1], [Field::Rmu2, Field::TauC2]]
+        .map(|laws| laws.iter().any(|f| p.is_active(*f)));
     let mut path = Path { flow: Flow::new(p), contact: [Contact::Slip(1.0); 2], dry, stuck: false };
     let start = Path::<S>::rates(&x0);
     path.contact = start.map(|r| Contact::Slip(if r < 0.0 { -1.0 } else { 1.0 }));
@@ -178,7 +183,8 @@ pub fn follow<S: Real>(
     }
     while t < end_s {
         let speed = k.x[2].value().abs().max(k.x[3].value().abs()) + SWING_RATE;
-        if !speed.is_finite() {
+        if !(speed < FASTEST) {
+            k.x = [S::constant(f64::NAN); 4];
             break;
         }
         let wanted = ANGLE_PER_STEP / speed;

@@ -83,8 +83,16 @@ pub(super) fn learned(
     for _ in 0..MOST_GUESSES {
         let slack = now.slack;
         let weight = Vector4::from(slack.map(|s| 1.0 / (s * s)));
-        let done = problem.assemble(point, locals, Some(weight)).eliminate(0.0)?;
-        let border = problem.border_step(point, &done)?;
+        let done = problem.assemble(point, locals, Some(weight)).eliminate(0.0);
+        let step = done.and_then(|done| problem.border_step(point, &done).map(|border| (done, border)));
+        let Some((done, border)) = step else {
+            if slack == lowest {
+                return None;
+            }
+            // So loose that the common unknowns are lost in rounding.
+            now.slack = std::array::from_fn(|i| (slack[i] / 10.0).max(lowest[i]));
+            continue;
+        };
         let (squares, freedom) = joints(problem, point, locals, &done, &border, slack);
         now.chi2 = std::array::from_fn(|i| squares[i] / (freedom[i].max(1e-9) * slack[i] * slack[i]));
         now.slack = std::array::from_fn(|i| {

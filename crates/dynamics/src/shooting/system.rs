@@ -19,6 +19,9 @@ pub(super) struct Problem<'a> {
     pub(super) border: usize,
 }
 
+/// Least relative information that counts, tried in turn.
+const RIDGES: [f64; 4] = [1e-13, 1e-11, 1e-9, 1e-7];
+
 impl Problem<'_> {
     pub(super) fn locals(&self, point: &Point) -> Vec<Local> {
         let one = |(k, segment): (usize, &Segment)| {
@@ -145,11 +148,15 @@ impl Problem<'_> {
             let right = -(&done.corner_gradient + &done.corner * &step);
             let scale: Vec<f64> =
                 free.iter().map(|&i| 1.0 / done.corner[(i, i)].max(f64::MIN_POSITIVE).sqrt()).collect();
-            let m = DMatrix::from_fn(free.len(), free.len(), |r, c| {
-                done.corner[(free[r], free[c])] * scale[r] * scale[c] + if r == c { 1e-13 } else { 0.0 }
-            });
+            let m = |ridge: f64| {
+                DMatrix::from_fn(free.len(), free.len(), |r, c| {
+                    done.corner[(free[r], free[c])] * scale[r] * scale[c] + if r == c { ridge } else { 0.0 }
+                })
+            };
+            // Directions that rounding has left no information on are not moved along.
+            let factor = RIDGES.iter().find_map(|&ridge| m(ridge).cholesky())?;
             let v = DVector::from_iterator(free.len(), free.iter().zip(&scale).map(|(&i, s)| right[i] * s));
-            let solved = m.cholesky()?.solve(&v);
+            let solved = factor.solve(&v);
             for (n, &i) in free.iter().enumerate() {
                 step[i] = solved[n] * scale[n];
             }

@@ -1,0 +1,138 @@
+"""Which terms the data ask for, which they reject, and which they cannot tell apart.
+
+Every law is fitted at once to a part of the data; then each is left out in turn, with the same slack. The gain
+in likelihood says what the fitted data think of a term, the prediction of the rest what it is worth.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pydpend.coefficients import FULL, parameters, ratios_of
+from pydpend.damping import shooting
+from pydpend.damping.prediction import predict, split
+from pydpend.damping.trajectory import FLOOR, HUBER, SEGMENT_S, Recording, length_of
+from pydpend.damping.uncertainty import covariance
+from pydpend.model import Model
+
+Floats = NDArray[np.float64]
+
+WINDOW_S = 1.0
+"""Windows in which the data that were left out are predicted."""
+ASKED = 9.0
+"""Gain in twice the log-likelihood beyond which a term is asked for: three standard errors."""
+WORSE = 2.0
+"""Standard errors by which a prediction must differ to count."""
+
+
+@dataclass(frozen=True)
+class Term:
+    """What the data say of one term."""
+
+    name: str
+    gain: float
+    """Twice the gain in log-likelihood that it brings beside all others, over the residuals' chi-square."""
+    prediction: float
+    """How much worse the rest is predicted without it: change of the mean square, relative."""
+    prediction_z: float
+    """The same over its standard error, from the windows."""
+    partner: str
+    """The term it is most correlated with."""
+    correlation: float
+    verdict: str
+    """``asked for``, ``rejected``, ``cannot be told apart``, ``not decided``."""
+
+    @property
+    def sentence(self) -> str:
+        """The verdict in words."""
+        word = self.verdict
+        if word == "cannot be told apart":
+            word += f" from {self.partner} (correlation {self.correlation:+.2f})"
+        said = word if word.startswith("cannot") else f"is {word}"
+        return (
+            f"{self.name} {said}: without it twice the log-likelihood falls by {self.gain:.1f} and the mean square "
+            f"of the prediction of unused data changes by {100 * self.prediction:+.2f} % "
+            f"({self.prediction_z:+.1f} standard errors)"
+        )
+
+
+def verdict(gain: float, prediction_z: float, correlation: float) -> str:
+    """The word for a term from its three numbers."""
+    if gain > ASKED and prediction_z > -WORSE:
+        return "asked for"
+    if abs(correlation) > 0.9:
+        return "cannot be told apart"
+    if gain < 1.0 and prediction_z < WORSE:
+        return "rejected"
+    return "not decided"
+
+
+def compare_terms(
+    recordings: Sequence[Recording], model: Model, names: Sequence[str] = FULL
+) -> tuple[Term, ...]:
+    """The terms ``names`` judged on recordings ready for a fit: all but the last recording are fitted and the last
+    one predicted, or of a single one the last part.
+
+    Raises FitError as a fit does, and when nothing can be left out.
+    """
+    known, unknown = split(recordings)
+    tracks = [r.track for r in known]
+    wanted = [*ratios_of(known[0].angles.links), *names]
+    begun = shooting.settled(
+        tracks,
+        [r.span for r in known],
+        length_of(known, SEGMENT_S),
+        parameters(model),
+        np.zeros((len(known), 2)),
+        free=wanted,
+        bounded=names,
+    )
+    full = shooting.solve(
+        tracks,
+        begun.segments,
+        begun.parameters,
+        begun.zeros_rad,
+        free=wanted,
+        bounded=names,
+        slack=FLOOR,
+        huber=HUBER,
+    )
+    cov = covariance(full, model_error=True)
+    scale = np.sqrt(np.diag(cov))
+    related = cov / np.outer(scale, scale)
+
+    def squares(values: dict[str, float]) -> Floats:
+        rows = predict(unknown, values, (WINDOW_S,), forecasts=False).rows[f"{WINDOW_S:g}"]
+        out: Floats = (rows[:, 1:] ** 2 / np.square(np.degrees(unknown.noise.measured_rad))).sum(axis=1)
+        return out
+
+    with_all = squares(full.parameters)
+    terms = []
+    for name in names:
+        others = [n for n in wanted if n != name]
+        without = shooting.solve(
+            tracks,
+            full.segments,
+            full.parameters | {name: 0.0},
+            full.zeros_rad,
+            free=others,
+            slack=list(full.slack),
+            learned=False,
+            bounded=[n for n in names if n != name],
+            huber=HUBER,
+        )
+        gain = 2 * (without.cost - full.cost) / max(1.0, full.chi2)
+        change = squares(without.parameters) - with_all
+        error = float(change.std(ddof=1) / np.sqrt(change.size)) if change.size > 1 else 0.0
+        at = full.names.index(name)
+        partners = {n: float(related[at, full.names.index(n)]) for n in names if n != name}
+        partner = max(partners, key=lambda n: abs(partners[n])) if partners else ""
+        correlation = partners.get(partner, 0.0)
+        z = float(change.mean()) / error if error > 0 else 0.0
+        relative = float(change.mean() / with_all.mean())
+        terms.append(Term(name, gain, relative, z, partner, correlation, verdict(gain, z, correlation)))
+    return tuple(terms)
