@@ -144,7 +144,8 @@ pub fn fit(
                         break;
                     };
                     joint_chi2 = found.chi2;
-                    found.slack
+                    // What the linear problem promises holds for moderate steps of the states only.
+                    std::array::from_fn(|i| found.slack[i].clamp(slack[i] / 10.0, slack[i] * 10.0))
                 }
                 _ => std::array::from_fn(|i| (slack[i] / 10.0).max(lowest[i])),
             };
