@@ -60,3 +60,31 @@ def test_the_how_to(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     for name in ("rig.toml", "rig.png", "try.parquet", "run.toml"):
         assert (tmp_path / "out/own" / name).stat().st_size > 100
+
+
+def test_angles_and_encoder(tmp_path: Path) -> None:
+    together = tmp_path / "both.md"
+    together.write_text(
+        "".join((ROOT / "docs" / name).read_text("utf-8") for name in ("angles.md", "encoder.md"))
+    )
+    done = followed(str(together), tmp_path)
+    assert done.returncode == 0, done.stderr
+    printed = re.findall(r"^(\S.*)$", done.stdout, re.M)
+    for line in re.findall(
+        r"^    (phi\d: .*|zero from .*|\d+ holds: .*|linearity .*|gain .*|residual RMS .*)$",
+        together.read_text("utf-8"),
+        re.M,
+    ):
+        # The words are the page's; the numbers too, but for the last digits that a better tracker moves.
+        words = re.sub(r"[-+]?\d[\d.]*", "#", line)
+        (same,) = [p for p in printed if re.sub(r"[-+]?\d[\d.]*", "#", p) == words and p[:4] == line[:4]]
+        for page, found in zip(re.findall(r"\d[\d.]*", line), re.findall(r"\d[\d.]*", same), strict=True):
+            assert float(found) == pytest.approx(float(page), rel=0.15, abs=0.01)
+    for name in (
+        "angles.png",
+        "methods.png",
+        "calibration.png",
+        "comparison/compare.png",
+        "comparison/compare.json",
+    ):
+        assert (tmp_path / "out/angles" / name).stat().st_size > 1000
