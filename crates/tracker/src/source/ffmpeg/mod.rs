@@ -6,9 +6,12 @@
 
 mod decode;
 mod demux;
+mod describe;
+mod ending;
 mod layout;
 mod order;
 mod sample;
+mod stamps;
 
 use std::collections::VecDeque;
 use std::ffi::CStr;
@@ -18,12 +21,15 @@ use ffmpeg_next::ffi;
 
 use decode::{Decoder, Picture, Received};
 use demux::{Demuxer, Packet, Read};
+use describe::{describe, step};
 use layout::{Layout, Orientation};
 use order::{Order, Sent};
+use stamps::Stamps;
+pub(crate) use stamps::display_times;
 
-use super::{Input, OpenOptions, clock};
+use super::{Input, OpenOptions};
 use crate::error::{Error, Fault, Result};
-use crate::frame::{Bytes, Ending, Frame, FrameSource, RateOrigin, SourceInfo, TimeBase};
+use crate::frame::{Bytes, Ending, Frame, FrameSource, SourceInfo};
 
 /// FFmpeg's words for an error code.
 fn message(code: i32) -> String {
@@ -81,26 +87,8 @@ pub struct FfmpegSource {
     /// Frames given as samples of a pipe, to be handed out in their turn.
     replay: VecDeque<Frame>,
     next_index: u64,
-    /// Time of the last picture and the longest step between two.
-    last_ticks: Option<(i64, i64)>,
     user_clock: bool,
     ending: Ending,
-}
-
-/// Where display times come from.
-enum Stamps {
-    /// Each packet has one.
-    Packets {
-        /// The last one and its duration, for a packet without.
-        last: Option<(i64, i64)>,
-    },
-    /// None has: the decoding times, which rise, are given to frames in their order.
-    Decoding {
-        times: VecDeque<i64>,
-        /// Time of the next frame if there are no decoding times either, and ticks from frame to frame.
-        next: i64,
-        step: i64,
-    },
 }
 
 /// How far decoding order and display order can differ (H.264's and HEVC's limit of 16 frames).
@@ -122,50 +110,12 @@ impl FfmpegSource {
         let mut demuxer = Demuxer::open(url, name, protocols)?;
         let decoder = Decoder::open(&demuxer, name, options.threads)?;
         let parameters = demuxer.parameters();
-        let codec = codec_name(parameters.codec_id);
         let layout = Layout::new(parameters.format, name)?;
         // SAFETY: a look-up in a static table; null for codecs without a descriptor.
         let properties =
             unsafe { ffi::avcodec_descriptor_get(parameters.codec_id).as_ref() }.map_or(0, |d| d.props);
         let intra_only = properties & ffi::AV_CODEC_PROP_INTRA_ONLY != 0;
-        let (width, height) = size(parameters, name)?;
-        let mut warnings = Vec::new();
-        let orientation = turn(&demuxer, &mut warnings);
-        let (width, height) = orientation.size(width, height);
-
-        let stream = demuxer.stream();
-        let stream_base = positive(stream.time_base).unwrap_or((1, 1_000_000));
-        let rate = demuxer.rate();
-        let stream_rate_hz = rate.map(|r| f64::from(r.num) / f64::from(r.den));
-        let (time_base, rate_hz, rate_origin) = match options.fps {
-            Some(fps) => (clock::time_base(fps)?, Some(fps), RateOrigin::User),
-            None => (
-                TimeBase { numerator: stream_base.0, denominator: stream_base.1 },
-                stream_rate_hz,
-                if stream_rate_hz.is_some() { RateOrigin::Container } else { RateOrigin::Unknown },
-            ),
-        };
-        let step = stream_rate_hz
-            .map_or(1.0, |r| stream_base.1 as f64 / (stream_base.0 as f64 * r))
-            .round()
-            .max(1.0) as i64;
-        let info = SourceInfo {
-            name: name.to_owned(),
-            container: demuxer.container(),
-            codec,
-            width,
-            height,
-            format: layout.format,
-            depth_bits: layout.depth_bits,
-            declared_frames: u64::try_from(stream.nb_frames).ok().filter(|n| *n > 0),
-            time_base,
-            rate_hz,
-            rate_origin,
-            converted_from: layout.converted_from(),
-            size_bytes: can_reopen.then(|| std::fs::metadata(name).ok().map(|m| m.len())).flatten(),
-            details: details(parameters, &layout),
-            warnings,
-        };
+        let (info, orientation) = describe(&demuxer, &layout, name, options)?;
 
         // A stream has display times if its first packets have.
         let mut ahead = VecDeque::new();
@@ -189,6 +139,7 @@ impl FfmpegSource {
             p.get().pts == ffi::AV_NOPTS_VALUE && !(intra_only && p.get().dts != ffi::AV_NOPTS_VALUE)
         };
         let unstamped = ahead.iter().any(lacks);
+        let step = step(&demuxer);
         Ok(Self {
             info,
             url: url.clone(),
@@ -201,11 +152,7 @@ impl FfmpegSource {
             orientation,
             ahead,
             packet: Packet::new(name)?,
-            stamps: if unstamped {
-                Stamps::Decoding { times: VecDeque::new(), next: 0, step }
-            } else {
-                Stamps::Packets { last: None }
-            },
+            stamps: Stamps::new(unstamped, step),
             order: Order::new(if unstamped && !intra_only { REORDER } else { 0 }),
             intra_only,
             tainted: false,
@@ -220,7 +167,6 @@ impl FfmpegSource {
             ready: VecDeque::new(),
             replay: VecDeque::new(),
             next_index: 0,
-            last_ticks: None,
             user_clock: options.fps.is_some(),
             ending: Ending::Complete,
         })
@@ -251,20 +197,7 @@ impl FfmpegSource {
         self.packets += 1;
         let fields = *self.packet.get();
         let byte = u64::try_from(fields.pos).ok();
-        let key = match &mut self.stamps {
-            Stamps::Packets { last } => {
-                let stamp = [fields.pts, fields.dts].into_iter().find(|t| *t != ffi::AV_NOPTS_VALUE);
-                let key = stamp.unwrap_or_else(|| last.map_or(0, |(t, d)| t.saturating_add(d.max(1))));
-                *last = Some((key, fields.duration));
-                key
-            }
-            Stamps::Decoding { times, next, step } => {
-                let time = if fields.dts == ffi::AV_NOPTS_VALUE { *next } else { fields.dts.max(*next) };
-                times.push_back(time);
-                *next = time.saturating_add(*step);
-                number
-            }
-        };
+        let key = self.stamps.key(&fields, number);
         self.packet.set_pts(key);
         // What an edit list hides is decoded, because others are predicted from it, but gives no picture.
         if !self.packet.has(ffi::AV_PKT_FLAG_DISCARD) {
@@ -328,8 +261,8 @@ impl FfmpegSource {
         } else {
             self.layout.plane(picture, self.orientation)
         };
-        let usual = self.last_ticks;
-        let ticks = self.next_ticks(key);
+        let usual = self.stamps.last();
+        let ticks = self.stamps.ticks(key);
         // In a file that is cut, the last pictures in display order may be there and one before them not.
         let after_hole = self.draining
             && !self.intra_only
@@ -346,75 +279,8 @@ impl FfmpegSource {
     }
 
     fn hold(&mut self, lost: Sent) {
-        let ticks = self.next_ticks(lost.key);
+        let ticks = self.stamps.ticks(lost.key);
         self.held.push_back(Ready { ticks, plane: None, byte: lost.byte });
-    }
-
-    fn next_ticks(&mut self, key: i64) -> i64 {
-        let ticks = match &mut self.stamps {
-            Stamps::Packets { .. } => key,
-            Stamps::Decoding { times, next, .. } => times.pop_front().unwrap_or(*next),
-        };
-        let longest = self.last_ticks.map_or(1, |(last, longest)| longest.max(ticks.saturating_sub(last)));
-        self.last_ticks = Some((ticks, longest));
-        ticks
-    }
-
-    /// How much of the length that the container declares is not there, s; `None` if it is all there, but for
-    /// two of the longest steps between frames.
-    fn missing_s(&self) -> Option<f64> {
-        let (last, longest) = self.last_ticks?;
-        let missing = self.demuxer.declared_end()?.saturating_sub(last);
-        let base = self.demuxer.stream().time_base;
-        (missing > longest.saturating_mul(3))
-            .then(|| missing as f64 * f64::from(base.num) / f64::from(base.den))
-    }
-
-    /// Whether the file ends before what it declares, as far as that can be told from its packets.
-    fn is_cut(&self) -> bool {
-        self.stop_reason.is_some()
-            || self.last_is_cut
-            || self.info.declared_frames.is_some_and(|n| self.packets < n)
-            || self.missing_s().is_some()
-    }
-
-    /// The decoder gives no more: says how the recording ended.
-    fn finish(&mut self) {
-        self.finished = true;
-        for lost in self.order.rest() {
-            self.hold(lost);
-        }
-        let declared = self.info.declared_frames;
-        let short = declared.is_some_and(|n| self.packets < n);
-        let reason = match (&self.stop_reason, declared) {
-            (Some(reason), _) => format!("the file cannot be read further ({reason})"),
-            (None, Some(n)) if short => {
-                format!("the file ends after {} of {n} frames that its header declares", self.packets)
-            }
-            // Its frames lie end to end, so what is left over is part of one.
-            (None, _)
-                if self.info.container == "yuv4mpegpipe" && self.demuxer.position() > self.last_byte =>
-            {
-                "the file ends inside a frame".to_owned()
-            }
-            _ => match self.missing_s() {
-                Some(s) => format!("the file ends {s:.3} s before the length that its header declares"),
-                None if self.held.is_empty() => return,
-                // All packets are there by the container's own account: frames that cannot be decoded keep
-                // their places to the end.
-                None if !self.last_is_cut
-                    && self.next_index + self.ready.len() as u64 > 0
-                    && (declared.is_some() || self.demuxer.declared_end().is_some()) =>
-                {
-                    return self.ready.append(&mut self.held);
-                }
-                None => "the last frames cannot be decoded".to_owned(),
-            },
-        };
-        let frames = self.next_index + self.ready.len() as u64;
-        let byte = self.held.front().map_or(self.last_byte, |h| h.byte).or_else(|| self.demuxer.position());
-        self.held.clear();
-        self.ending = Ending::Early { frames, byte, reason };
     }
 
     fn make(&mut self, ready: Ready) -> Frame {
@@ -459,30 +325,6 @@ impl FfmpegSource {
     }
 }
 
-/// Display times of all frames of a file in ticks, rising, without decoding; for a decoder that does not tell them.
-///
-/// # Errors
-/// [`Error::Source`] if the file cannot be read.
-pub(crate) fn display_times(name: &str, input: &Input) -> Result<Vec<i64>> {
-    let (Input::File(url) | Input::Pipe(url) | Input::Address(url)) = input;
-    let mut demuxer = Demuxer::open(url, name, Some("file"))?;
-    let mut packet = Packet::new(name)?;
-    let mut times = Vec::new();
-    let mut unstamped = false;
-    while let Read::Packet = demuxer.read(&mut packet) {
-        if packet.has(ffi::AV_PKT_FLAG_DISCARD) {
-            continue;
-        }
-        let fields = packet.get();
-        unstamped |= fields.pts == ffi::AV_NOPTS_VALUE;
-        times.push((fields.pts, fields.dts));
-    }
-    // Decoding times rise as display times do, if there are no others.
-    let mut times: Vec<i64> = times.into_iter().map(|(p, d)| if unstamped { d } else { p }).collect();
-    times.sort_unstable();
-    Ok(times)
-}
-
 impl FrameSource for FfmpegSource {
     fn info(&self) -> &SourceInfo {
         &self.info
@@ -510,64 +352,5 @@ struct Shared(Arc<dyn Bytes>);
 impl Bytes for Shared {
     fn bytes(&self) -> &[u8] {
         self.0.bytes()
-    }
-}
-
-/// A fraction with both parts above 0.
-fn positive(r: ffi::AVRational) -> Option<(u64, u64)> {
-    Some((u64::try_from(r.num).ok().filter(|n| *n > 0)?, u64::try_from(r.den).ok().filter(|n| *n > 0)?))
-}
-
-/// Pixel format, profile's range and the like, for the user.
-fn details(parameters: &ffi::AVCodecParameters, layout: &Layout) -> Vec<(String, String)> {
-    let range = match parameters.color_range {
-        ffi::AVColorRange::AVCOL_RANGE_MPEG => "limited",
-        ffi::AVColorRange::AVCOL_RANGE_JPEG => "full",
-        _ if layout.name.starts_with("yuvj") || layout.name.starts_with("gray") => "full",
-        _ if layout.converted_from().is_some() => "full",
-        _ => "not said",
-    };
-    vec![("pixel format".into(), layout.name.clone()), ("range".into(), range.into())]
-}
-
-fn size(parameters: &ffi::AVCodecParameters, name: &str) -> Result<(u32, u32)> {
-    match (u32::try_from(parameters.width), u32::try_from(parameters.height)) {
-        (Ok(w), Ok(h)) if w > 0 && h > 0 => Ok((w, h)),
-        _ => Err(Error::Source(
-            Fault::new(name, format!("a picture of {} x {} px", parameters.width, parameters.height))
-                .advice("Check that the file is complete and that `ffmpeg -i` reads it"),
-        )),
-    }
-}
-
-/// How the container says that pictures are to be turned.
-fn turn(demuxer: &Demuxer, warnings: &mut Vec<String>) -> Orientation {
-    let mut size = 0usize;
-    // SAFETY: the stream is valid, and the data it gives lives as long as the stream.
-    let data = unsafe {
-        ffi::av_stream_get_side_data(
-            demuxer.stream(),
-            ffi::AVPacketSideDataType::AV_PKT_DATA_DISPLAYMATRIX,
-            (&raw mut size).cast(),
-        )
-    };
-    if data.is_null() || size < 36 {
-        return Orientation::default();
-    }
-    // SAFETY: a display matrix is nine 32-bit numbers; the size was checked, and reads may be unaligned.
-    let at = |i: usize| unsafe { data.cast::<i32>().add(i).read_unaligned() };
-    let orientation = Orientation::from_matrix(at(0), at(1), at(3), at(4));
-    match orientation {
-        Some(o) => {
-            if let Some(words) = o.words() {
-                warnings.push(format!("turned as the file says: {words}"));
-            }
-            o
-        }
-        None => {
-            warnings
-                .push("the file asks for a turn that is not by a right angle; it is not turned".to_owned());
-            Orientation::default()
-        }
     }
 }

@@ -5,13 +5,34 @@
 
 use std::collections::HashMap;
 
-use super::header::{Header, Side, fraction, missing, number, short};
+use super::header::{Header, Names};
 use crate::error::{Error, Fault, Result};
 
 const OPEN: &[u8] = b"<cih>";
 const CLOSE: &[u8] = b"</cih>";
 /// Deepest nesting that is followed; real files have eight levels.
 const MAX_DEPTH: usize = 64;
+
+const NAMES: Names = Names {
+    width: "imageDataInfo/resolution/width",
+    height: "imageDataInfo/resolution/height",
+    color_bit: "imageDataInfo/colorInfo/bit",
+    depth: "imageDataInfo/effectiveBit/depth",
+    side: "imageDataInfo/effectiveBit/side",
+    color_type: "imageDataInfo/colorInfo/type",
+    file_format: "imageFileInfo/fileFormat",
+    total_frames: "frameInfo/totalFrame",
+    record_rate: "recordInfo/recordRate",
+    save_step: "frameInfo/skipFrame",
+    start_frame: "frameInfo/startFrame",
+    trigger_frame: None,
+    exposure_ns: "recordInfo/shutterSpeedNsec",
+    shutter: "recordInfo/shutterSpeed",
+    shutter_s: |denominator| 1.0 / denominator,
+    camera: "deviceInfo/deviceName",
+    recorded: ["fileInfo/date", "fileInfo/time"],
+    comment: "basicInfo/comment",
+};
 
 /// Whether bytes are this form of header and not the text one.
 pub fn is_cihx(bytes: &[u8]) -> bool {
@@ -33,58 +54,7 @@ pub fn parse(bytes: &[u8], name: &str) -> Result<Header> {
         body.len()
     });
     let values = elements(&String::from_utf8_lossy(&body[..end]));
-    let get = |path: &str| values.get(path).map(String::as_str).filter(|v| !v.is_empty());
-    let mut whole = |path: &str| get(path).and_then(|v| number::<i64>(path, v, &mut warnings));
-    let width = whole("imageDataInfo/resolution/width");
-    let height = whole("imageDataInfo/resolution/height");
-    let bits = whole("imageDataInfo/colorInfo/bit");
-    let depth = whole("imageDataInfo/effectiveBit/depth");
-    let total = whole("frameInfo/totalFrame");
-    let step = whole("frameInfo/skipFrame");
-    let start_frame = whole("frameInfo/startFrame");
-    let exposure_ns = whole("recordInfo/shutterSpeedNsec");
-    let record_rate_hz =
-        get("recordInfo/recordRate").and_then(|v| fraction("recordInfo/recordRate", v, &mut warnings));
-    // The shutter speed is a denominator.
-    let shutter =
-        get("recordInfo/shutterSpeed").and_then(|v| fraction("recordInfo/shutterSpeed", v, &mut warnings));
-    let side = match get("imageDataInfo/effectiveBit/side").map(str::to_lowercase).as_deref() {
-        Some("higher") => Side::Higher,
-        _ => Side::Lower,
-    };
-    let positive = |value: Option<i64>, key: &str| {
-        value.and_then(|v| u32::try_from(v).ok()).filter(|v| *v > 0).ok_or_else(|| missing(name, key))
-    };
-    let save_step = match step {
-        Some(s) if s < 1 => {
-            warnings.push(format!("frameInfo/skipFrame: {s} makes no sense; taken as 1"));
-            1
-        }
-        Some(s) => s.unsigned_abs(),
-        None => 1,
-    };
-    let recorded =
-        [get("fileInfo/date"), get("fileInfo/time")].into_iter().flatten().collect::<Vec<_>>().join(" ");
-    Ok(Header {
-        width: positive(width, "imageDataInfo/resolution/width")?,
-        height: positive(height, "imageDataInfo/resolution/height")?,
-        color_bit: positive(bits, "imageDataInfo/colorInfo/bit")?,
-        effective_depth: depth.and_then(|d| u32::try_from(d).ok()),
-        side,
-        color_type: get("imageDataInfo/colorInfo/type").and_then(short),
-        file_format: get("imageFileInfo/fileFormat").and_then(short),
-        total_frames: total.and_then(|n| u64::try_from(n).ok()),
-        record_rate_hz,
-        save_step,
-        start_frame,
-        // Frames are numbered from the trigger.
-        trigger_frame: start_frame.map(|_| 0),
-        exposure_s: exposure_ns.filter(|n| *n > 0).map(|n| n as f64 * 1e-9).or(shutter.map(|s| 1.0 / s)),
-        camera: get("deviceInfo/deviceName").and_then(short),
-        recorded: short(&recorded),
-        comment: get("basicInfo/comment").and_then(short),
-        warnings,
-    })
+    Header::of(&NAMES, |path| values.get(path).map(String::as_str), warnings, name)
 }
 
 fn find(bytes: &[u8], word: &[u8]) -> Option<usize> {

@@ -69,6 +69,30 @@ pub struct Packing {
     pub frame_bytes: u64,
 }
 
+/// Under which names a form of header keeps its facts.
+pub(super) struct Names {
+    pub width: &'static str,
+    pub height: &'static str,
+    pub color_bit: &'static str,
+    pub depth: &'static str,
+    pub side: &'static str,
+    pub color_type: &'static str,
+    pub file_format: &'static str,
+    pub total_frames: &'static str,
+    pub record_rate: &'static str,
+    pub save_step: &'static str,
+    pub start_frame: &'static str,
+    /// `None` where frames are numbered from the trigger.
+    pub trigger_frame: Option<&'static str>,
+    pub exposure_ns: &'static str,
+    pub shutter: &'static str,
+    /// Exposure in s of what stands under `shutter`.
+    pub shutter_s: fn(f64) -> f64,
+    pub camera: &'static str,
+    pub recorded: [&'static str; 2],
+    pub comment: &'static str,
+}
+
 impl Header {
     /// Reads a header of either form; `name` is for messages.
     ///
@@ -78,6 +102,61 @@ impl Header {
         let header = if cihx::is_cihx(bytes) { cihx::parse(bytes, name)? } else { cih::parse(bytes, name)? };
         header.check(name)?;
         Ok(header)
+    }
+
+    /// The header whose entries `get` finds by their names; `name` is the file's, for messages.
+    ///
+    /// # Errors
+    /// [`Error::Source`] if width, height or bits are missing.
+    pub(super) fn of<'a>(
+        names: &Names,
+        get: impl Fn(&str) -> Option<&'a str>,
+        mut warnings: Vec<String>,
+        name: &str,
+    ) -> Result<Self> {
+        let get = |key: &str| get(key).map(str::trim).filter(|v| !v.is_empty());
+        let mut whole = |key: &str| get(key).and_then(|v| number(key, v, &mut warnings));
+        let (width, height, bits) = (whole(names.width), whole(names.height), whole(names.color_bit));
+        let depth = whole(names.depth);
+        let total = whole(names.total_frames);
+        let step = whole(names.save_step);
+        let start_frame = whole(names.start_frame);
+        let trigger_frame = match names.trigger_frame {
+            Some(key) => whole(key),
+            None => start_frame.map(|_| 0),
+        };
+        let exposure_ns = whole(names.exposure_ns).filter(|n| *n > 0);
+        let mut above_zero = |key: &str| get(key).and_then(|v| fraction(key, v, &mut warnings));
+        let record_rate_hz = above_zero(names.record_rate);
+        let shutter_s = above_zero(names.shutter).map(names.shutter_s);
+        let positive = |value: Option<i64>, key: &str| {
+            value.and_then(|v| u32::try_from(v).ok()).filter(|v| *v > 0).ok_or_else(|| missing(name, key))
+        };
+        let save_step = step.unwrap_or(1);
+        if save_step < 1 {
+            warnings.push(format!("{}: {save_step} makes no sense; taken as 1", names.save_step));
+        }
+        let higher = get(names.side).is_some_and(|s| s.eq_ignore_ascii_case("higher"));
+        let recorded = names.recorded.into_iter().filter_map(get).collect::<Vec<_>>().join(" ");
+        Ok(Self {
+            width: positive(width, names.width)?,
+            height: positive(height, names.height)?,
+            color_bit: positive(bits, names.color_bit)?,
+            effective_depth: depth.and_then(|d| u32::try_from(d).ok()),
+            side: if higher { Side::Higher } else { Side::Lower },
+            color_type: get(names.color_type).and_then(short),
+            file_format: get(names.file_format).and_then(short),
+            total_frames: total.and_then(|n| u64::try_from(n).ok()),
+            record_rate_hz,
+            save_step: save_step.max(1).unsigned_abs(),
+            start_frame,
+            trigger_frame,
+            exposure_s: exposure_ns.map(|n| n as f64 * 1e-9).or(shutter_s),
+            camera: get(names.camera).and_then(short),
+            recorded: short(&recorded),
+            comment: get(names.comment).and_then(short),
+            warnings,
+        })
     }
 
     fn check(&self, name: &str) -> Result<()> {
@@ -166,37 +245,35 @@ impl Header {
     }
 }
 
-/// A number of a header, or a note that it is none. Whole numbers may be written `75.0`.
-pub(super) fn number<T: TryFrom<i128>>(key: &str, text: &str, warnings: &mut Vec<String>) -> Option<T> {
-    let text = text.trim();
+/// A whole number of a header, which may be written `75.0`, or a note that it is none.
+fn number(key: &str, text: &str, warnings: &mut Vec<String>) -> Option<i64> {
     let whole = text.parse::<i128>().ok().or_else(|| {
         // Above 2^53 a float no longer counts in ones.
         let value = text.parse::<f64>().ok()?;
         (value.fract() == 0.0 && value.abs() < 9e15).then_some(value as i128)
     });
-    let value = whole.and_then(|v| T::try_from(v).ok());
-    if value.is_none() && !text.is_empty() {
+    let value = whole.and_then(|v| i64::try_from(v).ok());
+    if value.is_none() {
         warnings.push(format!("{key}: {text:?} is not a number that makes sense; not used"));
     }
     value
 }
 
 /// A number that may be a fraction such as `1/15371`.
-pub(super) fn fraction(key: &str, text: &str, warnings: &mut Vec<String>) -> Option<f64> {
-    let text = text.trim();
+fn fraction(key: &str, text: &str, warnings: &mut Vec<String>) -> Option<f64> {
     let value = match text.split_once('/') {
         Some((a, b)) => a.trim().parse::<f64>().ok().zip(b.trim().parse::<f64>().ok()).map(|(a, b)| a / b),
         None => text.parse::<f64>().ok(),
     };
     let value = value.filter(|v| v.is_finite() && *v > 0.0);
-    if value.is_none() && !text.is_empty() {
+    if value.is_none() {
         warnings.push(format!("{key}: {text:?} is not a number above 0; not used"));
     }
     value
 }
 
 /// The error for a key without which the pixels cannot be read.
-pub(super) fn missing(name: &str, key: &str) -> Error {
+fn missing(name: &str, key: &str) -> Error {
     Error::Source(
         Fault::new(name, "it is not in the header, or not a number")
             .at(Place::Key(key.into()))
@@ -205,7 +282,7 @@ pub(super) fn missing(name: &str, key: &str) -> Error {
 }
 
 /// Text cut to a length that fits a report.
-pub(super) fn short(text: &str) -> Option<String> {
+fn short(text: &str) -> Option<String> {
     let text: String = text.trim().chars().filter(|c| !c.is_control()).take(200).collect();
     (!text.is_empty()).then_some(text)
 }

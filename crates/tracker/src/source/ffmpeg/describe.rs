@@ -1,0 +1,129 @@
+//! What a container and its stream say of a recording.
+//!
+//! Owns: [`describe`]. Must not: decode.
+
+use ffmpeg_next::ffi;
+
+use super::codec_name;
+use super::demux::Demuxer;
+use super::layout::{Layout, Orientation};
+use crate::error::{Error, Fault, Result};
+use crate::frame::{RateOrigin, SourceInfo, TimeBase};
+use crate::source::{OpenOptions, clock};
+
+/// What is known of a recording before any of it is decoded, and how its pictures are to be turned.
+///
+/// # Errors
+/// [`Error::Source`] for a size that is none; [`Error::Argument`] for a rate that is none.
+pub(super) fn describe(
+    demuxer: &Demuxer,
+    layout: &Layout,
+    name: &str,
+    options: &OpenOptions,
+) -> Result<(SourceInfo, Orientation)> {
+    let parameters = demuxer.parameters();
+    let (width, height) = size(parameters, name)?;
+    let mut warnings = Vec::new();
+    let orientation = turn(demuxer, &mut warnings);
+    let (width, height) = orientation.size(width, height);
+
+    let stream = demuxer.stream();
+    let stream_base = positive(stream.time_base).unwrap_or((1, 1_000_000));
+    let rate = demuxer.rate();
+    let stream_rate_hz = rate.map(|r| f64::from(r.num) / f64::from(r.den));
+    let (time_base, rate_hz, rate_origin) = match options.fps {
+        Some(fps) => (clock::time_base(fps)?, Some(fps), RateOrigin::User),
+        None => (
+            TimeBase { numerator: stream_base.0, denominator: stream_base.1 },
+            stream_rate_hz,
+            if stream_rate_hz.is_some() { RateOrigin::Container } else { RateOrigin::Unknown },
+        ),
+    };
+    let info = SourceInfo {
+        name: name.to_owned(),
+        container: demuxer.container(),
+        codec: codec_name(parameters.codec_id),
+        width,
+        height,
+        format: layout.format,
+        depth_bits: layout.depth_bits,
+        declared_frames: u64::try_from(stream.nb_frames).ok().filter(|n| *n > 0),
+        time_base,
+        rate_hz,
+        rate_origin,
+        converted_from: layout.converted_from(),
+        size_bytes: std::fs::metadata(name).ok().filter(|m| m.is_file()).map(|m| m.len()),
+        details: details(parameters, layout),
+        warnings,
+    };
+    Ok((info, orientation))
+}
+
+/// Ticks from frame to frame by the rate that the container claims, at least 1.
+pub(super) fn step(demuxer: &Demuxer) -> i64 {
+    let base = demuxer.stream().time_base;
+    let ticks = demuxer
+        .rate()
+        .map_or(1.0, |r| f64::from(base.den) * f64::from(r.den) / (f64::from(base.num) * f64::from(r.num)));
+    // A float that is none, from a base of 0, becomes 0.
+    (ticks.round() as i64).max(1)
+}
+
+/// A fraction with both parts above 0.
+fn positive(r: ffi::AVRational) -> Option<(u64, u64)> {
+    Some((u64::try_from(r.num).ok().filter(|n| *n > 0)?, u64::try_from(r.den).ok().filter(|n| *n > 0)?))
+}
+
+/// Pixel format, profile's range and the like, for the user.
+fn details(parameters: &ffi::AVCodecParameters, layout: &Layout) -> Vec<(String, String)> {
+    let range = match parameters.color_range {
+        ffi::AVColorRange::AVCOL_RANGE_MPEG => "limited",
+        ffi::AVColorRange::AVCOL_RANGE_JPEG => "full",
+        _ if layout.name.starts_with("yuvj") || layout.name.starts_with("gray") => "full",
+        _ if layout.converted_from().is_some() => "full",
+        _ => "not said",
+    };
+    vec![("pixel format".into(), layout.name.clone()), ("range".into(), range.into())]
+}
+
+fn size(parameters: &ffi::AVCodecParameters, name: &str) -> Result<(u32, u32)> {
+    match (u32::try_from(parameters.width), u32::try_from(parameters.height)) {
+        (Ok(w), Ok(h)) if w > 0 && h > 0 => Ok((w, h)),
+        _ => Err(Error::Source(
+            Fault::new(name, format!("a picture of {} x {} px", parameters.width, parameters.height))
+                .advice("Check that the file is complete and that `ffmpeg -i` reads it"),
+        )),
+    }
+}
+
+/// How the container says that pictures are to be turned.
+fn turn(demuxer: &Demuxer, warnings: &mut Vec<String>) -> Orientation {
+    let mut size = 0usize;
+    // SAFETY: the stream is valid, and the data it gives lives as long as the stream.
+    let data = unsafe {
+        ffi::av_stream_get_side_data(
+            demuxer.stream(),
+            ffi::AVPacketSideDataType::AV_PKT_DATA_DISPLAYMATRIX,
+            (&raw mut size).cast(),
+        )
+    };
+    if data.is_null() || size < 36 {
+        return Orientation::default();
+    }
+    // SAFETY: a display matrix is nine 32-bit numbers; the size was checked, and reads may be unaligned.
+    let at = |i: usize| unsafe { data.cast::<i32>().add(i).read_unaligned() };
+    let orientation = Orientation::from_matrix(at(0), at(1), at(3), at(4));
+    match orientation {
+        Some(o) => {
+            if let Some(words) = o.words() {
+                warnings.push(format!("turned as the file says: {words}"));
+            }
+            o
+        }
+        None => {
+            warnings
+                .push("the file asks for a turn that is not by a right angle; it is not turned".to_owned());
+            Orientation::default()
+        }
+    }
+}

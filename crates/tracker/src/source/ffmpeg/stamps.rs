@@ -1,0 +1,105 @@
+//! When frames are shown: by their packets' display times, or, in a stream without, by the decoding times.
+//!
+//! Owns: [`Stamps`], [`display_times`]. Must not: decode.
+
+use std::collections::VecDeque;
+
+use ffmpeg_next::ffi;
+
+use super::demux::{Demuxer, Packet, Read};
+use crate::error::Result;
+use crate::source::Input;
+
+/// The times of a stream's frames, in ticks.
+pub(super) struct Stamps {
+    origin: Origin,
+    /// Time of the last picture and the longest step between two.
+    last: Option<(i64, i64)>,
+}
+
+/// Where display times come from.
+enum Origin {
+    /// Each packet has one.
+    Packets {
+        /// The last one and its duration, for a packet without.
+        last: Option<(i64, i64)>,
+    },
+    /// None has: the decoding times, which rise, are given to frames in their order.
+    Decoding {
+        times: VecDeque<i64>,
+        /// Time of the next frame if there are no decoding times either, and ticks from frame to frame.
+        next: i64,
+        step: i64,
+    },
+}
+
+impl Stamps {
+    /// Times of a stream whose first packets are `unstamped`, with `step` ticks from frame to frame, or not.
+    pub(super) fn new(unstamped: bool, step: i64) -> Self {
+        let origin = if unstamped {
+            Origin::Decoding { times: VecDeque::new(), next: 0, step }
+        } else {
+            Origin::Packets { last: None }
+        };
+        Self { origin, last: None }
+    }
+
+    /// What the picture of the `number`-th packet will be known by: its time, or, in a stream without display
+    /// times, the number.
+    pub(super) fn key(&mut self, packet: &ffi::AVPacket, number: i64) -> i64 {
+        match &mut self.origin {
+            Origin::Packets { last } => {
+                let stamp = [packet.pts, packet.dts].into_iter().find(|t| *t != ffi::AV_NOPTS_VALUE);
+                let key = stamp.unwrap_or_else(|| last.map_or(0, |(t, d)| t.saturating_add(d.max(1))));
+                *last = Some((key, packet.duration));
+                key
+            }
+            Origin::Decoding { times, next, step } => {
+                let time = if packet.dts == ffi::AV_NOPTS_VALUE { *next } else { packet.dts.max(*next) };
+                times.push_back(time);
+                *next = time.saturating_add(*step);
+                number
+            }
+        }
+    }
+
+    /// The time of the next frame, which is known by `key`.
+    pub(super) fn ticks(&mut self, key: i64) -> i64 {
+        let ticks = match &mut self.origin {
+            Origin::Packets { .. } => key,
+            Origin::Decoding { times, next, .. } => times.pop_front().unwrap_or(*next),
+        };
+        let longest = self.last.map_or(1, |(last, longest)| longest.max(ticks.saturating_sub(last)));
+        self.last = Some((ticks, longest));
+        ticks
+    }
+
+    /// Time of the last frame and the longest step between two.
+    pub(super) fn last(&self) -> Option<(i64, i64)> {
+        self.last
+    }
+}
+
+/// Display times of all frames of a file in ticks, rising, without decoding; for a decoder that does not tell them.
+///
+/// # Errors
+/// [`Error::Source`] if the file cannot be read.
+pub(crate) fn display_times(name: &str, input: &Input) -> Result<Vec<i64>> {
+    let (Input::File(url) | Input::Pipe(url) | Input::Address(url)) = input;
+    let mut demuxer = Demuxer::open(url, name, Some("file"))?;
+    let mut packet = Packet::new(name)?;
+    let mut times = Vec::new();
+    let mut unstamped = false;
+    while let Read::Packet = demuxer.read(&mut packet) {
+        if packet.has(ffi::AV_PKT_FLAG_DISCARD) {
+            continue;
+        }
+        let fields = packet.get();
+        unstamped |= fields.pts == ffi::AV_NOPTS_VALUE;
+        times.push((fields.pts, fields.dts));
+    }
+    // Decoding times rise as display times do, if there are no others.
+    let mut times: Vec<i64> = times.into_iter().map(|(p, d)| if unstamped { d } else { p }).collect();
+    times.sort_unstable();
+    Ok(times)
+}
