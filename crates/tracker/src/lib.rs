@@ -10,6 +10,7 @@
 //! Image coordinates: x right, y down, pixel centres at integers, the first pixel is (0, 0). Times are integer
 //! ticks with a time base until they are written.
 
+pub mod brightest;
 pub mod detect;
 pub mod discover;
 pub mod error;

@@ -23,6 +23,8 @@ mod tests;
 
 pub use detector::Detector;
 pub use levels::{Background, Levels, Marker, Noise, Side};
+#[cfg(test)]
+pub(crate) use pixels::pack;
 
 use crate::rig::{Lens, Region};
 

@@ -3,12 +3,16 @@
 use std::io::Write;
 use std::process::ExitCode;
 
+use rayon::prelude::*;
 use serde_json::{Value, json};
-use tracker::frame::{Ending, FrameSource, PixelFormat, RateOrigin};
+use tracker::brightest::brightest;
+use tracker::frame::{Ending, Frame, FrameSource, PixelFormat, RateOrigin};
 use tracker::source::{Decoder, OpenOptions, open};
 
 /// Frames whose time stamps are shown.
 const FIRST: usize = 5;
+/// Most bytes of frames that are looked at side by side; at least one is.
+const BATCH_BYTES: usize = 32 << 20;
 
 /// Show container, size, bit depth, frames, rate and its origin, first time stamps, warnings
 #[derive(Debug, clap::Args)]
@@ -18,7 +22,7 @@ pub struct Args {
     /// Write JSON
     #[arg(long)]
     json: bool,
-    /// Decode all frames and count them
+    /// Decode all frames, count them and look for the brightest pixel
     #[arg(long)]
     count: bool,
     /// Frames per second of recorded time; replaces what the recording says
@@ -36,6 +40,8 @@ pub struct Args {
 struct Seen {
     times_s: Vec<f64>,
     counted: Option<(u64, u64)>,
+    /// The greatest sample of all frames.
+    brightest: Option<u16>,
     ending: Option<Ending>,
     last_s: Option<f64>,
 }
@@ -59,8 +65,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 
 fn look(source: &mut dyn FrameSource, count: bool) -> anyhow::Result<Seen> {
     let time_base = source.info().time_base;
-    let mut seen = Seen { times_s: Vec::new(), counted: None, ending: None, last_s: None };
+    let mut seen = Seen { times_s: Vec::new(), counted: None, brightest: None, ending: None, last_s: None };
     let (mut frames, mut lost) = (0u64, 0u64);
+    let mut batch: Vec<Frame> = Vec::new();
+    let mut bytes = 0;
     while count || seen.times_s.len() < FIRST {
         let Some(frame) = source.next_frame()? else {
             seen.ending = Some(source.ending());
@@ -73,9 +81,23 @@ fn look(source: &mut dyn FrameSource, count: bool) -> anyhow::Result<Seen> {
         if seen.times_s.len() < FIRST {
             seen.times_s.push(time);
         }
+        bytes += frame.plane.as_ref().map_or(0, |p| p.bytes().len());
+        batch.push(frame);
+        if bytes >= BATCH_BYTES {
+            seen.brightest = seen.brightest.max(brightest_of(&mut batch));
+            bytes = 0;
+        }
     }
-    seen.counted = seen.ending.is_some().then_some((frames, lost));
+    if seen.ending.is_some() {
+        seen.counted = Some((frames, lost));
+        seen.brightest = seen.brightest.max(brightest_of(&mut batch));
+    }
     Ok(seen)
+}
+
+/// The greatest sample of the frames, each looked at by whichever core is free; empties the vector.
+fn brightest_of(batch: &mut Vec<Frame>) -> Option<u16> {
+    batch.par_drain(..).filter_map(|frame| brightest(&frame)).max()
 }
 
 fn format_name(format: PixelFormat) -> &'static str {
@@ -134,11 +156,14 @@ fn as_text(source: &dyn FrameSource, seen: &Seen) -> String {
         let lost = if lost > 0 { format!(", of these {lost} cannot be decoded") } else { String::new() };
         row("decoded", format!("{frames} frames{lost}"));
     }
+    if let Some(brightest) = seen.brightest {
+        row("brightest", format!("{brightest} of {}", (1u32 << info.depth_bits) - 1));
+    }
     let rate = info.rate_hz.map_or(String::new(), |r| format!("{r} frames per second, "));
     row("rate", format!("{rate}{}", origin_words(info.rate_origin)));
     row("time base", format!("{}/{} s", info.time_base.numerator, info.time_base.denominator));
     if let Some(duration) = duration_s(source, seen) {
-        row("duration", format!("{duration} s"));
+        row("duration", format!("{duration:.9} s"));
     }
     let stamps: Vec<String> = seen.times_s.iter().map(|t| format!("{t:.9}")).collect();
     row("first times", format!("{} s", stamps.join(", ")));
@@ -179,6 +204,7 @@ fn as_json(source: &dyn FrameSource, seen: &Seen) -> Value {
         "declared_frames": info.declared_frames,
         "decoded_frames": seen.counted.map(|(frames, lost)| frames - lost),
         "undecodable_frames": seen.counted.map(|(_, lost)| lost),
+        "brightest": seen.brightest,
         "rate_hz": info.rate_hz,
         "rate_origin": info.rate_origin,
         "time_base": {"numerator": info.time_base.numerator, "denominator": info.time_base.denominator},
