@@ -1,5 +1,8 @@
 //! Compressed film: every codec a lab uses, order, times, ends and damage.
 
+use std::process::Stdio;
+
+use serde_json::Value;
 use tracker::error::Error;
 use tracker::frame::{Ending, PixelFormat, RateOrigin};
 use tracker::source::{OpenOptions, open};
@@ -114,6 +117,17 @@ fn every_codec_gives_every_frame_in_order_with_its_time() {
             // Matroska's ticks are 1 ms, all others finer or exact.
             assert!((time - i as f64 * 0.002).abs() <= 0.000_501, "{} frame {i}: {time} s", case.file);
         }
+        let (status, out, err) =
+            crate::info::info(&[path.to_str().unwrap(), "--json", "--count"], Stdio::null());
+        assert_eq!((status, err.as_str()), (0, ""), "{}: {out}", case.file);
+        let told: Value = serde_json::from_str(&out).unwrap();
+        assert_eq!(told["decoded_frames"], COUNT, "{}", case.file);
+        let brightest = told["brightest"].as_u64().unwrap() as u32;
+        assert!(
+            (to_eight(brightest, case.depth_bits) - 220.0).abs() <= 4.0 * case.rms,
+            "{}: {told}",
+            case.file
+        );
     }
 }
 

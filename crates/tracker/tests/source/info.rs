@@ -7,7 +7,8 @@ use serde_json::Value;
 
 use crate::film::{encode, have_ffmpeg};
 
-fn info(arguments: &[&str], input: Stdio) -> (i32, String, String) {
+/// Exit status, standard output and standard error of `tracker info`.
+pub fn info(arguments: &[&str], input: Stdio) -> (i32, String, String) {
     let done = Command::new(env!("CARGO_BIN_EXE_tracker"))
         .arg("info")
         .args(arguments)

@@ -8,5 +8,8 @@ mod damage;
 mod ffmpeg;
 mod images;
 mod info;
+mod lies;
 mod mraw;
 mod opencv;
+mod pixels;
+mod program;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use tracker::frame::{Ending, FrameSource, PixelFormat, RateOrigin};
 use tracker::source::{OpenOptions, open};
 
-use crate::film::{read_all, real, samples};
+use crate::film::{checksums, read_all, real, samples};
 
 const WIDTH: usize = 6;
 const HEIGHT: usize = 5;
@@ -291,4 +291,31 @@ fn the_real_ball_falls_in_a_straight_line_and_a_cut_copy_ends_early() {
     let Ending::Early { frames: 9, byte: Some(1_991_656), .. } = source.ending() else {
         panic!("{:?}", source.ending())
     };
+}
+
+#[test]
+fn another_reader_sees_the_same_pixels() {
+    // From pyMRAW 0.33.0 (PyPI) on numpy 2.4.6: `a = pyMRAW.load_video(header)[0].astype("u8").reshape(count, -1)`,
+    // `(a * numpy.arange(1, a.shape[1] + 1, dtype="u8")).sum(1)`.
+    let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/formats");
+    let files = [
+        (
+            Some(fixtures.join("photron_12bit.cih")),
+            [8_166_494_695, 8_161_594_849, 8_123_736_791, 97_833_768_667],
+        ),
+        (Some(fixtures.join("photron_8bit.cih")), [511_082_307, 510_929_113, 508_685_926, 6_124_082_518]),
+        (
+            real("photron/ball_12bit.cihx"),
+            [36_072_393_126_146, 35_767_363_734_340, 35_470_149_569_596, 536_649_161_285_568],
+        ),
+        (
+            real("photron/data_showcase.cih"),
+            [32_986_669_912, 33_229_407_964, 33_223_918_442, 2_489_926_019_848],
+        ),
+    ];
+    for (path, expected) in files {
+        let Some(path) = path else { continue };
+        let frames = read_all(&mut *open_path(&path).unwrap());
+        assert_eq!(checksums(&frames), expected, "{}", path.display());
+    }
 }
