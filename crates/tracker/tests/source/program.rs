@@ -105,13 +105,17 @@ fn a_frame_damaged_in_the_middle_is_a_row_of_missing_with_its_time() {
         .collect();
     // The bytes lie in one picture, or at the end of one and the start of the next.
     assert!(!lost.is_empty() && lost.len() <= 2 && lost[0].abs_diff(COUNT / 2) < 6, "{lost:?}");
-    // All others are where they were: nothing moved up.
+    // All others are where they were: nothing moved up. Half hidden markers just after may wait for certainty.
+    let mut both = 0;
     for t in (0..COUNT).filter(|t| !lost.contains(t)) {
         for at in 2 * nodes * t..2 * nodes * (t + 1) {
             let (a, b) = (good.rows.xy_px[at], table.rows.xy_px[at]);
-            assert!(a.is_nan() || (a - b).abs() < 0.05, "frame {t}: {a} {b}");
+            assert!(a.is_nan() || b.is_nan() || (a - b).abs() < 0.05, "frame {t}: {a} {b}");
+            both += usize::from(!a.is_nan() && !b.is_nan());
         }
     }
+    let whole = good.rows.xy_px.iter().filter(|v| !v.is_nan()).count();
+    assert!(both * 20 > whole * 18, "{both} of {whole}");
 }
 
 #[test]
