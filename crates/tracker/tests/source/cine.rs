@@ -31,16 +31,19 @@ fn another_reader_sees_the_same_pixels() {
     let Some(path) = real("phantom/cine_781.cine") else { return };
     let mut source = open(path.to_str().unwrap(), &OpenOptions::default()).unwrap();
     let mut frames = read_all(&mut *source);
-    // FFmpeg stretches the camera's 12 bits to 16; taken back, they are whole numbers again.
+    // FFmpeg stretches the camera's 12 bits to 16; taken back, they are whole numbers again. pycine then takes the black
+    // level of 64 away and stretches what is left up to the white level of 4064.
     for frame in &mut frames {
-        let twelve = samples(frame).unwrap().into_iter().map(|v| ((v * 4095 + 32767) / 65535) as u16);
-        frame.plane = Some(Box::new(twelve.flat_map(u16::to_le_bytes).collect::<Vec<u8>>()));
+        let twelve = samples(frame).unwrap().into_iter().map(|v| (v * 4095 + 32767) / 65535);
+        let stretched = twelve.map(|v| (v.saturating_sub(64) * 4095 / 4000) as u16);
+        frame.plane = Some(Box::new(stretched.flat_map(u16::to_le_bytes).collect::<Vec<u8>>()));
         frame.stride = 512;
     }
-    // From pycine 0.3.2 (PyPI): `pycine.raw.read_frames(path, start_frame=1, count=15)`, sums as in `mraw.rs`.
+    // From pycine 0.3.2 (PyPI): `pycine.raw.read_frames(path, start_frame=1, count=15)`, turned upside down, because it
+    // does not heed the header's `bFlipV`; sums as in `mraw.rs`.
     assert_eq!(
         checksums(&frames),
-        [5_723_269_957_703, 5_725_714_880_650, 5_727_456_458_398, 85_799_876_465_232]
+        [5_859_161_517_127, 5_860_090_296_714, 5_860_600_022_942, 87_816_170_160_976]
     );
 }
 
