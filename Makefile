@@ -5,12 +5,13 @@ PY := .venv/bin/python
 EXTENSION := python/pydpend/_tracker.abi3.so
 CARGO_FLAGS := --release --workspace --locked
 
-.PHONY: help demo screenshot test build check format bench validate fixtures clean
+.PHONY: help demo screenshot test build check format bench validate wheel fixtures clean
 help:
 	@echo "make demo      set up, build, and go from the bundled film to out/demo/report.html"
 	@echo "make test      set up, build, and run every test, Rust and Python"
 	@echo "make check     format, lint and type checks"
 	@echo "make validate  the long accuracy sweeps, into docs/validation.md's tables (about an hour)"
+	@echo "make wheel     build the wheel, install it into a new environment and use it there"
 	@echo "make bench     the speed figures (criterion), and the ratios beside them"
 	@echo "make fixtures  make the bundled recordings again from their seeds"
 	@echo "make screenshot  the README's picture, from the demo's report"
@@ -53,8 +54,12 @@ check: build
 # Long: the eight scenes by twenty seeds, then the estimators' sweeps.
 validate: build
 	cargo run $(CARGO_FLAGS) --example validate -- --seeds 100..120
+	$(PY) -m tests.validate_resume
 	for sweep in angles default physics; do $(PY) -m tests.validate_$$sweep || exit 1; done
 	for part in energy inertias ratios slow all; do $(PY) -m tests.validate_damping $$part || exit 1; done
+
+wheel: .make/system .make/venv
+	tools/wheel.sh
 
 bench: build
 	cargo bench --workspace --locked

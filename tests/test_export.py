@@ -10,6 +10,7 @@ import pydpend as dp
 import pytest
 from pydpend.cli import main
 from pydpend.export import export
+from pydpend.nodes import SEEN
 
 from tests.drawn_nodes import some_nodes
 
@@ -70,6 +71,49 @@ def test_mat_holds_everything(tmp_path: Path) -> None:
     np.testing.assert_array_equal(content["time_s"], nodes.t_s)
     np.testing.assert_array_equal(content["status"], nodes.status)
     assert list(content["node"]) == ["n0", "n1", "n2"]
+
+
+@pytest.mark.filterwarnings("ignore:No analog data")
+def test_readers_that_are_not_the_writers_agree(tmp_path: Path) -> None:
+    """Each form through a library that has no part in writing it, first frame to last."""
+    import c3d
+    import mat4py
+    import pandas as pd
+    from trc import TRCData
+
+    nodes = some_nodes()
+    up_px = np.where(nodes.seen[..., None], nodes.xy_px, np.nan)
+    up_px[..., 1] = 479 - up_px[..., 1]
+    for ending in ("c3d", "csv", "mat"):
+        export(nodes, tmp_path / f"t.{ending}", px_per_m=2000)
+
+    with (tmp_path / "t.c3d").open("rb") as file:
+        reader = c3d.Reader(file)
+        assert (reader.point_rate, reader.first_frame, reader.last_frame) == (500, 11, 60)
+        assert [str(label) for label in reader.point_labels] == ["n0", "n1", "n2"]
+        points = np.array([points for _, points, _ in reader.read_frames()])
+    places = np.where(points[..., 3:4] < 0, np.nan, points[..., :2])
+    np.testing.assert_allclose(places, up_px / 2, atol=2e-5)
+
+    # This reader splits at any white space, so it cannot know which cell is empty: all nodes are seen here.
+    columns = {name: np.nan_to_num(getattr(nodes, name), nan=0.5) for name in ("sigma_px", "area_px")}
+    xy_px = np.where(nodes.seen[..., None], nodes.xy_px, np.arange(3)[:, None])
+    whole = replace(nodes, xy_px=xy_px, status=np.full((50, 3), SEEN, dtype=np.uint8), **columns)
+    export(whole, tmp_path / "whole.trc", px_per_m=2000)
+    trc = TRCData()
+    trc.load(str(tmp_path / "whole.trc"))
+    assert (trc["DataRate"], trc["Units"], trc["Markers"]) == (500, "mm", ["n0", "n1", "n2"])
+    assert trc["Time"] == list(nodes.t_s)
+    places = np.array([trc[name] for name in nodes.rig.names]).transpose(1, 0, 2)[..., :2]
+    np.testing.assert_allclose(places[..., 0], whole.xy_px[..., 0] / 2, atol=1e-6)
+    np.testing.assert_allclose(places[..., 1], (479 - whole.xy_px[..., 1]) / 2, atol=1e-6)
+
+    clicked = pd.read_csv(tmp_path / "t.csv").to_numpy()[10:].reshape(50, 3, 2)
+    np.testing.assert_allclose(clicked, up_px + 1, atol=1e-6)
+
+    mat = mat4py.loadmat(str(tmp_path / "t.mat"))
+    assert mat["node"] == list(nodes.rig.names)
+    np.testing.assert_array_equal(np.array(mat["y_px"]), nodes.xy_px[..., 1])
 
 
 def test_what_a_form_cannot_hold_is_refused(tmp_path: Path) -> None:

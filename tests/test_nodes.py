@@ -102,6 +102,46 @@ def test_a_table_that_pyarrow_wrote_again_is_read(tmp_path: Path) -> None:
     same(nodes, dp.read_nodes(tmp_path / "again.parquet"))
 
 
+def test_a_table_whose_metadata_others_left_out_is_refused_and_told_so(tmp_path: Path) -> None:
+    import pandas as pd
+    import polars as pl
+
+    some_nodes().write(tmp_path / "t.parquet")
+    pd.read_parquet(tmp_path / "t.parquet").to_parquet(tmp_path / "pandas.parquet")
+    pl.read_parquet(tmp_path / "t.parquet").write_parquet(tmp_path / "polars.parquet")
+    for name in ("pandas", "polars"):
+        with pytest.raises(
+            dp.TableError, match=rf"{name}\.parquet: .*left its metadata out\. Give the table"
+        ):
+            dp.read_nodes(tmp_path / f"{name}.parquet")
+    # pyarrow keeps them by itself.
+    pq.write_table(pq.read_table(tmp_path / "t.parquet"), tmp_path / "arrow.parquet")
+    same(some_nodes(), dp.read_nodes(tmp_path / "arrow.parquet"))
+
+
+def test_a_full_disk_leaves_what_was_there(tmp_path: Path) -> None:
+    """A file may grow to 20 kB, as on a disk with so much left; what is there already is kept."""
+    import resource
+    import signal
+
+    small, large = some_nodes(), some_nodes(20_000)
+    for name in ("t.parquet", "t.csv"):
+        small.write(tmp_path / name)
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    quiet = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    try:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, before[1]))
+        for name in ("t.parquet", "t.csv"):
+            with pytest.raises(dp.TableError, match=rf"{name}: it cannot be written \(File too large"):
+                large.write(tmp_path / name)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        signal.signal(signal.SIGXFSZ, quiet)
+    for name in ("t.parquet", "t.csv"):
+        same(small, dp.read_nodes(tmp_path / name))
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["t.csv", "t.csv.json", "t.parquet"]
+
+
 def test_arrow_goes_through_the_capsule() -> None:
     import polars as pl
 
@@ -111,6 +151,9 @@ def test_arrow_goes_through_the_capsule() -> None:
         dict(zip(COLUMNS, row, strict=True)) for row in long_form(nodes)
     ]
     assert pl.DataFrame(nodes).select(COLUMNS).rows() == long_form(nodes)
+    framed = pl.from_arrow(nodes)
+    assert isinstance(framed, pl.DataFrame)
+    assert framed.select(COLUMNS).rows() == long_form(nodes)
     assert nodes.to_dataframe().shape == (150, 9)
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import contextlib
 import os
 import signal
+import subprocess
+import sys
 import threading
 from dataclasses import replace
 from pathlib import Path
@@ -137,6 +139,52 @@ def test_ctrl_c_stops_a_film_without_an_end(tmp_path: Path) -> None:
     assert isinstance(nodes, dp.Nodes)
     assert len(nodes) > 0
     assert nodes.meta["ending"] == {"kind": "interrupted"}
+
+
+def test_ctrl_c_is_heard_while_nobody_feeds_the_pipe(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.y4m")
+    program = """
+import os, signal, sys
+import pydpend as dp
+
+def interrupt(stage, done, total):
+    os.kill(os.getpid(), signal.SIGINT)
+
+for work in (
+    lambda: dp.track("pipe.y4m", progress=interrupt, output="t.parquet"),
+    lambda: dp.setup("pipe.y4m", progress=interrupt),
+):
+    try:
+        work()
+    except KeyboardInterrupt:
+        print("heard")
+"""
+    # In a process of its own, since a pipe that is waited for would stop all tests.
+    done = subprocess.run(
+        [sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, timeout=120
+    )
+    assert (done.stdout, done.returncode) == ("heard\nheard\n", 0), done.stderr
+    assert [p.name for p in tmp_path.iterdir()] == ["pipe.y4m"]
+
+
+def test_the_gil_is_free_during_work(film: Path) -> None:
+    """Python goes on counting while a film is tracked; with the GIL held it would stand still."""
+    counts = []
+    done = threading.Event()
+
+    def count() -> None:
+        n = 0
+        while not done.is_set():
+            n += 1
+            done.wait(0.001)
+        counts.append(n)
+
+    thread = threading.Thread(target=count)
+    thread.start()
+    dp.track(film, rig(), progress=False)
+    done.set()
+    thread.join()
+    assert counts[0] > 3
 
 
 def test_setup_finds_two_links_and_info_knows_the_film(film: Path, tmp_path: Path) -> None:

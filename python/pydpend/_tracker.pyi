@@ -141,17 +141,23 @@ class Film:
     """A scene ready to be filmed: H x W pixels, T frames, N markers, L links."""
 
     @staticmethod
-    def read(path: str, motion: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None) -> Film: ...
+    def read(path: str, motion: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None) -> Film:
+        """The film of a scene file; `motion` is times in s (T,) and angles in rad (T, L)."""
+
     @staticmethod
-    def from_json(
-        scene: str, motion: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
-    ) -> Film: ...
+    def from_json(scene: str, motion: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None) -> Film:
+        """The film of a scene as JSON; `motion` as in `read`."""
+
     @staticmethod
-    def preset(name: str, seed: int) -> Film: ...
+    def preset(name: str, seed: int) -> Film:
+        """The film of one of the program's own scenes."""
+
     def scene(self) -> str:
         """The scene as JSON."""
 
-    def rig_toml(self, frame: int) -> str: ...
+    def rig_toml(self, frame: int) -> str:
+        """The rig as it stands in a frame, TOML; places in px."""
+
     def image(self, frame: int) -> NDArray[Any]:
         """Recorded levels (H, W), uint8 or uint16."""
 
@@ -172,7 +178,8 @@ class Film:
         speed: str | None,
         gray_only: bool,
         bits: int | None,
-    ) -> None: ...
+    ) -> None:
+        """Writes the film, and its truth if a file is named; `bits` are those of a sample."""
 
 def score_places(
     nodes: list[str],
@@ -182,7 +189,7 @@ def score_places(
     truth: Film | str,
     limit_px: float,
 ) -> str:
-    """A table's places against the truth, as JSON."""
+    """A table's places against the truth, as JSON: frames (T,), places in px (T, N, 2), sigmas in px (T, N)."""
 
 def simulate_motion(
     model: dict[str, float],
@@ -192,7 +199,13 @@ def simulate_motion(
     tolerance: float,
     width_rad_s: float | None = None,
     pinned: bool = False,
-) -> dict[str, Any]: ...
+) -> dict[str, Any]:
+    """The motion from `state` (phi1, phi2 in rad, w1, w2 in rad/s), sampled at `times_s` (T,).
+
+    `state` (T, 4), `a` (T, 2) in rad/s2, `normal` (T, 2) in N, `dry` (T, 2) in N m, `energy` (T,) in J, `works`
+    (T, terms) in J, `events` (E, 4): time in s, joint, contact before and after; `at_rest`, `end_s`, `steps`.
+    """
+
 def simulate_ensemble(
     models: list[dict[str, float]],
     states: NDArray[np.float64],
@@ -201,7 +214,12 @@ def simulate_ensemble(
     tolerance: float,
     width_rad_s: float | None = None,
     pinned: bool = False,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]: ...
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+    """Motions of K `states` (K, 4) on all cores, one model for all or one each.
+
+    States (K T, 4) in rad and rad/s, energies (K T,) in J, which came to rest (K,).
+    """
+
 def poincare_section(
     model: dict[str, float],
     state: list[float],
@@ -212,7 +230,9 @@ def poincare_section(
     direction: float,
     tolerance: float,
     pinned: bool = False,
-) -> NDArray[np.float64]: ...
+) -> NDArray[np.float64]:
+    """Passages of link 0 or 1 through an angle: rows of time in s and state in rad and rad/s, (K, 5)."""
+
 def tangent_growth(
     model: dict[str, float],
     state: list[float],
@@ -220,7 +240,8 @@ def tangent_growth(
     skipped: int,
     counted: int,
     tolerance: float,
-) -> NDArray[np.float64]: ...
+) -> NDArray[np.float64]:
+    """Rates of growth of a tangent vector in 1/s, one per counted interval, (counted,)."""
 
 _Floats = NDArray[np.float64]
 _Ints = NDArray[np.int64]
@@ -228,7 +249,13 @@ _Angles = tuple[_Floats, _Floats, _Floats]
 
 def shooting_segments(
     recordings: Sequence[_Angles], spans: Sequence[tuple[float, float]], length_s: float, chained: bool
-) -> tuple[_Ints, _Floats, _Floats]: ...
+) -> tuple[_Ints, _Floats, _Floats]:
+    """Segments of about `length_s` over the spans, s, of each recording.
+
+    A recording is times in s (T,), angles and their sigmas in rad (T, 2).
+    Rows (K, 4): recording, first sample, one past the last, chained; start and end in s (K, 2); states (K, 4).
+    """
+
 def shooting_fit(
     recordings: Sequence[_Angles],
     segment_rows: _Ints,
@@ -247,7 +274,9 @@ def shooting_fit(
     max_iterations: int,
     stretch: float = 1.0,
     progress: Callable[[int, int, float], object] | None = None,
-) -> dict[str, Any]: ...
+) -> dict[str, Any]:
+    """The multiple-shooting fit; `pydpend.damping.shooting` names the shapes and units of each argument and result."""
+
 def shooting_trace(
     recordings: Sequence[_Angles],
     segment_rows: _Ints,
@@ -255,12 +284,24 @@ def shooting_trace(
     segment_states: _Floats,
     model: dict[str, float],
     stretch: float,
-) -> tuple[_Ints, _Floats, _Floats]: ...
+) -> tuple[_Ints, _Floats, _Floats]:
+    """The motion of every segment at its R samples.
+
+    Rows of recording, sample, segment (R, 3); states in rad and rad/s (R, 4); the power of each term in W for a
+    coefficient of one, (R, terms).
+    """
+
 def follow_motion(
     model: dict[str, float], state: tuple[float, float, float, float], start_s: float, times_s: _Floats
-) -> _Floats: ...
-def term_names() -> list[tuple[str, str]]: ...
-def unit_powers(model: dict[str, float], state: _Floats, accelerations: _Floats) -> _Floats: ...
+) -> _Floats:
+    """States at `times_s` (T,), ascending, from `state` at `start_s`: (T, 4) in rad and rad/s."""
+
+def term_names() -> list[tuple[str, str]]:
+    """Name and unit of each term's coefficient, in the order of the powers."""
+
+def unit_powers(model: dict[str, float], state: _Floats, accelerations: _Floats) -> _Floats:
+    """Powers (T, terms) for a coefficient of one along states (T, 4) and accelerations (T, 2) in rad/s2."""
+
 def learn_noise(
     t_s: NDArray[np.float64],
     phi_rad: NDArray[np.float64],
@@ -268,7 +309,13 @@ def learn_noise(
     order: int,
     scale: bool,
     stretch_s: float,
-) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]: ...
+) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
+    """The likeliest noise of one link's angles (T,).
+
+    Factor on the sigmas, knots in s (K,), logarithms of the intensity (K,);
+    `order` is the number of components carried, 3 or 4.
+    """
+
 def smooth_angles(
     t_s: NDArray[np.float64],
     phi_rad: NDArray[np.float64],
@@ -278,4 +325,8 @@ def smooth_angles(
     knots_s: NDArray[np.float64],
     log_q: NDArray[np.float64],
     white: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64], float, list[float]]: ...
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float, list[float]]:
+    """Angle, rate and acceleration of one link, (T, 3) in rad, rad/s, rad/s2, and their covariances, (T, 3, 3).
+
+    Then the logarithm of the likelihood and the three factors of the calibration by `white`, T unit normals.
+    """

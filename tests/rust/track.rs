@@ -3,10 +3,11 @@
 #![allow(clippy::unwrap_used, clippy::panic)] // a test may fail by panicking
 
 use std::fs;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::sync::OnceLock;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use tracker::table::{RunEnding, read_table};
 
@@ -33,17 +34,19 @@ fn films() -> &'static Path {
     FILMS
         .get_or_init(|| {
             let folder = tempfile::tempdir().unwrap();
-            let make = |name: &str, more: &[&str]| {
+            let make = |name: &str, frames: &str, more: &[&str]| {
                 let path = folder.path().join(name);
                 let rig = folder.path().join("rig.toml");
-                let mut arguments = vec!["film", "--preset", "clean", "--frames", "240", "-q", "--rig"];
+                let mut arguments = vec!["film", "--preset", "clean", "--frames", frames, "-q", "--rig"];
                 arguments.extend([rig.to_str().unwrap(), "-o", path.to_str().unwrap()]);
                 arguments.extend(more);
                 let (status, _, error) = said(&arguments);
                 assert_eq!(status, 0, "{error}");
             };
-            make("film.mp4", &["--speed", "ultrafast"]);
-            make("film.avi", &["--codec", "mjpeg"]);
+            make("film.mp4", "240", &["--speed", "ultrafast"]);
+            make("film.avi", "240", &["--codec", "mjpeg"]);
+            // Some blocks of detections long, so that a run can be met between two of them.
+            make("long.mp4", "800", &["--speed", "ultrafast"]);
             folder
         })
         .path()
@@ -170,39 +173,133 @@ fn a_state_cut_anywhere_goes_on_to_the_same_bytes() {
     }
 }
 
+fn signal(child: &Child, name: &str) {
+    assert!(Command::new("kill").args([name, &child.id().to_string()]).status().unwrap().success());
+}
+
+/// Waits until something is so; fails if it never is.
+fn until(what: &str, mut so: impl FnMut() -> bool) {
+    let begin = Instant::now();
+    while !so() {
+        assert!(begin.elapsed() < Duration::from_secs(120), "waited in vain for {what}");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
 #[test]
 fn ctrl_c_closes_the_table_and_the_run_can_go_on() {
     let case = Case::new();
-    let input = film("film.mp4");
+    let input = film("long.mp4");
     let expected = whole(&case, &input, "whole.csv");
     let out = case.text("stopped.csv");
     let rig = film("rig.toml");
-    let mut stopped = None;
-    for wait_ms in [400, 250, 150, 80, 600] {
-        let child =
-            start(&["track", &input, "-o", &out, "--rig", &rig, "--force", "--quiet", "--threads", "1"]);
-        std::thread::sleep(Duration::from_millis(wait_ms));
-        let interrupt = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
-        let status = child.wait_with_output().unwrap().status.code();
-        if interrupt.success() && status == Some(130) && case.path("stopped.csv").exists() {
-            stopped = Some(wait_ms);
-            break;
+    let state = case.path("stopped.csv.partial");
+    // The signal is sent while the run stands still with some of its detections on disk. Only where it had come to
+    // the table by then is there no more to stop, and another run shows it.
+    let met = (0..20).any(|_| {
+        let arguments = ["--rig", &rig, "--force", "--quiet", "--threads", "1"];
+        let mut child = start(&[&["track", &input, "-o", &out], &arguments[..]].concat());
+        until("the first detections", || {
+            fs::metadata(&state).is_ok_and(|m| m.len() > 20_000) || child.try_wait().unwrap().is_some()
+        });
+        for name in ["-STOP", "-INT", "-CONT"] {
+            signal(&child, name);
         }
-    }
-    let Some(_) = stopped else {
-        // On a machine where no signal fell into detection there is nothing to see; the next runs may.
-        return;
-    };
+        let status = child.wait().unwrap().code();
+        assert!(matches!(status, Some(0 | 130)), "{status:?}");
+        status == Some(130)
+    });
+    assert!(met, "no signal was heard in 20 runs");
     let table = read_table(&case.path("stopped.csv")).unwrap();
     assert_eq!(table.meta.ending, RunEnding::Interrupted);
-    assert!(table.frames() > 0 && table.frames() <= 240);
-    assert!(case.path("stopped.csv.partial").exists());
+    assert!(table.frames() > 0 && table.frames() < 800, "{}", table.frames());
+    assert!(state.exists());
     let (status, _, error) = said(&["track", &input, "-o", &out, "--rig", &rig, "--quiet"]);
     assert_eq!(status, 2);
     assert!(error.contains("there already"), "{error}");
     let (status, _, error) = said(&["track", &input, "-o", &out, "--resume", "--quiet"]);
     assert_eq!(status, 0, "{error}");
     assert!(fs::read(&out).unwrap() == expected, "other bytes after ctrl-c");
+}
+
+#[test]
+fn ctrl_c_is_heard_while_a_pipe_gives_nothing() {
+    let case = Case::new();
+    let pipe = case.path("pipe.y4m");
+    assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    let head = b"YUV4MPEG2 W64 H48 F500:1 Ip A1:1 Cmono\n".to_vec();
+    let frame = [&b"FRAME\n"[..], &[20; 64 * 48]].concat();
+    // Nobody opens the other end; nobody writes; a head and no frame; two frames and no more.
+    let given = [None, Some(vec![]), Some(head.clone()), Some([&head[..], &frame, &frame].concat())];
+    for (k, bytes) in given.into_iter().enumerate() {
+        let mut child = start(&["track", &case.text("pipe.y4m"), "-o", &case.text("t.csv"), "--quiet"]);
+        // Opening a pipe to write waits for a reader, so the child has it open by then.
+        let held = bytes.map(|bytes| {
+            let mut end = fs::OpenOptions::new().write(true).open(&pipe).unwrap();
+            end.write_all(&bytes).unwrap();
+            end
+        });
+        // Bit 1 of the signals that it catches is ctrl-c.
+        let status = format!("/proc/{}/status", child.id());
+        until("the handler", || {
+            let text = fs::read_to_string(&status).unwrap();
+            let mask = text.lines().find_map(|l| l.strip_prefix("SigCgt:")).unwrap().trim();
+            u64::from_str_radix(mask, 16).unwrap() & 2 != 0
+        });
+        signal(&child, "-INT");
+        let mut code = None;
+        until("the end after ctrl-c", || {
+            code = child.try_wait().unwrap();
+            code.is_some()
+        });
+        assert_eq!(code.unwrap().code(), Some(130), "case {k}");
+        drop(held);
+        assert_eq!(case.files(), ["pipe.y4m"], "case {k}");
+    }
+}
+
+#[test]
+fn tables_that_are_not_whole_or_not_right_are_refused_by_check() {
+    let case = Case::new();
+    let (parquet, csv) = (case.path("t.parquet"), case.path("t.csv"));
+    for name in ["t.parquet", "t.csv"] {
+        let arguments = ["track", &film("film.mp4"), "-o", &case.text(name), "--frames", "0..40", "--quiet"];
+        assert!(said(&arguments).0 <= 1);
+    }
+    let refused = |path: &Path, expected: &[&str]| {
+        let (status, stdout, error) = said(&["check", path.to_str().unwrap()]);
+        assert_eq!(status, 2, "{error}");
+        assert!(stdout.is_empty() && !error.contains("panicked"), "{error}");
+        let name = path.file_name().unwrap().to_str().unwrap();
+        for word in [name].iter().chain(expected) {
+            assert!(error.contains(word), "{word:?} is not in {error:?}");
+        }
+    };
+    let bytes = fs::read(&parquet).unwrap();
+    fs::write(&parquet, &bytes[..bytes.len() / 2]).unwrap();
+    refused(&parquet, &["not a whole Parquet file", "copy it again"]);
+    let text = fs::read_to_string(&csv).unwrap();
+    let lines: Vec<&str> = text.lines().collect();
+    let field = |line: usize, at: usize, with: &str| {
+        let mut fields: Vec<&str> = lines[line].split(',').collect();
+        fields[at] = with;
+        let mut out = lines.clone();
+        let changed = fields.join(",");
+        out[line] = &changed;
+        out.join("\n") + "\n"
+    };
+    let frame_again = lines[..19].iter().chain(&lines[10..]).copied().collect::<Vec<_>>().join("\n") + "\n";
+    for (changed, expected) in [
+        (field(0, 5, "y"), &["line 1", "there is no column y_px"][..]),
+        (field(4, 4, "far"), &["line 5", "column x_px", "\"far\" is not a number"]),
+        (field(4, 5, "NaN"), &["line 5", "column y_px", "NaN is not a finite number"]),
+        (frame_again, &["frame 1 comes after frame 1"]),
+        (field(7, 2, "n99"), &["line 8", "node \"n99\"", "expected"]),
+        (text[..text.len() - 30].to_owned(), &["line"]),
+    ] {
+        fs::write(&csv, changed).unwrap();
+        refused(&csv, expected);
+    }
 }
 
 #[test]
@@ -276,11 +373,14 @@ fn what_makes_no_sense_is_refused_with_what_to_do() {
     let (none, text) = (case.text("none.mp4"), case.text("text.mp4"));
     let (bad, unknown, small) = (case.text("bad.toml"), case.text("unknown.toml"), case.text("small.toml"));
     let nowhere = case.text("nowhere/t.csv");
+    // No file can be made in /proc, not even by root.
+    let closed = "/proc/t.csv".to_owned();
     for (arguments, expected) in [
         (vec![none.as_str(), "-o", &out], "no such file"),
         (vec![text.as_str(), "-o", &out], "text.mp4: not a recording"),
         (vec![&input, "-o", "t.xlsx"], "neither Parquet nor CSV"),
         (vec![&input, "-o", &nowhere], "nowhere/t.csv"),
+        (vec![&input, "-o", &closed], "/proc/t.csv"),
         (vec![&input, "-o", &out, "--rig", &none], "none.mp4: the rig file cannot be read"),
         (vec![&input, "-o", &out, "--rig", &bad], "bad.toml, line"),
         (vec![&input, "-o", &out, "--rig", &unknown], "its body \"third\" is not in the rig"),

@@ -8,7 +8,6 @@ use serde_json::json;
 use tracker::error::Error;
 use tracker::overlay::{self, FilmSettings};
 use tracker::pipeline::{self, Existing, RunSettings};
-use tracker::source;
 use tracker::table::SourceFacts;
 
 use crate::errors::{argument, raise};
@@ -137,12 +136,13 @@ pub fn overlay_film<'py>(
 #[pyfunction]
 pub fn info(py: Python<'_>, input: String, open: OpenArguments) -> PyResult<String> {
     let options = open_options(py, &open)?;
+    let mut watch = Watch::new(None);
     let known = py.detach(|| {
-        let source = source::open(&input, &options)?;
+        let source = pipeline::open(&input, &options, &mut watch)?;
         let info = source.info();
         let mut value = json!(SourceFacts::of(info));
         value["details"] = json!(info.details.iter().cloned().collect::<std::collections::BTreeMap<_, _>>());
         Ok(value.to_string())
     });
-    known.map_err(|e| raise(py, e))
+    watch.done(py, known)
 }

@@ -12,8 +12,8 @@ use super::{Overlay, failed};
 use crate::error::{Error, Fault, Result};
 use crate::film::encode::{Codec, VideoSettings, VideoWriter};
 use crate::frame::TimeBase;
-use crate::pipeline::{Observer, Stage};
-use crate::source::{self, OpenOptions};
+use crate::pipeline::{self, Observer, Stage};
+use crate::source::OpenOptions;
 use crate::table::NodeTable;
 use crate::track::Observation;
 
@@ -90,7 +90,7 @@ pub fn film(
     let rig = &table.meta.rig;
     let n = rig.nodes.len();
     observer.stage(Stage::Open, None);
-    let mut source = source::open(input, open)?;
+    let mut source = pipeline::open(input, open, observer)?;
     let info = source.info();
     if [info.width, info.height] != rig.image_px {
         let [w, h] = rig.image_px;

@@ -6,6 +6,7 @@
 mod ahead;
 mod detecting;
 mod observer;
+mod opening;
 mod state;
 
 use std::ops::Range;
@@ -15,6 +16,7 @@ use std::sync::Arc;
 use serde_json::json;
 
 pub use observer::{Observer, Silent, Stage};
+pub use opening::open;
 pub use state::partial_path;
 
 use crate::detect::{DetectSettings, Levels};
@@ -22,7 +24,7 @@ use crate::discover::{Discovery, discover};
 use crate::error::{Error, Fault, Result};
 use crate::frame::{Ending, FrameSource};
 use crate::rig::Rig;
-use crate::source::{self, OpenOptions};
+use crate::source::OpenOptions;
 use crate::store::DetectionStore;
 use crate::table::{
     Form, NodeSummary, NodeTable, Rows, RunEnding, SCHEMA_VERSION, SourceFacts, TableMeta, TableWriter, Tally,
@@ -45,7 +47,7 @@ pub enum Existing {
 /// What to run.
 #[derive(Debug, Clone, Default)]
 pub struct RunSettings {
-    /// The recording, as [`source::open`] takes it.
+    /// The recording, as [`crate::source::open`] takes it.
     pub input: String,
     /// The table; `None` only collects rows in memory.
     pub output: Option<PathBuf>,
@@ -106,8 +108,8 @@ pub fn run(settings: &RunSettings, observer: &mut dyn Observer) -> Result<RunSum
         return Ok(done);
     }
     observer.stage(Stage::Open, None);
-    let mut source = source::open(&settings.input, &settings.open)?;
-    let mut run = Run::begin(settings, source.as_mut(), observer)?;
+    let source = open(&settings.input, &settings.open, observer)?;
+    let (mut run, source) = Run::begin(settings, source, observer)?;
     let fresh = run.resumed == 0;
     let outcome = run.detect(source, observer).and_then(|ending| run.finish(ending, observer));
     // Only a run that was stopped or ran out of disk can go on; any other would fail again.
@@ -199,9 +201,9 @@ impl<'a> Run<'a> {
     /// Learns what detection needs, or takes it from an earlier run.
     fn begin(
         settings: &'a RunSettings,
-        source: &mut dyn FrameSource,
+        source: Box<dyn FrameSource>,
         observer: &mut dyn Observer,
-    ) -> Result<Self> {
+    ) -> Result<(Self, Box<dyn FrameSource>)> {
         let info = source.info();
         let facts = SourceFacts::of(info);
         let warnings = info.warnings.clone();
@@ -219,10 +221,11 @@ impl<'a> Run<'a> {
             let store = DetectionStore::on_spool(earlier.spool)?;
             let (resumed, levels) = (store.len() as u64, Arc::new(earlier.levels));
             let finished = earlier.ending;
-            return Ok(Self { settings, detect, facts, levels, store, resumed, finished, warnings });
+            let run = Self { settings, detect, facts, levels, store, resumed, finished, warnings };
+            return Ok((run, source));
         }
         observer.stage(Stage::Learn, None);
-        let samples = source.sample(SAMPLES)?;
+        let (source, samples) = opening::sample(source, SAMPLES, observer)?;
         let levels = Levels::learn(&samples, &detect)?;
         drop(samples);
         if observer.interrupted() {
@@ -233,7 +236,8 @@ impl<'a> Run<'a> {
             None => DetectionStore::new(),
         };
         let levels = Arc::new(levels);
-        Ok(Self { settings, detect, facts, levels, store, resumed: 0, finished: None, warnings })
+        let run = Self { settings, detect, facts, levels, store, resumed: 0, finished: None, warnings };
+        Ok((run, source))
     }
 
     /// Reads the recording through. `None` if the user stopped it.

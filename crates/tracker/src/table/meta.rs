@@ -178,8 +178,13 @@ impl TableMeta {
             }
             None => {
                 return Err(Error::Table(
-                    Fault::new(name, "there is no schema_version, so it is not a node table")
-                        .advice("Give a table written by `tracker track`"),
+                    Fault::new(
+                        name,
+                        "there is no schema_version: it is no node table, or who wrote it again left its metadata out",
+                    )
+                    .advice(
+                        "Give the table that `tracker track` wrote; with pyarrow, keep its schema.metadata",
+                    ),
                 ));
             }
         }

@@ -22,7 +22,7 @@ mod parquet;
 mod parquet_read;
 mod tally;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 
 use std::path::Path;
 

@@ -125,9 +125,16 @@ pub(super) fn read(path: &Path) -> Result<NodeTable> {
     }
     let columns = ProjectionMask::columns(metadata.parquet_schema(), COLUMNS);
     // Each group fills its own part of the table, so the parts can be filled side by side.
-    let mut table = Cells::new(total);
-    let parts = table.split(&first_rows);
-    parts.into_par_iter().enumerate().try_for_each(|(g, mut part)| -> Result<()> {
+    let mut table = Rows {
+        frame: vec![0; total / nodes],
+        time_s: vec![0.0; total / nodes],
+        xy_px: vec![0.0; 2 * total],
+        sigma_px: vec![0.0; total],
+        area_px: vec![0.0; total],
+        status: vec![0; total],
+    };
+    let parts = split(&mut table, &first_rows, nodes);
+    let begun = parts.into_par_iter().enumerate().map(|(g, mut part)| -> Result<Option<Stamp>> {
         let rows = groups[g].num_rows().max(1) as usize;
         let damaged = |e: String| {
             Error::Table(
@@ -142,31 +149,56 @@ pub(super) fn read(path: &Path) -> Result<NodeTable> {
             .with_batch_size(rows)
             .build()
             .map_err(|e| damaged(e.to_string()))?;
+        let (mut begun, mut newest) = (None, None);
         let mut done = 0;
         for batch in reader {
             let batch = batch.map_err(|e| damaged(e.to_string()))?;
-            let here =
-                part.split_off_front(batch.num_rows()).ok_or_else(|| damaged("too many rows".into()))?;
-            here.fill(&batch, &meta, first_rows[g] + done, &name)?;
+            let mut here = part
+                .split_off_front(batch.num_rows(), nodes)
+                .ok_or_else(|| damaged("too many rows".into()))?;
+            here.fill_stamps(&batch, &mut begun, &mut newest, &meta, &name)?;
+            here.fill(&batch, &meta, &name)?;
             done += batch.num_rows();
         }
-        if part.frame.is_empty() { Ok(()) } else { Err(damaged(format!("it has {done} of {rows} rows"))) }
-    })?;
-    table.into_rows(nodes, &name).map(|rows| NodeTable { meta, rows })
+        if part.status.is_empty() { Ok(begun) } else { Err(damaged(format!("it has {done} of {rows} rows"))) }
+    });
+    let begun: Vec<Result<Option<Stamp>>> = begun.collect();
+    for begun in begun {
+        // A frame that begins in one group and ends in another.
+        if let Some(here) = begun? {
+            let t = here.row / nodes;
+            let first = Stamp { row: t * nodes, frame: table.frame[t], time_s: table.time_s[t] };
+            here.same_frame(&first, nodes, &name)?;
+        }
+    }
+    Ok(NodeTable { meta, rows: table })
 }
 
-/// The columns as the file has them, one entry per row.
-struct Cells {
-    frame: Vec<i64>,
-    time_s: Vec<f64>,
-    xy_px: Vec<f64>,
-    sigma_px: Vec<f32>,
-    area_px: Vec<f32>,
-    status: Vec<u8>,
+/// The frame and time of a row.
+#[derive(Debug, Clone, Copy)]
+struct Stamp {
+    row: usize,
+    frame: i64,
+    time_s: f64,
 }
 
-/// A run of rows of [`Cells`].
+impl Stamp {
+    /// Fails unless it is of the frame that began with `first`.
+    fn same_frame(&self, first: &Stamp, nodes: usize, name: &str) -> Result<()> {
+        if self.frame == first.frame && self.time_s == first.time_s {
+            return Ok(());
+        }
+        let problem = format!(
+            "frame {} at {} s begins before all {nodes} nodes of frame {}",
+            self.frame, self.time_s, first.frame
+        );
+        Err(row_fault(name, self.row, problem))
+    }
+}
+
+/// A run of rows of a table, and the frames that begin in it.
 struct Part<'a> {
+    first_row: usize,
     frame: &'a mut [i64],
     time_s: &'a mut [f64],
     xy_px: &'a mut [f64],
@@ -175,96 +207,93 @@ struct Part<'a> {
     status: &'a mut [u8],
 }
 
-impl Cells {
-    fn new(rows: usize) -> Self {
-        Self {
-            frame: vec![0; rows],
-            time_s: vec![0.0; rows],
-            xy_px: vec![0.0; 2 * rows],
-            sigma_px: vec![0.0; rows],
-            area_px: vec![0.0; rows],
-            status: vec![0; rows],
-        }
-    }
+/// A part for each row group.
+fn split<'a>(table: &'a mut Rows, first_rows: &[usize], nodes: usize) -> Vec<Part<'a>> {
+    let total = table.status.len();
+    let mut rest = Part {
+        first_row: 0,
+        frame: &mut table.frame,
+        time_s: &mut table.time_s,
+        xy_px: &mut table.xy_px,
+        sigma_px: &mut table.sigma_px,
+        area_px: &mut table.area_px,
+        status: &mut table.status,
+    };
+    let ends = first_rows.iter().skip(1).copied().chain([total]);
+    first_rows.iter().zip(ends).filter_map(|(&start, end)| rest.split_off_front(end - start, nodes)).collect()
+}
 
-    fn split(&mut self, first_rows: &[usize]) -> Vec<Part<'_>> {
-        let total = self.frame.len();
-        let mut rest = Part {
-            frame: &mut self.frame,
-            time_s: &mut self.time_s,
-            xy_px: &mut self.xy_px,
-            sigma_px: &mut self.sigma_px,
-            area_px: &mut self.area_px,
-            status: &mut self.status,
-        };
-        let ends = first_rows.iter().skip(1).copied().chain([total]);
-        let mut parts = Vec::with_capacity(first_rows.len());
-        for (&start, end) in first_rows.iter().zip(ends) {
-            parts.extend(rest.split_off_front(end - start));
-        }
-        parts
+/// A column of a batch as `to`, without nulls where none may be.
+fn column(batch: &RecordBatch, at: usize, to: &DataType, first_row: usize, name: &str) -> Result<ArrayRef> {
+    let fault = |problem: String| Error::Table(Fault::new(name, problem).at(Place::Key(COLUMNS[at].into())));
+    let Some(array) = batch.column_by_name(COLUMNS[at]) else {
+        return Err(fault("the column is missing".into()));
+    };
+    let array = if array.data_type() == to {
+        Arc::clone(array)
+    } else {
+        cast(array, to).map_err(|e| fault(format!("{} cannot be read as {to} ({e})", array.data_type())))?
+    };
+    let may_be_null = (4..8).contains(&at);
+    if !may_be_null && array.null_count() > 0 {
+        let row = first_row + (0..array.len()).find(|&i| array.is_null(i)).unwrap_or(0);
+        return Err(row_fault(name, row, format!("column {} is empty", COLUMNS[at])));
     }
-
-    /// One entry per frame where the file has one per row.
-    fn into_rows(self, nodes: usize, name: &str) -> Result<Rows> {
-        let frames = self.frame.len() / nodes;
-        for t in 0..frames {
-            let (frame, time_s) = (self.frame[t * nodes], self.time_s[t * nodes]);
-            for k in t * nodes..(t + 1) * nodes {
-                if self.frame[k] != frame || self.time_s[k] != time_s {
-                    let problem = format!(
-                        "frame {} at {} s begins before all {nodes} nodes of frame {frame}",
-                        self.frame[k], self.time_s[k]
-                    );
-                    return Err(row_fault(name, k, problem));
-                }
-            }
-        }
-        Ok(Rows {
-            frame: self.frame.into_iter().step_by(nodes).collect(),
-            time_s: self.time_s.into_iter().step_by(nodes).collect(),
-            xy_px: self.xy_px,
-            sigma_px: self.sigma_px,
-            area_px: self.area_px,
-            status: self.status,
-        })
-    }
+    Ok(array)
 }
 
 impl<'a> Part<'a> {
-    fn split_off_front(&mut self, rows: usize) -> Option<Part<'a>> {
-        Some(Part {
-            frame: self.frame.split_off_mut(..rows)?,
-            time_s: self.time_s.split_off_mut(..rows)?,
+    fn split_off_front(&mut self, rows: usize, nodes: usize) -> Option<Part<'a>> {
+        let end = self.first_row.checked_add(rows)?;
+        let frames = end.div_ceil(nodes) - self.first_row.div_ceil(nodes);
+        let front = Part {
+            first_row: self.first_row,
+            frame: self.frame.split_off_mut(..frames)?,
+            time_s: self.time_s.split_off_mut(..frames)?,
             xy_px: self.xy_px.split_off_mut(..2 * rows)?,
             sigma_px: self.sigma_px.split_off_mut(..rows)?,
             area_px: self.area_px.split_off_mut(..rows)?,
             status: self.status.split_off_mut(..rows)?,
-        })
+        };
+        self.first_row = end;
+        Some(front)
     }
 
-    fn fill(self, batch: &RecordBatch, meta: &TableMeta, first_row: usize, name: &str) -> Result<()> {
-        let column = |at: usize, to: DataType| -> Result<ArrayRef> {
-            let fault =
-                |problem: String| Error::Table(Fault::new(name, problem).at(Place::Key(COLUMNS[at].into())));
-            let Some(array) = batch.column_by_name(COLUMNS[at]) else {
-                return Err(fault("the column is missing".into()));
-            };
-            let array = if array.data_type() == &to {
-                Arc::clone(array)
-            } else {
-                cast(array, &to)
-                    .map_err(|e| fault(format!("{} cannot be read as {to} ({e})", array.data_type())))?
-            };
-            let may_be_null = (4..8).contains(&at);
-            if !may_be_null && array.null_count() > 0 {
-                let row = first_row + (0..array.len()).find(|&i| array.is_null(i)).unwrap_or(0);
-                return Err(row_fault(name, row, format!("column {} is empty", COLUMNS[at])));
+    /// Frame and time of each frame that begins here; all its rows must have the same. `newest` is the frame that the
+    /// rows before these end with, and `begun` a row of a frame that began before the row group.
+    fn fill_stamps(
+        &mut self,
+        batch: &RecordBatch,
+        begun: &mut Option<Stamp>,
+        newest: &mut Option<Stamp>,
+        meta: &TableMeta,
+        name: &str,
+    ) -> Result<()> {
+        let (first_row, nodes) = (self.first_row, meta.rig.nodes.len());
+        let frames = column(batch, 0, &DataType::Int64, first_row, name)?;
+        let frames = frames.as_primitive::<Int64Type>().values();
+        let times = column(batch, 1, &DataType::Float64, first_row, name)?;
+        let times = times.as_primitive::<Float64Type>().values();
+        let stamp = |i: usize| Stamp { row: first_row + i, frame: frames[i], time_s: times[i] };
+        let rest = (first_row.div_ceil(nodes) * nodes - first_row).min(batch.num_rows());
+        if rest > 0 {
+            let first = *newest.get_or_insert_with(|| *begun.insert(stamp(0)));
+            (0..rest).try_for_each(|i| stamp(i).same_frame(&first, nodes, name))?;
+        }
+        for (t, start) in (rest..batch.num_rows()).step_by(nodes).enumerate() {
+            let first = stamp(start);
+            (self.frame[t], self.time_s[t]) = (first.frame, first.time_s);
+            for i in start..(start + nodes).min(batch.num_rows()) {
+                stamp(i).same_frame(&first, nodes, name)?;
             }
-            Ok(array)
-        };
-        self.frame.copy_from_slice(column(0, DataType::Int64)?.as_primitive::<Int64Type>().values());
-        self.time_s.copy_from_slice(column(1, DataType::Float64)?.as_primitive::<Float64Type>().values());
+            *newest = Some(first);
+        }
+        Ok(())
+    }
+
+    fn fill(self, batch: &RecordBatch, meta: &TableMeta, name: &str) -> Result<()> {
+        let first_row = self.first_row;
+        let column = |at: usize, to: DataType| column(batch, at, &to, first_row, name);
         for (at, offset) in [(4, 0), (5, 1)] {
             let array = column(at, DataType::Float64)?;
             let values = array.as_primitive::<Float64Type>();

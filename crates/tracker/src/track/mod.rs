@@ -15,6 +15,8 @@ pub mod signature;
 pub mod tracker;
 
 #[cfg(test)]
+mod properties;
+#[cfg(test)]
 mod swing;
 
 pub use recording::{TrackSummary, track_recording};

@@ -20,10 +20,16 @@ use clap::Parser;
 fn main() -> ExitCode {
     match args::Cli::parse().run() {
         Ok(status) => status,
+        // Whoever reads our output may stop reading it.
+        Err(error) if error.downcast_ref().is_some_and(is_closed) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("tracker: {error:#}");
             let interrupted = matches!(error.downcast_ref(), Some(tracker::error::Error::Interrupted));
             ExitCode::from(if interrupted { 130 } else { 2 })
         }
     }
+}
+
+fn is_closed(error: &std::io::Error) -> bool {
+    error.kind() == std::io::ErrorKind::BrokenPipe
 }
