@@ -216,7 +216,10 @@ class Nodes:
         return frame
 
     def __arrow_c_stream__(self, requested_schema: object | None = None) -> object:
-        """The table as an Arrow stream: `pyarrow.table(nodes)`, `polars.from_arrow(nodes)`."""
+        """The table as an Arrow stream: `pyarrow.table(nodes)`, `polars.DataFrame(nodes)`.
+
+        `polars.from_arrow(nodes)` gives the same as one column of structs, as of every such stream.
+        """
         reader = _tracker.arrow_reader(self._columns(), self.rig.to_json())
         return reader.__arrow_c_stream__(requested_schema)
 

@@ -7,7 +7,8 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use ::parquet::arrow::ArrowWriter;
+use ::parquet::arrow::arrow_writer::ArrowWriterOptions;
+use ::parquet::arrow::{ARROW_SCHEMA_META_KEY, ArrowWriter, encode_arrow_schema};
 use ::parquet::basic::Compression;
 use ::parquet::errors::ParquetError;
 use ::parquet::file::metadata::{KeyValue, SortingColumn};
@@ -124,8 +125,11 @@ impl Writer {
         }
         let (pending, file) = Pending::create(path)?;
         let handle = file.try_clone().map_err(|e| write_fault(path, &e))?;
+        // The Arrow schema is written at the end, when its metadata are known.
+        let options =
+            ArrowWriterOptions::new().with_properties(properties.build()).with_skip_arrow_metadata(true);
         let writer =
-            ArrowWriter::try_new(handle, schema(), Some(properties.build())).map_err(|e| fault(path, e))?;
+            ArrowWriter::try_new_with_options(handle, schema(), options).map_err(|e| fault(path, e))?;
         Ok(Self { path: path.to_owned(), rig: rig.clone(), writer, file, pending })
     }
 
@@ -136,8 +140,12 @@ impl Writer {
     }
 
     pub(super) fn finish(mut self, meta: &TableMeta) -> Result<()> {
-        for (key, text) in meta.entries()? {
-            self.writer.append_key_value_metadata(KeyValue::new(format!("{KEY_PREFIX}{key}"), text));
+        let entries = meta.entries()?.into_iter().map(|(key, text)| (format!("{KEY_PREFIX}{key}"), text));
+        // In Arrow's schema too: pyarrow takes them from there, and so keeps them when it writes the table again.
+        let arrow = schema().as_ref().clone().with_metadata(entries.clone().collect());
+        let entries = entries.chain([(ARROW_SCHEMA_META_KEY.to_owned(), encode_arrow_schema(&arrow))]);
+        for (key, text) in entries {
+            self.writer.append_key_value_metadata(KeyValue::new(key, text));
         }
         self.writer.finish().map_err(|e| fault(&self.path, e))?;
         self.pending.publish(&self.file)

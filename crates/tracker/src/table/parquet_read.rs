@@ -156,8 +156,8 @@ pub(super) fn read(path: &Path) -> Result<NodeTable> {
             let mut here = part
                 .split_off_front(batch.num_rows(), nodes)
                 .ok_or_else(|| damaged("too many rows".into()))?;
-            here.fill_stamps(&batch, &mut begun, &mut newest, &meta, &name)?;
             here.fill(&batch, &meta, &name)?;
+            here.fill_stamps(&batch, &mut begun, &mut newest, &meta, &name)?;
             done += batch.num_rows();
         }
         if part.status.is_empty() { Ok(begun) } else { Err(damaged(format!("it has {done} of {rows} rows"))) }
@@ -291,7 +291,7 @@ impl<'a> Part<'a> {
         Ok(())
     }
 
-    fn fill(self, batch: &RecordBatch, meta: &TableMeta, name: &str) -> Result<()> {
+    fn fill(&mut self, batch: &RecordBatch, meta: &TableMeta, name: &str) -> Result<()> {
         let first_row = self.first_row;
         let column = |at: usize, to: DataType| column(batch, at, &to, first_row, name);
         for (at, offset) in [(4, 0), (5, 1)] {
@@ -309,7 +309,7 @@ impl<'a> Part<'a> {
                 }
             }
         }
-        for (at, to) in [(6, self.sigma_px), (7, self.area_px)] {
+        for (at, to) in [(6, &mut *self.sigma_px), (7, &mut *self.area_px)] {
             let array = column(at, DataType::Float32)?;
             let values = array.as_primitive::<Float32Type>();
             no_nan(values.values(), &array, at, first_row, name)?;
