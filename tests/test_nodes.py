@@ -251,6 +251,15 @@ def test_files_that_are_no_node_tables_are_refused(tmp_path: Path) -> None:
         pq.write_table(wrong.replace_schema_metadata(meta), path)
         with pytest.raises(dp.TableError, match=match):
             dp.read_nodes(path)
+    # Row groups of 40 rows end within a frame of three; what follows must be of the same one.
+    frames = table["frame"].to_numpy().copy()
+    frames[40:42] += 1
+    wrong = table.set_column(0, "frame", pa.array(frames)).replace_schema_metadata(meta)
+    pq.write_table(wrong, path, row_group_size=40)
+    with pytest.raises(
+        dp.TableError, match=r"row 40: frame 24 at 0\.046 s begins before all 3 nodes of frame 23"
+    ):
+        dp.read_nodes(path)
     newer = {**meta, b"pydpend.schema_version": b"2"}
     pq.write_table(table.replace_schema_metadata(newer), path)
     with pytest.raises(dp.TableError, match="schema version is 2, this program reads version 1"):
