@@ -3,6 +3,8 @@
 //! Owns: [`brightest`]. Must not: unpack a frame. Written so that the compiler makes vector instructions of it, once for
 //! every machine of the kind and once for those with AVX2.
 
+use multiversion::multiversion;
+
 use crate::frame::{Frame, PixelFormat};
 
 /// The greatest sample of a frame, in units of its least significant bit; `None` if it was not decoded or its plane
@@ -21,24 +23,12 @@ pub fn brightest(frame: &Frame) -> Option<u16> {
 
 /// The greatest of the samples in the first `bits` of `bytes`; `None` if there are fewer bytes.
 fn greatest(bytes: &[u8], bits: usize, format: PixelFormat) -> Option<u16> {
-    let bytes = bytes.get(..bits.div_ceil(8))?;
-    #[cfg(target_arch = "x86_64")]
-    if std::arch::is_x86_feature_detected!("avx2") {
-        // SAFETY: the machine has AVX2, and that is all the function asks for.
-        return Some(unsafe { greatest_avx2(bytes, bits, format) });
-    }
-    Some(greatest_any(bytes, bits, format))
+    Some(greatest_in(bytes.get(..bits.div_ceil(8))?, bits, format))
 }
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn greatest_avx2(bytes: &[u8], bits: usize, format: PixelFormat) -> u16 {
-    greatest_any(bytes, bits, format)
-}
-
-// Always inlined, as is all that it calls: only what becomes part of the function above gets its instructions.
-#[inline(always)]
-fn greatest_any(bytes: &[u8], bits: usize, format: PixelFormat) -> u16 {
+// What it calls is always inlined: only what becomes part of it gets its instructions.
+#[multiversion(targets("x86_64+avx2"))]
+fn greatest_in(bytes: &[u8], bits: usize, format: PixelFormat) -> u16 {
     match format {
         PixelFormat::Gray8 => bytes.iter().fold(0, |best, byte| u8::max(best, *byte)).into(),
         PixelFormat::Gray16 => {
