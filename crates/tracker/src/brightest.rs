@@ -95,11 +95,10 @@ fn raise<const N: usize, const ONE_MORE: usize>(
     group: &[u8; ONE_MORE],
     keep: &[[u16; N]; 2],
 ) {
-    for phase in 0..2 {
-        for lane in 0..N {
+    for (phase, (best, keep)) in best.iter_mut().zip(keep).enumerate() {
+        for (lane, (best, keep)) in best.iter_mut().zip(keep).enumerate() {
             let at = 2 * lane + phase;
-            let word = u16::from_be_bytes([group[at], group[at + 1]]) & keep[phase][lane];
-            best[phase][lane] = best[phase][lane].max(word);
+            *best = u16::max(*best, u16::from_be_bytes([group[at], group[at + 1]]) & keep);
         }
     }
 }
