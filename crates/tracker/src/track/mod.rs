@@ -15,9 +15,9 @@ pub mod signature;
 pub mod tracker;
 
 #[cfg(test)]
-mod properties;
-#[cfg(test)]
 mod swing;
+#[cfg(test)]
+mod tests;
 
 pub use recording::{TrackSummary, track_recording};
 pub use tracker::Tracker;
