@@ -12,7 +12,9 @@ from pydpend.cli.completions import SHELLS
 from pydpend.cli.plot import FIGURES
 from pydpend.plots.folder import DRAWINGS
 
-DEMO = Path(__file__).parent.parent / "fixtures" / "demo"
+ROOT = Path(__file__).parent.parent
+DEMO = ROOT / "fixtures" / "demo"
+TRACKER = ROOT / "target" / "release" / "tracker"
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -28,6 +30,19 @@ def test_every_help_has_an_example_that_the_parser_takes(
     for words in examples:
         words = words[1 : words.index(">") if ">" in words else None]
         parser().parse_args(words)
+
+
+@pytest.mark.parametrize(
+    "command", ["info", "setup", "track", "overlay", "check", "film", "score", "completions"]
+)
+def test_every_help_of_the_tracker_has_an_example(command: str) -> None:
+    shown = subprocess.run([TRACKER, command, "--help"], capture_output=True, text=True, check=True).stdout
+    text, _, below = shown.partition("Examples:")
+    examples = [line.split() for line in below.splitlines() if line.startswith(f"  tracker {command} ")]
+    assert examples, shown
+    for words in examples:
+        # Every flag of an example is one that the help explains.
+        assert all(word in text for word in words if word.startswith("-")), words
 
 
 def test_the_figures_of_the_command_are_those_of_the_folder() -> None:

@@ -18,13 +18,29 @@ pub struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    #[command(after_help = "Examples:\n  tracker info drop.mp4\n  tracker info drop.mraw --json")]
     Info(info::Args),
+    #[command(after_help = "Examples:\n  tracker setup drop.mp4 -o rig.toml --picture rig.png")]
     Setup(setup::Args),
+    #[command(
+        after_help = "Examples:\n  tracker track drop.mp4 -o drop.parquet\n  tracker track drop.mraw --rig rig.toml --frames 0..5000 -o drop.csv\n  tracker track drop.mp4 --fps 1000 --resume -o drop.parquet"
+    )]
     Track(track::Args),
+    #[command(
+        after_help = "Examples:\n  tracker overlay drop.mp4 drop.parquet -o seen.mp4\n  tracker overlay drop.mp4 drop.parquet --every 20 --width 640 -o small.mp4"
+    )]
     Overlay(overlay::Args),
+    #[command(after_help = "Examples:\n  tracker check drop.parquet")]
     Check(check::Args),
+    #[command(
+        after_help = "Examples:\n  tracker film --preset clean --print-scene > scene.toml\n  tracker film scene.toml --frames 500 -o try.mp4 --truth truth.parquet"
+    )]
     Film(film::Args),
+    #[command(after_help = "Examples:\n  tracker score try.parquet truth.parquet")]
     Score(score::Args),
+    #[command(
+        after_help = "Examples:\n  tracker completions bash > ~/.local/share/bash-completion/completions/tracker"
+    )]
     Completions(completions::Args),
 }
 
