@@ -147,7 +147,7 @@ def comparison_figure(
                         color=COLORS[1],
                         alpha=0.25,
                         lw=0,
-                        label=f"$\\pm\\sigma$ of the {name}",
+                        label="$\\pm\\sigma$ of the encoder",
                     )
                 if np.isfinite(width).any():
                     axes.fill_between(
