@@ -20,6 +20,7 @@ pub mod noise;
 mod presets;
 mod render;
 pub mod scene;
+mod scene_check;
 mod spline;
 mod truth;
 mod truth_table;

@@ -124,9 +124,6 @@ impl FrameNoise {
 
 /// Writes the recorded levels of one frame into `out`, one byte or two (little-endian) per pixel.
 pub(crate) fn record(camera: &Camera, seed: u64, index: u64, expected: &[f32], out: &mut Vec<u8>) {
-    out.clear();
-    let deep = camera.depth_bits > 8;
-    out.reserve(expected.len() * if deep { 2 } else { 1 });
     let top = camera.top() as f32;
     let read2 = (camera.read_noise * camera.read_noise) as f32;
     let gain = camera.shot_gain as f32;
@@ -134,24 +131,36 @@ pub(crate) fn record(camera: &Camera, seed: u64, index: u64, expected: &[f32], o
     let mut noise = FrameNoise::new(seed, index);
     // Clipped first, then adding one half and cutting off rounds.
     let level = |x: f32| (x.clamp(0.0, top) + 0.5) as u16;
-    let mut put = |levels: &[u16]| {
-        if deep {
-            levels.iter().for_each(|v| out.extend_from_slice(&v.to_le_bytes()));
-        } else {
-            out.extend(levels.iter().map(|&v| v as u8));
-        }
-    };
-    for four in expected.chunks(4) {
+    let mut four_levels = |four: &[f32]| {
         let mut levels = [0u16; 4];
         if read2 == 0.0 && gain == 0.0 {
             levels.iter_mut().zip(four).for_each(|(l, &mu)| *l = level(mu));
+            return levels;
+        }
+        let z = noise.next4();
+        if gain == 0.0 {
+            let sd = read2.sqrt();
+            levels.iter_mut().zip(four).zip(z).for_each(|((l, &mu), z)| *l = level(mu + z * sd));
         } else {
-            let z = noise.next4();
             for ((l, &mu), z) in levels.iter_mut().zip(four).zip(z) {
                 *l = level(mu + z * (read2 + gain * (mu - black).max(0.0)).sqrt());
             }
         }
-        put(&levels[..four.len()]);
+        levels
+    };
+    out.clear();
+    if camera.depth_bits > 8 {
+        out.resize(2 * expected.len(), 0);
+        for (four, bytes) in expected.chunks(4).zip(out.chunks_mut(8)) {
+            let levels = four_levels(four);
+            bytes.chunks_exact_mut(2).zip(levels).for_each(|(b, l)| b.copy_from_slice(&l.to_le_bytes()));
+        }
+    } else {
+        out.resize(expected.len(), 0);
+        for (four, bytes) in expected.chunks(4).zip(out.chunks_mut(4)) {
+            let levels = four_levels(four);
+            bytes.iter_mut().zip(levels).for_each(|(b, l)| *b = l as u8);
+        }
     }
 }
 

@@ -162,16 +162,24 @@ impl<'a> Canvas<'a> {
         for y in rows {
             let [u0, v0] = quad.local(0.0, y as f64);
             let (mut low, mut high) = (bx[0], bx[1]);
+            // Between these every pixel is wholly inside.
+            let (mut first, mut last) = (f64::NEG_INFINITY, f64::INFINITY);
             for (start, slope, [a, b]) in [(u0, su, quad.u), (v0, sv, quad.v)] {
                 if slope.abs() < 1e-9 {
                     if start < a - reach || start > b + reach {
                         low = f64::INFINITY;
+                    }
+                    if start < a + 1.0 || start > b - 1.0 {
+                        first = f64::INFINITY;
                     }
                     continue;
                 }
                 let (p, q) = ((a - reach - start) / slope, (b + reach - start) / slope);
                 low = low.max(p.min(q));
                 high = high.min(p.max(q));
+                let (p, q) = ((a + 1.0 - start) / slope, (b - 1.0 - start) / slope);
+                first = first.max(p.min(q));
+                last = last.min(p.max(q));
             }
             if low > high {
                 continue;
@@ -182,7 +190,8 @@ impl<'a> Canvas<'a> {
             }
             self.touch(y, &row);
             for x in row {
-                let c = quad.pixel_coverage(x as f64, y as f64);
+                let inside = x as f64 >= first && x as f64 <= last;
+                let c = if inside { 1.0 } else { quad.pixel_coverage(x as f64, y as f64) };
                 if c > 0.0 {
                     self.put(x, y, c, level);
                 }
