@@ -118,3 +118,28 @@ fn not_at_rest(rig: &Rig, rows: &Rows) -> Option<String> {
         )
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::Scene;
+    use crate::track::bed::{Bed, QUIET, scene, tumble};
+
+    fn advice(scene: &Scene) -> Vec<String> {
+        let bed = Bed::new(scene, QUIET);
+        let rig = bed.film.rig(0);
+        advise(&rig, &bed.rows(&rig), Some(scene.rate_hz))
+    }
+
+    #[test]
+    fn alike_signatures_are_named_with_their_pair() {
+        let layout = [[10.0, 0.0], [110.0, 0.0], [50.0, 30.0], [50.0, -30.0]];
+        let link = ("kite", None, [360.0, 360.0], tumble(0.0, 5.0));
+        let said = advice(&scene(2000, &[link], &layout.map(|at| ("kite", at))));
+        assert!(
+            said.iter().any(|w| w.contains("nodes m2 and m3 of body kite have the same distances")),
+            "{said:?}"
+        );
+        assert!(!said.iter().any(|w| w.contains("m0 and")), "{said:?}");
+    }
+}

@@ -4,10 +4,12 @@
 
 use nalgebra::{Isometry2, Vector2};
 
+use super::circle::Circle;
 use crate::rig::{Body, Joint, Node, RIG_SCHEMA, Rig};
 use crate::track::joints::{Shared, Turning};
 use crate::track::mechanism::Link;
-use crate::track::rigid::place;
+use crate::track::predict::hung_at;
+use crate::track::rigid::{place, pose_at};
 
 /// A body and its pose in each frame of the sample.
 #[derive(Debug, Clone)]
@@ -31,7 +33,63 @@ struct Held {
     there: Vector2<f64>,
 }
 
+impl Found {
+    /// Whether it is a single marker, whose poses have no angle yet.
+    fn is_lone(&self) -> bool {
+        self.link.nodes.len() == 1
+    }
+
+    /// Its first node as body `on` sees it (`None` is the ground), in each frame in which both are known.
+    fn seen_from<'a>(&'a self, on: Option<&'a Found>) -> impl Iterator<Item = (usize, Vector2<f64>)> + 'a {
+        self.poses.iter().enumerate().filter_map(move |(f, pose)| {
+            let here = place(pose.as_ref()?, self.link.template[0]);
+            match on {
+                None => Some((f, here)),
+                Some(b) => Some((f, place(&b.poses[f]?.inverse(), here))),
+            }
+        })
+    }
+
+    /// The circle about a point of `on` on which a lone marker goes.
+    pub fn circle(&self, on: Option<&Found>) -> Option<Circle> {
+        Circle::through(&self.seen_from(on).map(|s| s.1).collect::<Vec<_>>())
+    }
+
+    /// Gives a lone marker that goes about `there` of `on` its angle in every frame, zero in the first; returns the
+    /// joint in its own coordinates.
+    fn turn_about(&mut self, on: Option<&Found>, there: Vector2<f64>) -> Vector2<f64> {
+        let mut local: Option<Vector2<f64>> = None;
+        for f in 0..self.poses.len() {
+            let held = match on {
+                None => Some(Isometry2::identity()),
+                Some(b) => b.poses[f],
+            };
+            let (Some(pose), Some(held)) = (self.poses[f], held) else {
+                self.poses[f] = None;
+                continue;
+            };
+            let here = place(&pose, self.link.template[0]);
+            let ray = place(&held, there) - here;
+            let first = *local.get_or_insert(ray + self.link.template[0]);
+            let arm = first - self.link.template[0];
+            let angle = ray.y.atan2(ray.x) - arm.y.atan2(arm.x);
+            self.poses[f] = Some(pose_at(angle, self.link.template[0], here));
+        }
+        local.unwrap_or_default()
+    }
+}
+
 fn joint(a: &Found, b: Option<&Found>) -> Option<Turning> {
+    if a.is_lone() {
+        let c = a.circle(b)?;
+        // Where it is on the marker's own link follows once it is hung.
+        return Some(Turning {
+            first: Vector2::zeros(),
+            second: c.middle,
+            rms_px: c.rms_px,
+            sigma_px: c.rms_px,
+        });
+    }
     let mut sums = Shared::default();
     for (f, pose) in a.poses.iter().enumerate() {
         let Some(pose) = pose else { continue };
@@ -53,6 +111,7 @@ fn joint(a: &Found, b: Option<&Found>) -> Option<Turning> {
 /// `reference` of the sample.
 pub fn arrange(found: &[Found], reference: usize, reference_frame: Option<u64>, image_px: [u32; 2]) -> Rig {
     let n = found.len();
+    let mut found = found.to_vec();
     // What each body hangs on: the ground first, then bodies already hung.
     let mut held: Vec<Option<Held>> = (0..n).map(|_| None).collect();
     let mut order: Vec<usize> = Vec::new();
@@ -60,7 +119,8 @@ pub fn arrange(found: &[Found], reference: usize, reference_frame: Option<u64>, 
         (0..n).filter_map(|b| joint(&found[b], None).map(|t| (t.rms_px, b, t))).collect();
     ground.sort_by(|a, b| a.0.total_cmp(&b.0));
     for (_, b, t) in ground {
-        held[b] = Some(Held { on: None, local: t.first, there: t.second });
+        let local = if found[b].is_lone() { found[b].turn_about(None, t.second) } else { t.first };
+        held[b] = Some(Held { on: None, local, there: t.second });
         order.push(b);
     }
     if order.is_empty() && n > 0 {
@@ -71,7 +131,7 @@ pub fn arrange(found: &[Found], reference: usize, reference_frame: Option<u64>, 
     loop {
         let mut best: Option<(f64, usize, usize, Turning)> = None;
         for b in (0..n).filter(|b| !order.contains(b)) {
-            for &o in &order {
+            for &o in order.iter().filter(|&&o| held[o].is_some() || !found[o].is_lone()) {
                 if let Some(t) = joint(&found[b], Some(&found[o]))
                     && best.as_ref().is_none_or(|x| t.rms_px < x.0)
                 {
@@ -81,7 +141,10 @@ pub fn arrange(found: &[Found], reference: usize, reference_frame: Option<u64>, 
         }
         match best {
             Some((_, b, o, t)) => {
-                held[b] = Some(Held { on: Some(o), local: t.first, there: t.second });
+                let on = found[o].clone();
+                let local =
+                    if found[b].is_lone() { found[b].turn_about(Some(&on), t.second) } else { t.first };
+                held[b] = Some(Held { on: Some(o), local, there: t.second });
                 order.push(b);
             }
             None => match (0..n).find(|b| !order.contains(b)) {
@@ -101,14 +164,19 @@ pub fn arrange(found: &[Found], reference: usize, reference_frame: Option<u64>, 
             _ => format!("body{}", k + 1),
         })
         .collect();
-    let pose = |b: usize| {
-        found[b]
-            .poses
-            .get(reference)
-            .copied()
-            .flatten()
-            .unwrap_or_else(|| Isometry2::new(found[b].link.home, 0.0))
-    };
+    // A body that the reference frame does not show hangs there from its joint.
+    let mut poses: Vec<Isometry2<f64>> = found.iter().map(|f| Isometry2::new(f.link.home, 0.0)).collect();
+    for &b in &order {
+        poses[b] = match (found[b].poses.get(reference).copied().flatten(), &held[b]) {
+            (Some(pose), _) => pose,
+            (None, Some(Held { on: Some(o), local, there })) => {
+                hung_at(&poses[b], *local, place(&poses[*o], *there))
+            }
+            (None, Some(Held { on: None, local, there })) => hung_at(&poses[b], *local, *there),
+            (None, None) => poses[b],
+        };
+    }
+    let pose = |b: usize| poses[b];
     let mut rig = Rig {
         schema: RIG_SCHEMA,
         image_px,

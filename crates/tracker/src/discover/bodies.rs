@@ -85,6 +85,21 @@ pub fn poses(links: &[Link], frame: &[Detection]) -> Vec<Option<Sighting>> {
     out
 }
 
+/// Two bodies of which one has all markers of the other at the same distances.
+pub fn alike(links: &[Link]) -> Option<(usize, usize)> {
+    for a in 0..links.len() {
+        for b in (0..links.len()).filter(|&b| b != a && links[b].nodes.len() >= links[a].nodes.len()) {
+            let point = |p: &Vector2<f64>| Detection { x_px: p.x, y_px: p.y, ..Default::default() };
+            let points: Vec<Detection> = links[b].template.iter().map(point).collect();
+            let found = sightings(&links[a], &Sky::new(&points), &vec![true; points.len()], PAIRS);
+            if found.first().is_some_and(|s| s.support == links[a].nodes.len()) {
+                return Some((a, b));
+            }
+        }
+    }
+    None
+}
+
 /// Groups of points of one frame that keep their distances: for each body its points, px.
 fn groups(base: &[Detection], others: &[&[Detection]]) -> Vec<Vec<Vector2<f64>>> {
     let n = base.len();
@@ -227,7 +242,8 @@ fn complete(links: &mut Vec<Link>, sample: &Sample) {
                 }
             }
             let before = points.len();
-            let least = (known[b] / 25).max(6);
+            // A node of another body comes again to the same place where both turn back at once, for a few frames.
+            let least = (known[b] / 10).max(6);
             for p in crowds(&spare[b], least) {
                 // The rest of a half hidden marker, within a radius of its centre, is no marker of its own.
                 if points.iter().all(|q| (p - q).norm() > apart_px) {

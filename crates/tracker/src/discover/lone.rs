@@ -5,9 +5,12 @@
 use nalgebra::{Isometry2, Vector2};
 
 use super::arrange::Found;
-use super::bodies::{FLOOR_PX, link_of};
+use super::bodies::{self, FLOOR_PX, link_of};
 use super::sample::Sample;
+use crate::detect::Detection;
 use crate::store::DetectionStore;
+use crate::track::mechanism::Link;
+use crate::track::rigid::{Pair, fit_pose, place};
 
 /// Frames linked at most.
 const FRAMES: usize = 3000;
@@ -52,14 +55,49 @@ impl Path {
     }
 }
 
-/// Bodies of one marker each, with their places in the sample's frames.
-pub fn find_lone(store: &DetectionStore, sample: &Sample, standing: &[Vector2<f64>]) -> Vec<Found> {
+/// Where a body's nodes are, nearer than this, what is seen is theirs, px.
+const OWN_PX: f64 = 10.0;
+/// Distances that scatter by less are constant, px, and the same as a part of the distance.
+const RIGID_PX: f64 = 0.5;
+const RIGID_PART: f64 = 0.004;
+/// Turn of the line between two markers from which their distance says something, rad.
+const TURNED_RAD: f64 = 0.3;
+/// Joints nearer together than this are one, px.
+const SAME_JOINT_PX: f64 = 3.0;
+
+/// The detections of a frame that are no node of the bodies; `None` where not every body is found.
+fn left_over(links: &[Link], frame: &[Detection]) -> Option<Vec<Detection>> {
+    let mut out = frame.to_vec();
+    for (link, s) in links.iter().zip(bodies::poses(links, frame)) {
+        let places = link.places(&s?.fit.pose);
+        out.retain(|d| places.iter().all(|p| (p - Vector2::new(d.x_px, d.y_px)).norm() > OWN_PX));
+    }
+    Some(out)
+}
+
+/// Whether something moves that is no node of the bodies, in most of the sample's frames that show them all.
+pub fn others_move(sample: &Sample, links: &[Link]) -> bool {
+    let rest: Vec<usize> =
+        sample.moving.iter().filter_map(|f| left_over(links, f)).map(|rest| rest.len()).collect();
+    2 * rest.iter().filter(|&&n| n > 0).count() > rest.len()
+}
+
+/// Markers that are on no body of three, with their places in the sample's frames.
+pub fn find_lone(
+    store: &DetectionStore,
+    sample: &Sample,
+    standing: &[Vector2<f64>],
+    links: &[Link],
+) -> Vec<Found> {
+    let mut linked = 0;
     let mut open: Vec<Path> = Vec::new();
     let mut done: Vec<Path> = Vec::new();
     let mut scratch = Vec::new();
     for i in 0..store.len().min(FRAMES) {
         store.read(i, &mut scratch);
-        let mut free: Vec<(Vector2<f64>, (f32, f32))> = scratch
+        let Some(rest) = left_over(links, &scratch) else { continue };
+        linked += 1;
+        let mut free: Vec<(Vector2<f64>, (f32, f32))> = rest
             .iter()
             .map(|d| (Vector2::new(d.x_px, d.y_px), (d.area_px, d.elongation)))
             .filter(|(p, _)| standing.iter().all(|s| (s - p).norm() > super::sample::STILL_PX))
@@ -98,7 +136,9 @@ pub fn find_lone(store: &DetectionStore, sample: &Sample, standing: &[Vector2<f6
         open.extend(free.into_iter().map(|(p, s)| Path { at: vec![(i, p)], shape: vec![s] }));
     }
     done.append(&mut open);
-    done.retain(|p| p.at.len() >= LEAST && p.travelled() > 10.0 && p.is_marker());
+    // Beside bodies that make a rig already, what is seen for a moment is no part of it.
+    let least = if links.is_empty() { LEAST } else { LEAST.max(linked / 5) };
+    done.retain(|p| p.at.len() >= least && p.travelled() > 10.0 && p.is_marker());
     done.sort_by_key(|p| std::cmp::Reverse(p.at.len()));
     // Paths that overlap in time are different markers; one that fits none beside it may be any of them.
     let mut kept: Vec<Path> = Vec::new();
@@ -124,4 +164,68 @@ pub fn find_lone(store: &DetectionStore, sample: &Sample, standing: &[Vector2<f6
             Found { link: link_of(vec![path.at[0].1], FLOOR_PX), poses }
         })
         .collect()
+}
+
+/// Makes one body of every two lone markers that keep their distance, unless one hangs on the other: then one of them
+/// goes about a point of the ground or of a body, and the other does not.
+pub fn pair_up(found: &mut Vec<Found>) {
+    while let Some((i, j, body)) = next_pair(found) {
+        found[i] = body;
+        found.remove(j);
+    }
+}
+
+fn next_pair(found: &[Found]) -> Option<(usize, usize, Found)> {
+    let lone: Vec<usize> = (0..found.len()).filter(|&k| found[k].link.nodes.len() == 1).collect();
+    // What a marker goes about: the first of the ground and the bodies that it circles, and where.
+    let about = |k: usize| {
+        let holders = std::iter::once(None).chain(found.iter().map(Some));
+        holders
+            .enumerate()
+            .filter(|(_, b)| b.is_none_or(|b| b.link.nodes.len() > 1))
+            .find_map(|(h, b)| found[k].circle(b).map(|c| (h, c.middle)))
+    };
+    let joints: Vec<Option<(usize, Vector2<f64>)>> = lone.iter().map(|&k| about(k)).collect();
+    // Those about one point first: a body found may be what the next hang on.
+    for together in [true, false] {
+        for (a, &i) in lone.iter().enumerate() {
+            for (b, &j) in lone.iter().enumerate().skip(a + 1) {
+                let one = match (&joints[a], &joints[b]) {
+                    (Some(p), Some(q)) => together && p.0 == q.0 && (p.1 - q.1).norm() < SAME_JOINT_PX,
+                    (None, None) => !together,
+                    _ => false,
+                };
+                if one && let Some(body) = rigid_pair(&found[i], &found[j]) {
+                    return Some((i, j, body));
+                }
+            }
+        }
+    }
+    None
+}
+
+/// Two lone markers as one body, if they keep their distance while they turn.
+fn rigid_pair(a: &Found, b: &Found) -> Option<Found> {
+    let at = |f: &Found, k: usize| f.poses[k].map(|p| place(&p, f.link.template[0]));
+    let both: Vec<Option<(Vector2<f64>, Vector2<f64>)>> =
+        (0..a.poses.len()).map(|k| Some((at(a, k)?, at(b, k)?))).collect();
+    let arms: Vec<Vector2<f64>> = both.iter().flatten().map(|(p, q)| q - p).collect();
+    let first = *arms.first().filter(|_| arms.len() >= LEAST)?;
+    let mean = arms.iter().map(|v| v.norm()).sum::<f64>() / arms.len() as f64;
+    let scatter = (arms.iter().map(|v| (v.norm() - mean).powi(2)).sum::<f64>() / arms.len() as f64).sqrt();
+    let turned = arms.iter().map(|v| first.perp(v).atan2(first.dot(v)).abs()).fold(0.0, f64::max);
+    if scatter > RIGID_PX.max(RIGID_PART * mean) || turned < TURNED_RAD {
+        return None;
+    }
+    let (p, q) = both.iter().flatten().next().copied()?;
+    let link = link_of(vec![p, p + (q - p) * (mean / (q - p).norm())], FLOOR_PX);
+    let poses = both
+        .iter()
+        .map(|both| {
+            let (p, q) = (*both)?;
+            let pair = |k: usize, place| Pair { local: link.template[k], place, sigma_px: FLOOR_PX };
+            fit_pose(&[pair(0, p), pair(1, q)]).map(|f| f.pose)
+        })
+        .collect();
+    Some(Found { link, poses })
 }

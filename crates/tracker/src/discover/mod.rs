@@ -5,6 +5,7 @@
 pub mod advice;
 mod arrange;
 mod bodies;
+mod circle;
 mod lone;
 mod sample;
 
@@ -13,6 +14,7 @@ use nalgebra::Vector2;
 use crate::error::{Error, Fault, Result};
 use crate::rig::Rig;
 use crate::store::DetectionStore;
+use crate::track::mechanism::Link;
 use crate::track::rigid::place;
 use arrange::Found;
 use sample::Sample;
@@ -50,13 +52,25 @@ pub fn discover(store: &DetectionStore, image_px: [u32; 2]) -> Result<Discovery>
     let mut sample = sample;
     let mut found = moving_bodies(&mut sample);
     let standing = sample.standing.clone();
-    if found.is_empty() {
-        found = lone::find_lone(store, &sample, &standing);
+    let links: Vec<Link> = found.iter().map(|f| f.link.clone()).collect();
+    if links.is_empty() || lone::others_move(&sample, &links) {
+        found.extend(lone::find_lone(store, &sample, &standing, &links));
+        lone::pair_up(&mut found);
     }
     if found.is_empty() {
         return Err(Error::Rig(
             Fault::new("recording", "no marker can be followed")
                 .advice("Look at the picture of `tracker setup`, or give a rig with --rig"),
+        ));
+    }
+    if let Some((a, b)) = bodies::alike(&links) {
+        let (a, b) = (place_words(&found[a]), place_words(&found[b]));
+        return Err(Error::Rig(
+            Fault::new(
+                "recording",
+                format!("two bodies have their markers alike, {a} and {b}: they cannot be told apart"),
+            )
+            .advice("Move a marker of one of them by some pixels, or say which is which with --rig"),
         ));
     }
     let (reference, whole) = reference(&sample, &found, image_px);
@@ -136,7 +150,7 @@ fn reference(sample: &Sample, found: &[Found], image_px: [u32; 2]) -> (usize, bo
                 seen += usize::from(sky.nearest(p, 1.5).is_some_and(|(d, _)| sky.whole(d)));
             }
         }
-        if found.iter().all(|f| f.poses[k].is_some()) && seen > best.1 {
+        if seen > best.1 {
             best = (k, seen);
         }
         if best.1 == all {
@@ -144,4 +158,12 @@ fn reference(sample: &Sample, found: &[Found], image_px: [u32; 2]) -> (usize, bo
         }
     }
     (best.0, best.1 == all)
+}
+
+/// Where a body is first seen, for a message.
+fn place_words(found: &Found) -> String {
+    found.poses.iter().flatten().next().map_or_else(String::new, |p| {
+        let at = place(p, found.link.template[0]);
+        format!("one with a marker at ({:.0}, {:.0}) px", at.x, at.y)
+    })
 }

@@ -72,21 +72,25 @@ fn turned(a: f64) -> f64 {
 
 impl Search<'_> {
     /// Standard uncertainty of detection `d` as node `j`, px.
-    fn sigma(&self, j: usize, d: usize) -> f64 {
+    pub fn sigma(&self, j: usize, d: usize) -> f64 {
         let own = f64::from(self.sky.get(d).sigma_px).max(1e-3);
-        (own * own + self.link.slack_px[j].powi(2) + self.floor_px.powi(2)).sqrt()
+        // A part is compared as it is: it is no support, and one that is cut does not agree.
+        let doubted = !self.sky.whole(d) && self.whole(j, d);
+        let cut = if doubted { self.link.cut_px(j, self.sky.get(d).area_px) } else { 0.0 };
+        (own * own + cut * cut + self.link.slack_px[j].powi(2) + self.floor_px.powi(2)).sqrt()
     }
 
-    /// Whether detection `d` is the whole of node `j`, as far as its picture tells.
-    fn whole(&self, j: usize, d: usize) -> bool {
-        self.sky.whole(d) && self.sky.get(d).area_px >= self.link.whole_px[j]
+    /// Whether detection `d` is the whole of node `j`, as far as its picture tells. Where the node's size is known,
+    /// a blob that the detector calls a part is the whole if nothing of its area lacks.
+    pub fn whole(&self, j: usize, d: usize) -> bool {
+        let whole_px = self.link.whole_px[j];
+        let area_px = self.sky.get(d).area_px;
+        let one = if whole_px > 0.0 { self.sky.single(d) } else { self.sky.whole(d) };
+        one && area_px >= whole_px
     }
 
     fn usual_sigma(&self, j: usize) -> f64 {
-        let mut own = 0.0_f64;
-        for d in 0..self.sky.len() {
-            own = own.max(f64::from(self.sky.get(d).sigma_px));
-        }
+        let own = self.sky.widest_px();
         (own * own + self.link.slack_px[j].powi(2) + self.floor_px.powi(2)).sqrt()
     }
 

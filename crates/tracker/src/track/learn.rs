@@ -4,11 +4,12 @@
 
 use nalgebra::{Isometry2, Vector2};
 
+use super::engine::BodySeen;
+use super::habits::Habits;
 use super::joints::Shared;
 use super::mechanism::{Holder, Mechanism};
 use super::nearest::Sky;
 use super::rigid::place;
-use super::tracker::{BodySeen, Habits};
 
 /// Samples kept of each node; beyond, every second one is dropped and only every second taken.
 const SAMPLES: usize = 1024;

@@ -146,6 +146,24 @@ impl Link {
         self.template.iter().map(|t| (t - from).norm()).fold(0.0, f64::max)
     }
 
+    /// The least distance between two nodes, px; infinite for a single one.
+    pub fn spacing_px(&self) -> f64 {
+        let n = self.template.len();
+        let pairs = (0..n).flat_map(|i| (0..i).map(move |j| (i, j)));
+        pairs.map(|(i, j)| (self.template[i] - self.template[j]).norm()).fold(f64::INFINITY, f64::min)
+    }
+
+    /// How far the centre of a blob of `area_px` may be from node `j`'s, px, if what lacks is hidden: the part
+    /// hidden of a disc, where small, moves the centre of the rest by that part of the radius. Areas scatter too.
+    pub fn cut_px(&self, j: usize, area_px: f32) -> f64 {
+        let (usual, scatter) = self.area_px[j];
+        if usual <= 0.0 {
+            return 0.0;
+        }
+        let radius = (usual / std::f64::consts::PI).sqrt();
+        radius * ((usual - f64::from(area_px)).max(0.0) + scatter) / usual
+    }
+
     /// Where the nodes are in a pose, px.
     pub fn places(&self, pose: &Isometry2<f64>) -> Vec<Vector2<f64>> {
         self.template.iter().map(|&t| place(pose, t)).collect()

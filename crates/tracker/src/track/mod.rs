@@ -2,7 +2,11 @@
 //!
 //! Owns: [`Status`], [`Observation`], [`Tracker`], [`track_recording`]. Must not: know of pixels, pendulums or metres.
 
+pub mod beside;
+pub mod chance;
 pub mod constellation;
+pub mod engine;
+pub mod habits;
 pub mod joints;
 pub mod learn;
 pub mod mechanism;
@@ -11,13 +15,18 @@ pub mod partly;
 pub mod predict;
 pub mod recording;
 pub mod rigid;
+pub mod rows;
 pub mod signature;
 pub mod tracker;
 
 #[cfg(test)]
+pub(crate) mod bed;
+#[cfg(test)]
 mod swing;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod worst;
 
 pub use recording::{TrackSummary, track_recording};
 pub use tracker::Tracker;

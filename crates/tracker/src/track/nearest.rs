@@ -11,6 +11,7 @@ use crate::detect::{Detection, Flags};
 pub struct Sky<'a> {
     detections: &'a [Detection],
     tree: Option<ImmutableKdTree<f64, 2>>,
+    widest_px: f64,
 }
 
 impl<'a> Sky<'a> {
@@ -32,7 +33,8 @@ impl<'a> Sky<'a> {
         } else {
             None
         };
-        Self { detections, tree }
+        let widest_px = detections.iter().map(|d| f64::from(d.sigma_px)).fold(0.0, f64::max);
+        Self { detections, tree, widest_px }
     }
 
     /// How many detections there are.
@@ -50,6 +52,11 @@ impl<'a> Sky<'a> {
         &self.detections[i]
     }
 
+    /// The greatest standard uncertainty among them, px.
+    pub fn widest_px(&self) -> f64 {
+        self.widest_px
+    }
+
     /// A detection's centre, px.
     pub fn place(&self, i: usize) -> Vector2<f64> {
         Vector2::new(self.detections[i].x_px, self.detections[i].y_px)
@@ -58,6 +65,11 @@ impl<'a> Sky<'a> {
     /// Whether a detection is the whole of one marker, as far as its picture tells.
     pub fn whole(&self, i: usize) -> bool {
         !self.detections[i].flags.has(Flags::MERGED | Flags::PARTIAL | Flags::BORDER)
+    }
+
+    /// Whether a detection is one marker that the image's border does not cut, though something else may.
+    pub fn single(&self, i: usize) -> bool {
+        !self.detections[i].flags.has(Flags::MERGED | Flags::BORDER)
     }
 
     /// The nearest detection within `radius_px` of `place`, and its distance in px.
@@ -140,7 +152,7 @@ mod tests {
             .map(|i| if i < 40 { at(7.0, f64::from(i)) } else { at(f64::from(i * 13 % 50), f64::from(i)) })
             .collect();
         let tree = Sky::new(&many);
-        let straight = Sky { detections: &many, tree: None };
+        let straight = Sky { detections: &many, tree: None, widest_px: 0.1 };
         for i in 0..200 {
             let place = Vector2::new(f64::from(i * 17 % 53) + 0.3, f64::from(i * 29 % 61) + 0.1);
             assert_eq!(tree.nearest(place, 9.0), straight.nearest(place, 9.0));

@@ -54,6 +54,26 @@ impl Motion {
         self.past.last().map(|p| p.0)
     }
 
+    /// The newest pose.
+    pub fn newest_pose(&self) -> Option<Isometry2<f64>> {
+        self.past.last().map(|&(_, angle, origin)| pose_at(angle, Vector2::zeros(), origin))
+    }
+
+    /// Whether a pose is known of this frame or the one before it, either way in time.
+    pub fn was_just_seen(&self, time: f64) -> bool {
+        self.newest().is_some_and(|t| (time - t).abs() < 1.5)
+    }
+
+    /// The newest pose where it was just seen and too few are known to carry it on.
+    pub fn fresh(&self, time: f64) -> Option<Isometry2<f64>> {
+        self.newest_pose().filter(|_| self.past.len() < 3 && self.was_just_seen(time))
+    }
+
+    /// Forgets the poses; how far predictions erred stays.
+    pub fn forget(&mut self) {
+        self.past.clear();
+    }
+
     /// How many poses carry the prediction.
     pub fn depth(&self) -> usize {
         self.past.len()
@@ -113,6 +133,12 @@ impl Motion {
         };
         let pose = pose_at(angle, Vector2::zeros(), origin);
         Some(Forecast { pose, angle_rad, origin_px })
+    }
+
+    /// The pose at `time` with no more room than the last predictions needed; `None` while that is not known.
+    pub fn settled_forecast(&self, time: f64) -> Option<Forecast> {
+        let own = self.unrest.filter(|_| self.past.len() == 3)?;
+        self.forecast(time, own, own)
     }
 
     fn unrest(&self, floor: Unrest) -> Unrest {

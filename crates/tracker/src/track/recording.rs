@@ -5,12 +5,14 @@
 use std::collections::VecDeque;
 
 use super::Observation;
+use super::engine::{BodySeen, Engine};
+use super::habits::Habits;
 use super::learn::Lessons;
 use super::mechanism::Mechanism;
 use super::nearest::Sky;
 use super::partly::Partly;
 use super::predict::Motion;
-use super::tracker::{BodySeen, Engine, Habits, Returns, observations, partly};
+use super::rows::{Returns, observations, partly};
 use crate::detect::Detection;
 use crate::error::Result;
 use crate::rig::Rig;
@@ -243,7 +245,7 @@ impl<'a> Pass<'a> {
         let from = start.max(self.first) - self.first;
         let end = self.pending.len() - SETTLED;
         let mut engine = self.engine.clone();
-        engine.motions[b] = Motion::default();
+        engine.motions[b].forget();
         let time = |p: &Pending, store: &DetectionStore| (p.stamp.index - store.stamp(0).index) as f64;
         for p in self.pending.range(end..).rev() {
             if let Some(f) = &p.seen[b].fit {

@@ -1,0 +1,118 @@
+//! How likely a sighting is by chance alone.
+//!
+//! Owns: [`by_chance`], [`likeness`], [`twins`]. Must not: decide what is accepted (`engine` does).
+
+use std::f64::consts::PI;
+
+use nalgebra::Vector2;
+
+use super::constellation::{Anchor, Search, Sighting};
+use super::engine::{PAIRS, REACH_SIGMA};
+use super::habits::Habits;
+use super::mechanism::{Link, Mechanism};
+use super::nearest::Sky;
+use crate::detect::Detection;
+
+/// How exactly the only node seen of a body must be expected, px.
+const LONE_GATE_PX: f64 = 1.5;
+
+/// Expected number of sightings as good as `s` that chance alone would give to `search` in `trials` poses.
+pub fn by_chance(search: &Search<'_>, s: &Sighting, trials: usize, habits: &Habits, image_px: f64) -> f64 {
+    let link = search.link;
+    let n = link.nodes.len();
+    let others = search.free.iter().filter(|&&f| f).count().saturating_sub(s.support) as f64;
+    let from = search.anchors.first().map_or(Vector2::zeros(), |a| a.local);
+    let reach = link.reach_px(from).max(30.0);
+    let density = others.max(habits.clutter) / (PI * reach * reach);
+    let whole =
+        s.picks.iter().enumerate().filter_map(|(j, d)| d.filter(|&d| search.whole(j, d)).map(|d| (j, d)));
+    let picked = whole.map(|(j, d)| search.sigma(j, d));
+    let radius = REACH_SIGMA * picked.fold(0.0, f64::max);
+    let hit = (density * PI * radius * radius).min(1.0);
+    let base = 2 - search.anchors.len().min(2);
+    if s.support > base {
+        let k = s.support - base;
+        return trials as f64 * choose(n.saturating_sub(base).max(k), k) * hit.powi(k as i32);
+    }
+    let turn = search.window.map_or(PI, |w| w.angle_rad.min(PI));
+    if n == 1 && base == 2 {
+        let density = others.max(habits.clutter) / image_px;
+        let gate = search.window.map_or(f64::INFINITY, |w| w.origin_px + radius);
+        return density * PI * gate * gate;
+    }
+    match base {
+        // One node on its circle about the anchor; half hidden it would not show, so it must be expected
+        // within what it may be off.
+        1 if n > 1 && turn * reach > LONE_GATE_PX => f64::INFINITY,
+        1 => n as f64 * density * 4.0 * radius * reach * turn,
+        // One or two nodes of a body that hangs on nothing.
+        _ if s.support == 1 => f64::INFINITY,
+        _ => {
+            let gate = search.window.map_or(f64::INFINITY, |w| w.origin_px + w.angle_rad * reach + radius);
+            let pairs = (n * (n - 1) / 2) as f64;
+            pairs * (density * PI * gate * gate) * density * 4.0 * radius * gate
+        }
+    }
+}
+
+fn choose(n: usize, k: usize) -> f64 {
+    (0..k).map(|i| (n - i) as f64 / (i + 1) as f64).product()
+}
+
+/// A body's nodes as detections at their places in it.
+fn drawn(link: &Link) -> Vec<Detection> {
+    let star = |t: &Vector2<f64>| Detection { x_px: t.x, y_px: t.y, sigma_px: 0.05, ..Default::default() };
+    link.template.iter().map(star).collect()
+}
+
+fn anywhere<'a>(
+    link: &'a Link,
+    anchors: &'a [Anchor],
+    sky: &'a Sky<'a>,
+    free: &'a [bool],
+    habits: &Habits,
+) -> Search<'a> {
+    let floor_px = habits.floor_px;
+    Search { link, anchors, sky, free, window: None, reach_sigma: REACH_SIGMA, floor_px, pairs: PAIRS }
+}
+
+/// The least turn of a body, about its first joint if it has one, that lays two of its nodes (three where it
+/// hangs on nothing) on places of nodes again; infinite if there is none.
+pub fn likeness(mechanism: &Mechanism, habits: &Habits, body: usize) -> f64 {
+    let link = &mechanism.links[body];
+    let stars = drawn(link);
+    let anchors: Vec<Anchor> = mechanism
+        .hinges
+        .iter()
+        .filter(|h| h.body == body)
+        .take(1)
+        .map(|h| Anchor { local: h.local, place: h.local, sigma_px: h.sigma_px })
+        .collect();
+    let least = if anchors.is_empty() { 3 } else { 2 };
+    let free = vec![true; stars.len()];
+    anywhere(link, &anchors, &Sky::new(&stars), &free, habits)
+        .run()
+        .sightings
+        .iter()
+        .filter(|s| s.support >= least)
+        .filter(|s| s.picks.iter().enumerate().any(|(j, p)| p.is_some_and(|p| p != j)))
+        .map(|s| s.fit.pose.rotation.angle().abs())
+        .fold(f64::INFINITY, f64::min)
+}
+
+/// For each body the others that look the same: one has all the nodes of the other at the same distances. Single
+/// nodes always do.
+pub fn twins(mechanism: &Mechanism, habits: &Habits) -> Vec<Vec<usize>> {
+    let links = &mechanism.links;
+    let same = |a: usize, b: usize| {
+        let (small, large) = if links[a].nodes.len() < links[b].nodes.len() { (a, b) } else { (b, a) };
+        if links[small].nodes.len() == 1 {
+            return links[large].nodes.len() == 1;
+        }
+        let stars = drawn(&links[large]);
+        let free = vec![true; stars.len()];
+        let found = anywhere(&links[small], &[], &Sky::new(&stars), &free, habits).run();
+        found.sightings.first().is_some_and(|s| s.support == links[small].nodes.len())
+    };
+    (0..links.len()).map(|a| (0..links.len()).filter(|&b| b != a && same(a, b)).collect()).collect()
+}

@@ -1,0 +1,87 @@
+//! A frame's bodies as rows of nodes.
+//!
+//! Owns: [`observations`], [`partly`], [`Returns`]. Must not: decide anything.
+
+use super::engine::BodySeen;
+use super::mechanism::Mechanism;
+use super::{Observation, Status};
+use crate::detect::{Detection, Flags};
+
+/// The observations of one frame, in the order of the rig's nodes.
+pub fn observations(mechanism: &Mechanism, seen: &[BodySeen], sky: &[Detection]) -> Vec<Observation> {
+    let mut out = vec![Observation::MISSING; mechanism.nodes];
+    for (link, s) in mechanism.links.iter().zip(seen) {
+        for (j, &node) in link.nodes.iter().enumerate() {
+            if let Some(Some(d)) = s.picks.get(j) {
+                let d = &sky[*d];
+                // A marker half hidden may agree by chance; its own uncertainty is that of a whole one.
+                let doubt = d.flags.has(Flags::PARTIAL | Flags::MERGED | Flags::BORDER)
+                    || d.area_px < link.whole_px[j];
+                let sigma_px = d.sigma_px.hypot(link.excess_px as f32);
+                out[node] = Observation {
+                    x_px: d.x_px,
+                    y_px: d.y_px,
+                    sigma_px: if doubt { sigma_px.hypot(0.2) } else { sigma_px },
+                    area_px: d.area_px,
+                    status: Status::Seen,
+                };
+            } else if let Some(Some(b)) = s.beside.get(j) {
+                let d = &sky[b.detection];
+                // The blob only shows that the marker is there: its centre is where the body says. What is given
+                // as uncertainty is the blob's whole disagreement, so that no fit gains from it.
+                out[node] = Observation {
+                    x_px: b.place.x,
+                    y_px: b.place.y,
+                    sigma_px: d.sigma_px.hypot(b.off_px),
+                    area_px: d.area_px,
+                    status: Status::Seen,
+                };
+            } else if s.open.get(j) == Some(&true) {
+                out[node].status = Status::Ambiguous;
+            }
+        }
+    }
+    out
+}
+
+/// For each node of the rig whether only a part of it is seen.
+pub fn partly(mechanism: &Mechanism, seen: &[BodySeen]) -> Vec<bool> {
+    let mut out = vec![false; mechanism.nodes];
+    for (link, s) in mechanism.links.iter().zip(seen) {
+        for (&node, b) in link.nodes.iter().zip(&s.beside) {
+            out[node] = b.is_some();
+        }
+    }
+    out
+}
+
+/// Marks the first frame in which a node is seen again.
+#[derive(Debug, Clone)]
+pub struct Returns {
+    /// For each node whether it was seen before, and whether in the last frame.
+    past: Vec<(bool, bool)>,
+}
+
+impl Returns {
+    /// No frame yet.
+    pub fn new(nodes: usize) -> Self {
+        Self { past: vec![(false, false); nodes] }
+    }
+
+    /// Whether a node was seen in the last frame.
+    pub fn in_last(&self, node: usize) -> bool {
+        self.past[node].1
+    }
+
+    /// Marks one frame's nodes; frames must come in order.
+    pub fn mark(&mut self, row: &mut [Observation]) {
+        for (o, (ever, last)) in row.iter_mut().zip(&mut self.past) {
+            let now = o.status == Status::Seen;
+            if now && *ever && !*last {
+                o.status = Status::Reacquired;
+            }
+            *ever |= now;
+            *last = now;
+        }
+    }
+}
