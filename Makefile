@@ -51,9 +51,10 @@ check: build
 	.venv/bin/mypy
 	MYPYPATH=python .venv/bin/stubtest pydpend._tracker
 
-# Long: the eight scenes by twenty seeds, then the estimators' sweeps.
+# Long: the eight scenes by twenty seeds, real motion filmed, then the estimators' sweeps.
 validate: build
-	cargo run $(CARGO_FLAGS) --example validate -- --seeds 100..120
+	cargo run $(CARGO_FLAGS) --example validate -- --seeds 100..120 --write docs/validation.md
+	$(PY) -m tests.validate_kinematics
 	$(PY) -m tests.validate_resume
 	for sweep in angles default physics; do $(PY) -m tests.validate_$$sweep || exit 1; done
 	for part in energy inertias ratios slow all; do $(PY) -m tests.validate_damping $$part || exit 1; done
