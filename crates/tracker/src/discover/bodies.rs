@@ -42,6 +42,7 @@ pub fn link_of(points: Vec<Vector2<f64>>, slack_px: f64) -> Link {
         area_px: vec![(0.0, 0.0); points.len()],
         template: points.iter().map(|p| p - home).collect(),
         home,
+        excess_px: 0.0,
     }
 }
 
