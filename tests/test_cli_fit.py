@@ -79,9 +79,14 @@ def test_prediction_of_an_unseen_recording_is_its_noise(folder: Path) -> None:
 
 def test_bad_input_is_refused_in_words(folder: Path, tmp_path: Path) -> None:
     still = LinkAngles(np.arange(2000) / 500, np.zeros((2000, 2)), np.full((2000, 2), 1e-3))
+    good = measured(released(21, 6.0, 500.0), 21, 0.05, stated=False)
+    gaps = good.phi_rad.copy()
+    gaps[(np.arange(len(gaps)) % 150) > 20] = np.nan  # 0.26 s of 0.3 s not seen
+    holed = LinkAngles(good.t_s, gaps, np.full_like(gaps, np.nan))
     cases = {
         "no free decay": (written(still, tmp_path / "still.csv"), []),
         "at least one second": (folder / "21.csv", ["--stop", "0.7"]),
+        "fewer gaps": (written(holed, tmp_path / "gaps.csv"), []),
         "is not a coefficient": (folder / "21.csv", ["--laws", "mu_x"]),
         "Check the units": (folder / "21.csv", ["--model", str(_thousandfold(tmp_path))]),
         "goes up and down": (folder / "21.csv", ["--model", "published"]),

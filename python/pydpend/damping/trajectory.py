@@ -30,6 +30,8 @@ FLOOR = 0.05
 """Smallest slack, relative to what a segment's own samples determine its state to: information is then
 shared over 1/0.05 = 20 segments. Tighter, a segment near the upright answers to the rounding of its own integration."""
 HUBER = 3.5
+LOST = 1000.0
+"""Chi-square of loosely tied pieces beyond which nothing was found: wrong constants that are let through give tens."""
 
 
 @dataclass(frozen=True)
@@ -105,6 +107,15 @@ def fit_trajectory(
         progress=progress,
     )
     segments, start, zeros = settled.segments, settled.parameters, settled.zeros_rad
+    if settled.chi2 > LOST:
+        raise FitError(
+            fault(
+                ", ".join(r.angles.name for r in recordings),
+                f"no motion of this pendulum comes near the angles (chi-square {settled.chi2:.0f} even in pieces of "
+                f"{shooting.PIECE_S} s)",
+                "Give angles with fewer gaps, or check the model",
+            )
+        )
     if len(segments) < 4:
         raise FitError(
             fault(
