@@ -21,6 +21,8 @@ pub(crate) struct Centre {
     pub saturated: u32,
     /// The disc, if one was fitted.
     pub fitted: Option<Fitted>,
+    /// Whether brightness falls and rises again on the way along it.
+    pub parted: bool,
 }
 
 /// Heights around a blob, in the detector's scratch.
@@ -39,6 +41,13 @@ pub(crate) struct Window {
 /// What an unknown shape adds to the uncertainty of its weighted centre: about what edges that fall on pixels in
 /// different ways move the centre of a small sharp blob, px.
 const SHAPE_PX: f64 = 0.01;
+
+/// Longer over shorter axis from which a blob may be two beside each other.
+const LONG: f64 = 1.6;
+/// Height of a gap between two markers, as a part of the lower one's: blurred edges that touch fill half of it.
+const GAP: f64 = 0.6;
+/// Stretches along a blob.
+const STRETCHES: usize = 48;
 
 /// Pixels that the window reaches beyond the blob: two for the edge's foot, two for the background.
 const MARGIN: usize = 4;
@@ -213,6 +222,37 @@ impl Window {
         }
     }
 
+    /// Whether heights above the ground fall below [`GAP`] of those on both sides somewhere along the
+    /// blob's longer axis, near that axis.
+    fn parted(&self, blob: &Blob, ground: f64, sign: f64) -> bool {
+        let ([mx, my], [ax, ay]) = (blob.mean(), blob.direction());
+        // Of a bar, 0.92 of its length, so that what comes behind its ends is left out; 0.55 of its width.
+        let [long, short] = blob.axes().map(|v| 1.6 * v.sqrt());
+        let mut sums = [[0.0; 2]; STRETCHES];
+        for (j, row) in self.rows().enumerate() {
+            for (i, &v) in row.iter().enumerate() {
+                let (dx, dy) = ((self.x0 + i) as f64 - mx, (self.y0 + j) as f64 - my);
+                let along = ((dx * ax + dy * ay) / long + 1.0) / 2.0 * STRETCHES as f64;
+                if (dx * ay - dy * ax).abs() < 0.6 * short && (0.0..STRETCHES as f64).contains(&along) {
+                    let s = &mut sums[along as usize];
+                    s[0] += sign * (f64::from(v) - ground);
+                    s[1] += 1.0;
+                }
+            }
+        }
+        let (mut highest, mut lowest_since) = (0.0f64, f64::INFINITY);
+        for h in sums.iter().filter(|s| s[1] > 0.0).map(|s| (s[0] / s[1]).max(0.0)) {
+            if lowest_since < GAP * highest.min(h) {
+                return true;
+            }
+            if h > highest {
+                (highest, lowest_since) = (h, f64::INFINITY);
+            }
+            lowest_since = lowest_since.min(h);
+        }
+        false
+    }
+
     /// The centre by intensity against the local background, over a disc that reaches two pixels beyond the
     /// blob; in three rounds, each about the centre of the one before.
     pub fn weighted(&mut self, pixels: &Pixels<'_>, spans: &Spans, blob: &Blob, levels: &Levels) -> Centre {
@@ -274,6 +314,7 @@ impl Window {
             result.sigma_px = (q.sqrt() / s).hypot(SHAPE_PX);
         }
         self.ground = ground;
+        result.parted = blob.elongation() > LONG && self.parted(blob, threshold - sign * levels.height, sign);
         result.x_px = cx;
         result.y_px = cy;
         result

@@ -270,6 +270,7 @@ fn centre_of(f: &Fitted) -> Centre {
         peak: f.height.abs(),
         saturated: f.saturated,
         fitted: Some(*f),
+        parted: false,
     }
 }
 

@@ -22,6 +22,9 @@ pub(crate) fn judge(blob: &Blob, centre: &Centre, levels: &Levels) -> Flags {
     if blob.border {
         flags |= Flags::BORDER;
     }
+    if centre.parted {
+        flags |= Flags::MERGED;
+    }
     let area = blob.area as f64;
     if let (Some(whole), Some(marker)) = (levels.marker_area_px, levels.marker) {
         // Markers of one size: the spread of radii counts twice in the area; pixels on the edge come and go.

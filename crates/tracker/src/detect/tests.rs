@@ -471,3 +471,40 @@ fn opencv_has_no_threads_of_its_own_inside_workers() {
         }
     });
 }
+
+#[test]
+fn two_bars_that_touch_are_flagged_and_one_is_not() {
+    // Bars 10 by 36 px on a dark ground, as on a ruler; the gap of the pair is blurred to 0.45 of their height.
+    let frame = |index: u64, gap: f64| {
+        let (w, h) = (200usize, 160usize);
+        let mut bytes = vec![20u8; w * h];
+        let mut bar = |x: usize, y: usize, height: usize| {
+            (y..y + height).for_each(|y| bytes[y * w + x..y * w + x + 10].fill(220));
+        };
+        for k in 0..4 {
+            bar(30 + 30 * k + index as usize, 20, 36);
+        }
+        bar(80, 80, 70);
+        for y in 114..116 {
+            bytes[y * w + 80..y * w + 90].fill((20.0 + 200.0 * gap) as u8);
+        }
+        Frame {
+            index,
+            ticks: index as i64,
+            width: w as u32,
+            height: h as u32,
+            stride: w,
+            format: PixelFormat::Gray8,
+            depth_bits: 8,
+            plane: Some(Box::new(bytes)),
+        }
+    };
+    let settings = DetectSettings { threshold: Threshold::Raw(100.0), ..Default::default() };
+    let levels = learn(&(0..4).map(|i| frame(i, 1.0)).collect::<Vec<_>>(), &settings);
+    for (gap, merged) in [(0.45, true), (1.0, false)] {
+        let found = detect(&frame(1, gap), &levels, &settings);
+        assert_eq!(found.len(), 5, "{found:?}");
+        assert_eq!(found[4].flags.has(Flags::MERGED), merged, "{gap}: {:?}", found[4]);
+        assert!(found[..4].iter().all(|d| !d.flags.has(Flags::MERGED)), "{found:?}");
+    }
+}
