@@ -123,7 +123,7 @@ fn not_at_rest(rig: &Rig, rows: &Rows) -> Option<String> {
 mod tests {
     use super::*;
     use crate::film::Scene;
-    use crate::track::bed::{Bed, QUIET, scene, tumble};
+    use crate::track::tests::bed::{Bed, QUIET, scene, tumble};
 
     fn advice(scene: &Scene) -> Vec<String> {
         let bed = Bed::new(scene, QUIET);

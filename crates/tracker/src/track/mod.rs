@@ -20,13 +20,9 @@ pub mod signature;
 pub mod tracker;
 
 #[cfg(test)]
-pub(crate) mod bed;
-#[cfg(test)]
 mod swing;
 #[cfg(test)]
-mod tests;
-#[cfg(test)]
-mod worst;
+pub(crate) mod tests;
 
 pub use recording::{TrackSummary, track_recording};
 pub use tracker::Tracker;

@@ -1,6 +1,9 @@
 //! What holds for any sequence of detections, however senseless: nothing is named twice, nothing is used twice,
 //! every frame has its row.
 
+pub(crate) mod bed;
+mod worst;
+
 use proptest::collection::vec;
 use proptest::prelude::*;
 

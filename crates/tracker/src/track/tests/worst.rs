@@ -1,9 +1,9 @@
 //! The worst cases, made on purpose: names stay open where nothing decides, and are never wrong.
 
-use super::Status;
 use super::bed::{Bed, Faults, QUIET, hide, scene, tumble};
 use crate::film::scene::{Distractor, LinkMotion};
 use crate::film::{MotionTable, Scene, preset};
+use crate::track::Status;
 
 const PIVOT: [f64; 2] = [360.0, 360.0];
 const SEEDS: std::ops::Range<u64> = 2000..2004;

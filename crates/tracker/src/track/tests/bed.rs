@@ -4,7 +4,6 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
 
-use super::{Status, track_recording};
 use crate::detect::{Detection, Flags};
 use crate::discover::{Discovery, discover};
 use crate::film::scene::{Hidden, Link, LinkMotion, Marker};
@@ -13,6 +12,7 @@ use crate::rig::Rig;
 use crate::score::{LIMIT_PX, Score, Tracked, score};
 use crate::store::{DetectionStore, FrameStamp};
 use crate::table::Rows;
+use crate::track::{Status, track_recording};
 
 /// A scene that was filmed and detected.
 pub struct Bed {
