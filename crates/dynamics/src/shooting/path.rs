@@ -183,7 +183,7 @@ pub fn follow<S: Real>(
     }
     while t < end_s {
         let speed = k.x[2].value().abs().max(k.x[3].value().abs()) + SWING_RATE;
-        if !(speed < FASTEST) {
+        if speed.is_nan() || speed >= FASTEST {
             k.x = [S::constant(f64::NAN); 4];
             break;
         }
