@@ -19,7 +19,7 @@ use rayon::prelude::*;
 use tracker::detect::{DetectSettings, Detection, Detector, Levels};
 use tracker::film::scene::{Link, Marker};
 use tracker::film::{Film, Scene, WriteOptions, preset, write};
-use tracker::frame::{Frame, FrameSource};
+use tracker::frame::Frame;
 use tracker::source::{OpenOptions, open};
 
 const SIZE: [u32; 2] = [1280, 1024];

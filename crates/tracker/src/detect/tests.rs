@@ -374,7 +374,7 @@ fn packed_rows_give_the_same_bits_as_unpacked_ones() {
             stride: 0,
             format,
             depth_bits: bits as u32,
-            plane: Some(Box::new(pixels::pack(&values, bits))),
+            plane: Some(Box::new(pack(&values, bits))),
             ..scene(9).frame(9, 16)
         };
         let found = detect(&packed, &levels, &settings);
@@ -434,7 +434,7 @@ fn area_limits_come_from_the_recording_and_can_be_given() {
 
 #[test]
 fn a_lens_moves_centres_and_leaves_the_pixels() {
-    let lens = crate::rig::Lens {
+    let lens = Lens {
         camera_matrix: [[300.0, 0.0, 84.0], [0.0, 300.0, 84.0], [0.0, 0.0, 1.0]],
         distortion: vec![-0.3, 0.1, 0.0, 0.0],
     };
