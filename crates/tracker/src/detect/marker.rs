@@ -119,9 +119,11 @@ pub(crate) fn learn(
     if inside.len() >= 5 {
         let rise = quantile(&heights, 0.5);
         // For dark markers the ground is the brighter side.
+        let within = quantile(&inside, 0.5);
         let (dark, bright) = match side {
-            Side::Bright => (noise.read, quantile(&inside, 0.5)),
-            Side::Dark => (quantile(&inside, 0.5), noise.read),
+            // Light only adds noise, so what is more around a marker than inside is no noise: the edge of its link.
+            Side::Bright => (noise.read.min(within), within),
+            Side::Dark => (within, noise.read),
         };
         noise.read = dark.max(1.0 / 12.0);
         noise.shot = ((bright - dark) / rise.max(1.0)).max(0.0);
