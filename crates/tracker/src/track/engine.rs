@@ -175,13 +175,12 @@ impl Engine {
                 continue;
             }
             let anchors = self.anchors(b, &seen);
-            let waiting = std::mem::take(&mut undecided[b]);
-            if self.twins[b].iter().any(|&o| seen[o].fit.is_none()) {
-                // Whatever it does, it may be the other.
-                self.tentative[b].clear();
-                continue;
-            }
-            if let Some(s) = self.follow(b, time, sky, &free, &anchors, waiting) {
+            let mut waiting = std::mem::take(&mut undecided[b]);
+            // Whatever it does, it may be the other.
+            waiting.retain(|(s, _)| !self.may_be_twin(b, time, sky, s, &seen));
+            if let Some(s) = self.follow(b, time, sky, &free, &anchors, waiting)
+                && !self.may_be_twin(b, time, sky, &s, &seen)
+            {
                 for d in s.picks.iter().flatten() {
                     free[*d] = false;
                 }
@@ -448,7 +447,24 @@ impl Engine {
                 .run()
                 .sightings
                 .iter()
-                .any(|t| t.support >= s.support)
+                .any(|t| t.support >= s.support && self.hangs(o, t, known))
+        })
+    }
+
+    /// Whether a body seen so could hang where it must: a neighbour that was not found itself, but whose other
+    /// joint's place is known, still has its own length.
+    fn hangs(&self, b: usize, s: &Sighting, known: &[BodySeen]) -> bool {
+        self.mechanism.hinges.iter().filter(|h| h.body == b).all(|h| {
+            let Holder::Body(o, there) = h.holder else { return true };
+            if known[o].fit.is_some() {
+                return true;
+            }
+            let here = place(&s.fit.pose, h.local);
+            self.anchors(o, known).iter().all(|a| {
+                let sigma_px = h.sigma_px.hypot(a.sigma_px).hypot(s.fit.sigma_at(h.local));
+                let length = (there - a.local).norm();
+                ((here - a.place).norm() - length).abs() < REACH_SIGMA * sigma_px.max(self.habits.floor_px)
+            })
         })
     }
 
