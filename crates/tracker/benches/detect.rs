@@ -1,5 +1,5 @@
 //! Detection against a plain maximum over the same bytes and against OpenCV's threshold, `findContours` and
-//! `moments`, one thread each: `cargo bench -p tracker --bench detect`.
+//! `moments`, one thread each: `cargo bench --workspace --locked --bench detect`.
 //!
 //! Sixteen frames of 1280 x 1024 8-bit pixels in turn, 9, 100 and 1000 markers; then a whole Photron recording in
 //! the page cache against a plain parallel maximum over its map. Ratios of medians count; times are the machine's.
