@@ -247,6 +247,20 @@ def test_zero_from_rest_at_the_start_and_not_from_the_hold_upside_down() -> None
     np.testing.assert_array_less(np.abs(error), 5 * np.array(found.meta["zero"]["sigma_rad"]))
 
 
+def test_zero_from_rest_at_the_end_only() -> None:
+    t, phi = rig.drop(1.0, 500, 15, rest_s=1.0)
+    # Backwards in time: it moves first and is let down to hang at last.
+    phi = phi[::-1].copy()
+    nodes = rig.film(t, phi, 15, reference_rad=(2.0, -1.0))
+    found = angles(nodes)
+    (rest,) = found.meta["zero"]["rests"]
+    assert rest["hanging"]
+    # Whole turns common to a recording are a choice of its first frame.
+    turns = 2 * np.pi * np.rint((found.phi_rad - phi)[0] / (2 * np.pi))
+    error = (found.phi_rad - turns - phi).mean(axis=0)
+    np.testing.assert_array_less(np.abs(error), 5 * np.array(found.meta["zero"]["sigma_rad"]))
+
+
 def test_zero_given_and_from_a_reference_recording() -> None:
     t, phi = tumbling(1500, 13)
     nodes = rig.film(t, phi, 13, reference_rad=(0.4, -0.7))
