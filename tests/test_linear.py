@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from pydpend.errors import SimulationError
 from pydpend.linear import lyapunov, modes, poincare
 from pydpend.model import Damping, Model, derived
 from pydpend.plots import physics
+from pydpend.plots.beside import Pictures, beside
 from pydpend.simulate import simulate
 
 Array = npt.NDArray[np.float64]
@@ -161,3 +163,35 @@ def test_figures_and_animation(tmp_path: Path) -> None:
     assert (tmp_path / "p.mp4").read_bytes()[4:8] == b"ftyp"
     with pytest.raises(SimulationError, match="is not a film"):
         physics.animate(run, model, tmp_path / "p.avi")
+    with pytest.raises(SimulationError, match="could not write it"):
+        physics.animate(run, model, tmp_path / "none" / "p.mp4", fps=5)
+
+
+def pictures_in(film: Path) -> Array:
+    """Gray values of its pictures, (K, H, W), of a film 800 by 640."""
+    words = ["ffmpeg", "-v", "error", "-i", str(film), "-f", "rawvideo", "-pix_fmt", "gray", "-"]
+    raw = subprocess.run(words, capture_output=True, check=True).stdout
+    return np.frombuffer(raw, dtype=np.uint8).reshape(-1, 640, 800).astype(np.float64)
+
+
+def test_the_recording_stands_upright_beside_its_simulation_at_its_time(tmp_path: Path) -> None:
+    model = derived("A")
+    run = simulate(model, Damping(), [2.0, 1.0, 0, 0], np.linspace(0, 1, 101))
+    # Ten pictures, one each 0.1 s: the upper half is white in the first five, the lower half in the others.
+    half = "geq=lum='255*eq(lt(Y,H/2),lt(N,5))':cb=128:cr=128"
+    source = f"nullsrc=size=64x48:rate=10:duration=1,{half}"
+    words = ["ffmpeg", "-v", "error", "-f", "lavfi", "-i", source, "-pix_fmt", "yuv420p"]
+    subprocess.run([*words, str(tmp_path / "film.mp4")], check=True)
+    pictures = Pictures(tmp_path / "film.mp4", (64, 48), np.arange(10) / 10)
+    for name in ("b.mp4", "b.gif"):
+        assert beside(run, run, model, tmp_path / name, pictures=pictures, fps=10, speed=1.0) == 10
+        shown = pictures_in(tmp_path / name)
+        # Well inside the left axes, where the picture 4:3 is, above and below its middle (200 px from the top).
+        upper, lower = (
+            shown[:, 120:160, 180:320].mean(axis=(1, 2)),
+            shown[:, 240:280, 180:320].mean(axis=(1, 2)),
+        )
+        assert (upper[:5] > 200).all()
+        assert (upper[5:] < 55).all()
+        assert (lower[:5] < 55).all()
+        assert (lower[5:] > 200).all()

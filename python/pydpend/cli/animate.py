@@ -1,8 +1,8 @@
 """Films a recording beside the simulation of the pendulum that was fitted to it.
 
 Left the film with what was found (or its angles as links, where there is no film), right the motion of the fitted
-equations from the recording's own state at --start, below the angles of both. A double pendulum is chaotic: the two
-part after some seconds however good the fit.
+equations from the state at --start that fits the second after it best, below the angles of both. A double pendulum is
+chaotic: while it tumbles the two part after a second or some, however good the fit.
 
   pydpend animate run/ -o beside.mp4
   pydpend animate run/ --start 1.5 --length 2 --speed 0.1 -o beside.gif
@@ -38,7 +38,6 @@ def run(args: argparse.Namespace) -> int:
     from pydpend.plots.beside import Pictures, beside
     from pydpend.plots.folder import chosen
     from pydpend.simulate import simulate
-    from pydpend.states import states
 
     r = chosen(args.run_folder, args.recording)
     stored = load_fit(r.run / "fit")
@@ -56,13 +55,12 @@ def run(args: argparse.Namespace) -> int:
         )
     if not args.length > 0:
         raise ArgumentError(fault("--length", f"{args.length:g} s is not above 0"))
-    # The smoother needs no more than the surroundings of the start.
-    state = states(angles.between(start - 1.0, start + 1.0))
-    row = int(np.argmin(np.abs(state.t_s - start)))
     until = min(float(angles.t_s[-1]), start + args.length)
-    times = np.arange(float(state.t_s[row]), until, 1e-3)
+    # One state fits a second of a motion well, and more of a chaotic one hardly.
+    state = stored.state(angles, start, min(1.0, until - start))
+    times = np.arange(start, until, 1e-3)
     damping = Damping(**{k: c["value"] for k, c in fit["coefficients"].items()})
-    motion = simulate(model, damping, [*state.phi_rad[row], *state.w_rad_s[row]], times)
+    motion = simulate(model, damping, state, times)
     pictures = None
     about = r.here / "overlay.json"
     if about.exists():

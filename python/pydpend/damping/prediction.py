@@ -153,6 +153,37 @@ def predict(
     )
 
 
+def initial_state(track: Track, parameters: dict[str, float], start_s: float, length_s: float) -> Floats:
+    """State (phi1, phi2, w1, w2) at ``start_s`` from which one motion fits the ``length_s`` that follow best.
+
+    Raises FitError where they have a gap.
+    """
+    base = shooting.cut([track], [(start_s, start_s + length_s)], PIECE_S)
+    size = max(1, len(base))
+    chain = base.grouped(size)
+    if (
+        len(chain) == 0
+        or chain.times_s[0, 0] > start_s + 1e-9
+        or chain.times_s[-1, 1] < start_s + 0.5 * length_s
+    ):
+        raise FitError(
+            fault("--start", f"{length_s:g} s from {start_s:g} s on have a gap", "Choose another start")
+        )
+    loose = shooting.solve([track], chain, parameters, np.zeros((1, 2)), slack=LOOSE, learned=False)
+    tied = shooting.solve(
+        [track],
+        loose.segments,
+        parameters,
+        loose.zeros_rad,
+        zeros=False,
+        slack=NO_SLACK,
+        learned=False,
+        huber=1e3,
+    )
+    state: Floats = tied.segments.merged(size).states[0]
+    return state
+
+
 @dataclass(frozen=True)
 class _Errors:
     """Squared errors per window, deg^2, and counts, (n, 2)."""

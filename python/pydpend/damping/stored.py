@@ -7,9 +7,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from pydpend.angles import LinkAngles
-from pydpend.damping.maps import Maps
-from pydpend.damping.prediction import WINDOWS_S, Prediction, predict
+from pydpend.damping.maps import Maps, corrected
+from pydpend.damping.prediction import WINDOWS_S, Prediction, initial_state, predict
 from pydpend.damping.result import DampingFit
 from pydpend.damping.trajectory import prepare
 from pydpend.errors import FitError, fault
@@ -58,6 +61,12 @@ class StoredFit:
         """Predicts a recording's free decay. Raises FitError when it has none."""
         recording = prepare(angles, self.model(), start_s, stop_s)
         return predict(recording, self.parameters, windows_s, self.maps)
+
+    def state(self, angles: LinkAngles, start_s: float, length_s: float) -> NDArray[np.float64]:
+        """`initial_state` of a recording's motion with this fit. Raises FitError where it cannot be told."""
+        recording = prepare(angles, self.model(), start_s, float(angles.t_s[-1]))
+        track = recording.track if self.maps is None else corrected([recording.track], self.maps)[0]
+        return initial_state(track, self.parameters, start_s, length_s)
 
 
 def load_fit(path: str | Path) -> StoredFit:

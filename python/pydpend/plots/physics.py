@@ -8,13 +8,11 @@ from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
-from matplotlib.animation import FFMpegWriter, FuncAnimation, PillowWriter
-from matplotlib.artist import Artist
 from matplotlib.figure import Figure
 
-from pydpend.errors import SimulationError, fault
 from pydpend.linear import Section
 from pydpend.model import Model
+from pydpend.plots.moving import check_film, pictures_of, write_film
 from pydpend.plots.style import COLORS, new_figure, style
 from pydpend.simulate import LAWS, Simulation
 
@@ -122,17 +120,7 @@ def animate(motion: Motion, model: Model, path: str | Path, *, fps: float = 25.0
     rate that is not positive.
     """
     path = Path(path)
-    if path.suffix.lower() not in (".gif", ".mp4"):
-        raise SimulationError(
-            fault(str(path), f"{path.suffix or 'no ending'} is not a film", "Use .gif or .mp4")
-        )
-    if not (fps > 0 and speed > 0):
-        raise SimulationError(fault("animate", f"fps {fps}, speed {speed}", "Both must be positive"))
-    writer = PillowWriter(fps=round(fps)) if path.suffix.lower() == ".gif" else FFMpegWriter(fps=round(fps))
-    if path.suffix.lower() == ".mp4" and not FFMpegWriter.isAvailable():
-        raise SimulationError(
-            fault(str(path), "the program ffmpeg is not there", "Install it or write a .gif")
-        )
+    check_film(path, fps, speed)
     times = np.arange(motion.t_s[0], motion.t_s[-1], speed / fps)
     phi = np.stack([np.interp(times, motion.t_s, motion.phi_rad[:, k]) for k in range(2)], axis=1)
     length = model.lower_outer_m if model.lower_outer_m > 0 else model.l1_m
@@ -150,12 +138,12 @@ def animate(motion: Motion, model: Model, path: str | Path, *, fps: float = 25.0
         (trace,) = ax.plot([], [], color=COLORS[2], linewidth=0.6)
         title = ax.set_title("")
 
-        def draw(i: int) -> tuple[Artist, ...]:
+        def draw(i: int) -> None:
             upper.set_data([0.0, elbow[i, 0]], [0.0, elbow[i, 1]])
             lower.set_data([elbow[i, 0], end[i, 0]], [elbow[i, 1], end[i, 1]])
             since = max(0, i - round(fps))
             trace.set_data(end[since : i + 1, 0], end[since : i + 1, 1])
             title.set_text(f"{times[i]:.2f} s")
-            return upper, lower, trace, title
 
-        FuncAnimation(figure, draw, frames=len(times)).save(str(path), writer=writer)
+        title.set_text("0.00 s")  # Its height counts when the figure is laid out.
+        write_film(path, fps, pictures_of(figure, [upper, lower, trace, title], draw, len(times)))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import base64
 import json
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from importlib.resources import files
 from typing import Any
 
@@ -17,48 +17,50 @@ import numpy as np
 from numpy.typing import NDArray
 
 
+class _Block:
+    @property
+    def kind(self) -> str:
+        """How the template knows it."""
+        return type(self).__name__
+
+
 @dataclass(frozen=True)
-class Text:
+class Text(_Block):
     """A paragraph."""
 
     text: str
     quiet: bool = False
-    kind: str = field(default="text", init=False)
 
 
 @dataclass(frozen=True)
-class Heading:
+class Heading(_Block):
     """A heading within a section."""
 
     text: str
-    kind: str = field(default="heading", init=False)
 
 
 @dataclass(frozen=True)
-class Listing:
+class Listing(_Block):
     """A list of sentences."""
 
     entries: tuple[str, ...]
-    kind: str = field(default="list", init=False)
 
 
 @dataclass(frozen=True)
-class Code:
+class Code(_Block):
     """Text to be copied."""
 
     text: str
-    kind: str = field(default="code", init=False)
 
 
 @dataclass(frozen=True)
-class Table:
+class Table(_Block):
     """Cells as text; ``numbers`` are the columns set to the right."""
 
     header: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     caption: str = ""
     numbers: frozenset[int] = frozenset()
-    kind: str = field(default="table", init=False)
 
     def is_number(self, column: int) -> bool:
         """Whether the column holds numbers."""
@@ -66,24 +68,22 @@ class Table:
 
 
 @dataclass(frozen=True)
-class Figure:
+class Figure(_Block):
     """A drawing made by pydpend, as SVG."""
 
     svg: str
     caption: str
-    kind: str = field(default="figure", init=False)
 
 
 @dataclass(frozen=True)
-class Reset:
+class Reset(_Block):
     """How to move in the charts of a group, and the way back."""
 
     group: str
-    kind: str = field(default="reset", init=False)
 
 
 @dataclass(frozen=True)
-class Film:
+class Film(_Block):
     """A film in the page. Frame k shows the recording at ``times_s[k]``; its own rate is ``rate_hz``."""
 
     id: str
@@ -92,7 +92,6 @@ class Film:
     times_s: NDArray[np.float64]
     rate_hz: float
     caption: str
-    kind: str = field(default="film", init=False)
 
     @property
     def base64(self) -> str:
@@ -117,7 +116,7 @@ class Series:
 
 
 @dataclass(frozen=True)
-class Chart:
+class Chart(_Block):
     """Curves over a common x that can be zoomed; charts of a ``group`` move together."""
 
     id: str
@@ -129,11 +128,10 @@ class Chart:
     y_label: str = ""
     height: int = 240
     key: tuple[tuple[str, str], ...] = ()
-    kind: str = field(default="chart", init=False)
 
 
 @dataclass(frozen=True)
-class StatusMap:
+class StatusMap(_Block):
     """What was known of each node over time. ``runs[n]``: (status code, from s, to s).
 
     ``residual_px[n]``: distance of the node from its place in the body's shape at ``t_s``; drawn in the node's row,
@@ -155,7 +153,6 @@ class StatusMap:
         ("ambiguous", "--s1"),
         ("missing", "--line"),
     )
-    kind: str = field(default="chart", init=False)
 
 
 Block = Text | Heading | Listing | Code | Table | Figure | Reset | Film | Chart | StatusMap
