@@ -48,6 +48,12 @@ def test_a_fit_of_two_recordings_writes_everything(folder: Path) -> None:
     names = {p.name for p in out.iterdir()}
     assert {"fit.json", "coefficients.csv", "trials.json", "trials.png", "shares.png"} <= names
     assert {"energy-1.csv", "energy-2.csv", "energy-1.png", "energy-2.png"} <= names
+    left = np.genfromtxt(out / "residuals-2.csv", delimiter=",", names=True)
+    assert left.dtype.names == (
+        "time_s", "phi1_residual_rad", "phi1_sigma_rad", "phi2_residual_rad", "phi2_sigma_rad"
+    )  # fmt: skip
+    # 2500 samples of 0.05 deg noise: their RMS scatters by 1/sqrt(2*2500) = 1.4 %; four of these
+    assert np.degrees(left["phi2_residual_rad"].std()) == pytest.approx(0.05, rel=0.06)
     fit = json.loads((out / "fit.json").read_text())
     # 12000 angles: chi-square scatters by 0.013; four of these
     assert abs(fit["chi2"] - 1) < 0.052

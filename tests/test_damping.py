@@ -59,7 +59,8 @@ def test_lbfgsb_agrees_when_tight_and_stops_early_when_not() -> None:
     tight, _ = energy.fit_lbfgsb([profile])
     loose, _ = energy.fit_lbfgsb([profile], tight=False)
     assert np.abs(tight / best - 1).max() < 1e-6
-    assert np.abs(loose / best - 1).max() > 1e-2
+    # Where it stops hinges on rounding: between 0.7 and 35 % off was seen.
+    assert np.abs(loose / best - 1).max() > 1e-3
 
 
 def test_trajectory_fit_finds_truth_within_its_errors(short_fit: DampingFit) -> None:

@@ -91,6 +91,8 @@ def about(name: str) -> str:
         return "energy of the motion and what each law takes out" + (
             " (Fig. 19)" if last.endswith(".png") else ", J"
         )
+    if last.startswith("residuals"):
+        return "measured minus fitted angle of each link, and its standard deviation, rad"
     return ABOUT.get(last, "")
 
 

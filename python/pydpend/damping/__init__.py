@@ -6,7 +6,7 @@ from __future__ import annotations
 from pydpend.damping.fit import fit_damping
 from pydpend.damping.maps import Maps
 from pydpend.damping.prediction import Prediction, Window, predict
-from pydpend.damping.result import DampingFit, EnergyCurve, Estimate, Identifiability
+from pydpend.damping.result import DampingFit, EnergyCurve, Estimate, Identifiability, Residuals
 
 __all__ = [
     "DampingFit",
@@ -15,6 +15,7 @@ __all__ = [
     "Identifiability",
     "Maps",
     "Prediction",
+    "Residuals",
     "Window",
     "fit_damping",
     "predict",

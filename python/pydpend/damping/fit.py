@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from pydpend.angles import LinkAngles
 from pydpend.coefficients import JOINT_OF, coefficients, parameters, ratios_of, unit
+from pydpend.damping import shooting
 from pydpend.damping.plausible import modes_hz
 from pydpend.damping.prediction import held_out
 from pydpend.damping.profile import fit_energy
@@ -151,6 +152,9 @@ def _energy(
             for r, e0, zeros in zip(recordings, fit.e0_j, smoothed.zeros_rad, strict=True)
         ),
         energy=curves,
+        residuals=shooting.residuals_of(
+            tracks, shooting.trace(tracks, smoothed.segments, parameters(model) | values), smoothed.zeros_rad
+        ),
         notes=(
             *(f"{r.angles.name}: {r.decay.message}" for r in recordings),
             f"acceleration noise raises |N| by {100 * excess[0]:.1g} and {100 * excess[1]:.1g} % on average; "

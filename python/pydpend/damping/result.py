@@ -40,6 +40,18 @@ class EnergyCurve:
 
 
 @dataclass(frozen=True)
+class Residuals:
+    """What is left of one recording's angles when the fitted motion, its zeros and angle maps are taken off."""
+
+    t_s: Floats
+    """(T,), the samples that were fitted."""
+    residual_rad: Floats
+    """(T, links), measured minus fitted; NaN where not seen."""
+    sigma_rad: Floats
+    """(T, links), the standard deviation each was weighted by."""
+
+
+@dataclass(frozen=True)
 class Identifiability:
     """What the data determine and what they do not."""
 
@@ -79,6 +91,8 @@ class DampingFit:
     inputs: tuple[dict[str, Any], ...]
     """Each recording: name, the span used, samples, noise, angle zeros."""
     energy: tuple[EnergyCurve, ...] = field(default=(), repr=False)
+    residuals: tuple[Residuals, ...] = field(default=(), repr=False)
+    """Of each recording; ``residuals.csv`` in the fit's folder."""
     prediction: dict[str, dict[str, Any]] = field(default_factory=dict)
     """Window in s: RMS per link in degrees of data the fit did not see."""
     chi2_slack: float = math.nan

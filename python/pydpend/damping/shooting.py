@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pydpend import _tracker
+from pydpend.damping.result import Residuals
 from pydpend.errors import FitError, fault
 
 Floats = NDArray[np.float64]
@@ -280,3 +281,14 @@ def residuals(tracks: Sequence[Track], path: Trace, zeros_rad: Floats) -> Floats
         here = path.recording == r
         out[here] = phi[path.sample[here]] - (path.state[here, :2] + zeros_rad[r])[:, : phi.shape[1]]
     return out
+
+
+def residuals_of(tracks: Sequence[Track], path: Trace, zeros_rad: Floats) -> tuple[Residuals, ...]:
+    """The same by recording, with the times and the standard deviations they were weighted by."""
+    left = residuals(tracks, path, zeros_rad)
+    out = []
+    for r, (t, _, sigma) in enumerate(tracks):
+        here = path.recording == r
+        samples = path.sample[here]
+        out.append(Residuals(t[samples], left[here], sigma[samples]))
+    return tuple(out)

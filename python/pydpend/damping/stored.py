@@ -18,6 +18,8 @@ from pydpend.damping.trajectory import prepare
 from pydpend.errors import FitError, fault
 from pydpend.model import Model
 
+Floats = NDArray[np.float64]
+
 
 @dataclass(frozen=True)
 class StoredFit:
@@ -104,7 +106,7 @@ def write_json(path: Path, content: dict[str, object]) -> None:
 
 
 def write_fit(fit: DampingFit, folder: Path) -> None:
-    """Writes ``fit.json``, ``coefficients.csv`` and an energy table per recording into a folder."""
+    """Writes ``fit.json``, ``coefficients.csv``, and a table of energies and one of residuals per recording."""
     write_json(folder / "fit.json", fit.to_json())
     rows = ["name,value,sigma,unit"]
     for name, e in (*fit.coefficients.items(), *((f"{k}/psi", e) for k, e in fit.ratios.items())):
@@ -113,10 +115,19 @@ def write_fit(fit: DampingFit, folder: Path) -> None:
     for k, curve in enumerate(fit.energy):
         head = ["time_s", "energy_j", "model_j", *(f"{n}_j" for n in fit.coefficients)]
         table = [curve.t_s, curve.energy_j, curve.model_j, *curve.works_j.T]
-        lines = [",".join(head)]
-        lines += [",".join(f"{v:.9g}" for v in row) for row in zip(*table, strict=True)]
-        name = f"energy{recording_suffix(fit, k)}.csv"
-        (folder / name).write_text("\n".join(lines) + "\n", encoding="utf-8")
+        _write_table(folder / f"energy{recording_suffix(fit, k)}.csv", head, table)
+    for k, left in enumerate(fit.residuals):
+        head, table = ["time_s"], [left.t_s]
+        for j in range(left.residual_rad.shape[1]):
+            head += [f"phi{j + 1}_residual_rad", f"phi{j + 1}_sigma_rad"]
+            table += [left.residual_rad[:, j], left.sigma_rad[:, j]]
+        _write_table(folder / f"residuals{recording_suffix(fit, k)}.csv", head, table)
+
+
+def _write_table(path: Path, head: Sequence[str], columns: Sequence[Floats]) -> None:
+    """A CSV table; nan where there is no number."""
+    rows = np.column_stack(list(columns))
+    np.savetxt(path, rows, fmt="%.9g", delimiter=",", header=",".join(head), comments="")
 
 
 def recording_suffix(fit: DampingFit, recording: int) -> str:

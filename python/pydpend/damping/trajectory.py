@@ -260,6 +260,7 @@ def _judge(
         covariance=cov,
         inputs=tuple(_input(r, fitted, solution.zeros_rad[k]) for k, r in enumerate(recordings)),
         energy=tuple(energy_curve(tracks, path, names, values, fitted, k) for k in range(len(recordings))),
+        residuals=shooting.residuals_of(tracks, path, solution.zeros_rad),
         chi2_slack=solution.chi2,
         slack={
             f"{quantity}": float(s)
