@@ -11,11 +11,15 @@ from playwright.sync_api import Browser, Page
 
 
 @contextmanager
-def open_report(browser: Browser, html: Path, *, scheme: str = "light", width: int = 1100) -> Iterator[Page]:
+def open_report(
+    browser: Browser, html: Path, *, scheme: str = "light", width: int = 1100, touch: bool = False
+) -> Iterator[Page]:
     """The page, ready. At the end no console error, no dialog and no request to anywhere has been seen."""
     problems: list[str] = []
     context = browser.new_context(
-        viewport={"width": width, "height": 900}, color_scheme="dark" if scheme == "dark" else "light"
+        viewport={"width": width, "height": 900},
+        color_scheme="dark" if scheme == "dark" else "light",
+        has_touch=touch,
     )
     page = context.new_page()
     page.on("console", lambda m: problems.append(m.text) if m.type in ("error", "warning") else None)

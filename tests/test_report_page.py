@@ -164,6 +164,35 @@ def test_zoom_is_shared_and_undone(opened: Page) -> None:
     until(opened, f"{ranges}.every(r => r[1] - r[0] > 2.9)")
 
 
+def test_two_fingers_zoom_and_one_moves(browser: Browser, html: Path) -> None:
+    with open_report(browser, html, width=390, touch=True) as page:
+        over = page.locator("#two .u-over")
+        over.scroll_into_view_if_needed()
+        box = over.bounding_box()
+        assert box is not None
+        fingers = page.context.new_cdp_session(page)
+
+        def touch(kind: str, *shares: float) -> None:
+            points = [
+                {"x": box["x"] + s * box["width"], "y": box["y"] + 60, "id": k} for k, s in enumerate(shares)
+            ]
+            fingers.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+        ranges = "window.pydpendReport.groups.get('g').charts.map(c => [c.scales.x.min, c.scales.x.max])"
+        # From 0.4 and 0.6 of the width to 0.25 and 0.75: of the 3 s there stay 3 / 2.5, about the middle.
+        touch("touchStart", 0.4, 0.6)
+        for share in (0.35, 0.3, 0.25):
+            touch("touchMove", share, 1 - share)
+        touch("touchEnd")
+        until(page, f"{ranges}.every(r => Math.abs(r[0] - 0.9) < 0.03 && Math.abs(r[1] - 2.1) < 0.03)")
+        # A quarter of the width to the right: a quarter of what is shown earlier.
+        touch("touchStart", 0.5)
+        for share in (0.6, 0.7, 0.75):
+            touch("touchMove", share)
+        touch("touchEnd")
+        until(page, f"{ranges}.every(r => Math.abs(r[0] - 0.6) < 0.03 && Math.abs(r[1] - 1.8) < 0.03)")
+
+
 def test_names_are_text(opened: Page) -> None:
     assert HOSTILE in opened.inner_text("h1")
     assert HOSTILE in opened.inner_text("#warnings")

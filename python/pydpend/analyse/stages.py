@@ -64,7 +64,8 @@ def track(r: Recording, options: Options, into: Path, tell: Tell, resume: bool) 
         force=True,
         progress=_share(tell),
     )
-    return f"{nodes.frame.size} frames, {len(nodes.rig.nodes)} nodes"
+    count = len(nodes.rig.nodes)
+    return f"{nodes.frame.size} frames, {count} node{'s' if count > 1 else ''}"
 
 
 def markers(r: Recording, here: Path, into: Path) -> str:
@@ -340,7 +341,7 @@ def overlay(r: Recording, here: Path, into: Path, tell: Tell) -> str:
             "times_s": drawn.t_s.tolist(),
         },
     )
-    return f"{drawn.t_s.size} pictures, one frame in {every}"
+    return f"{drawn.t_s.size} pictures, {'every frame' if every == 1 else f'one frame in {every}'}"
 
 
 def report(folder: Path) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from pydpend.coefficients import RATIOS
 from pydpend.damping import DampingFit, Maps, Prediction
 from pydpend.damping.result import EnergyCurve
 from pydpend.damping.stored import recording_suffix
@@ -89,7 +90,10 @@ def coefficients_figure(coefficients: Mapping[str, Mapping[str, Any]]) -> Figure
                 axes.axhline(c["mean"], color=COLORS[1])
             else:
                 axes.axhline(0, color="0.5", lw=0.8)
-            axes.set_title(f"{name} ({c['unit']})" if c["unit"] else name, fontsize=8, loc="right")
+            unit = f" ({c['unit'].replace('s2', 's²')})" if c["unit"] not in ("", "1") else ""
+            axes.set_title(
+                f"{name}/psi{unit}" if name in RATIOS else f"{name}{unit}", fontsize=8, loc="right"
+            )
             axes.set_xticks(list(index))
             axes.set_xlim(0.5, len(c["values"]) + 0.5)
             axes.tick_params(labelsize=7)

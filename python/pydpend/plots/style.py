@@ -11,6 +11,7 @@ from typing import Any
 import matplotlib
 from cycler import cycler
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 from pydpend.errors import PydpendError, fault
 
@@ -71,20 +72,15 @@ def save(figure: Figure, path: str | Path) -> None:
 
 
 def inline_svg(figure: Figure) -> str:
-    """The figure as SVG to stand in an HTML page; text and frames take the page's text colour."""
+    """The figure as SVG to stand in an HTML page; text and frames take the page's text colour, curves its ``--s0``,
+    ``--s1``, ... where it has them."""
     for axes in figure.axes:
         axes.patch.set_alpha(0.0)
         for spine in axes.spines.values():
             spine.set_edgecolor(_INK)
         axes.tick_params(colors=_INK, which="both")
-        for text in (axes.title, axes.xaxis.label, axes.yaxis.label):
-            text.set_color(_INK)
-        legend = axes.get_legend()
-        if legend is not None:
-            for text in legend.get_texts():
-                text.set_color(_INK)
-        for text in axes.texts:
-            text.set_color(_INK)
+    for text in figure.findobj(Text):
+        text.set_color(_INK)
     figure.patch.set_alpha(0.0)
     out = io.StringIO()
     with matplotlib.rc_context(_SETTINGS):
@@ -92,4 +88,7 @@ def inline_svg(figure: Figure) -> str:
             out, format="svg", metadata=dict.fromkeys(("Creator", "Date", "Format", "Type")), transparent=True
         )
     svg = out.getvalue()
-    return svg[svg.index("<svg") :].replace(_INK, "currentColor")
+    svg = svg[svg.index("<svg") :].replace(_INK, "currentColor")
+    for k, color in enumerate(COLORS):
+        svg = svg.replace(f": {color}", f": var(--s{k}, {color})")
+    return svg

@@ -38,7 +38,7 @@ def report_page(folder: str | Path) -> Page:
         parts += part.sections(f"r{i}", r["label"] if len(found) > 1 else "")
     if fit is not None:
         warnings += damping.warnings(fit)
-        answer += [Heading("Damping"), damping.answer(fit)]
+        answer += [Heading("Damping"), *damping.answer(fit, prediction)]
         parts += damping.sections(path, fit, prediction)
     if not answer:
         answer = [Text("No stage gave a result; the warnings say why.")]
@@ -60,11 +60,11 @@ def report_page(folder: str | Path) -> Page:
 
 
 def _reproduce(facts: dict[str, Any], stages: dict[str, dict[str, Any]]) -> list[Block]:
-    rows = tuple((i["path"], i["given_as"], i["sha256"]) for i in facts.get("inputs", ()))
+    rows = tuple((i["given_as"], i["path"], i["sha256"]) for i in facts.get("inputs", ()))
     return [
         Text("This page was made by"),
         Code(facts.get("command", "")),
-        Table(("file", "given as", "SHA-256"), rows),
+        Table(("given as", "file", "SHA-256"), rows),
         Table(("program", "version"), tuple(facts.get("versions", {}).items())),
         Table(
             ("stage", "what came of it", "took (s)"),
@@ -79,10 +79,8 @@ def _reproduce(facts: dict[str, Any], stages: dict[str, dict[str, Any]]) -> list
             "A. D. Myers, J. R. Tempelman, D. Petrushenko, F. A. Khasawneh, The Double Pendulum: An Experimental "
             "Design Report (2020)."
         ),
-        Listing(
-            (
-                "Angles are absolute, counter-clockwise positive, zero hanging down, unwrapped over turns.",
-                "An uncertainty is one standard uncertainty.",
-            )
+        Text(
+            "Angles are absolute, counter-clockwise positive, zero hanging down, unwrapped over turns. An uncertainty "
+            "is one standard uncertainty."
         ),
     ]

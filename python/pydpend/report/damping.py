@@ -9,11 +9,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pydpend.coefficients import RATIO_UNITS
 from pydpend.plots.damping import coefficients_figure, shares_figure
 from pydpend.plots.folder import energy_path, read_columns
 from pydpend.plots.style import inline_svg
-from pydpend.report.page import Block, Chart, Figure, Heading, Listing, Reset, Section, Series, Table, Text
-from pydpend.report.words import with_sigma, with_squares
+from pydpend.report.page import (
+    Block,
+    Chart,
+    Figure,
+    Heading,
+    Listing,
+    Reset,
+    Section,
+    Series,
+    Table,
+    Text,
+    band,
+)
+from pydpend.report.words import sentence, with_sigma, with_squares
 
 ZOOM_S = 2.0
 """The first seconds of the energy stand alone too (Fig. 19)."""
@@ -35,30 +48,82 @@ MEANING = {
 }
 
 
+SHARE = {"law": "share of the energy lost, by law", "joint": "share of the energy lost, by joint"}
+
+SCALE = (
+    "± is one standard uncertainty of the fit. All coefficients are in proportion to psi, the inertia of the upper "
+    "joint, which is the model's; its relative uncertainty is common to them and comes on top."
+)
+
+
 def warnings(fit: dict[str, Any]) -> list[str]:
     """What a reader must know before the numbers."""
+    message = _message(fit)
+    out = []
     if fit["status"] != "converged":
-        return [f"The damping fit did not converge: {fit['message']}"]
-    return [f"Damping: {fit['message']}"] if "beyond the noise" in fit["message"] else []
+        out.append(f"The damping fit did not converge, its numbers are where it stopped: {message}")
+    elif "beyond the noise" in message:
+        out.append(f"Damping: {message}")
+    # The sentence on the whole recording; those on single coefficients stand with them.
+    out += [s for s in fit["identifiability"]["sentences"] if "too short" in s]
+    return out
 
 
-def answer(fit: dict[str, Any]) -> Table:
-    """Coefficients and shares with their uncertainties."""
+def _message(fit: dict[str, Any]) -> str:
+    return str(fit["message"]).replace(fit["status"], fit["status"].replace("_", " "), 1)
+
+
+def answer(fit: dict[str, Any], prediction: dict[str, Any] | None) -> list[Block]:
+    """Coefficients, shares and prediction errors with their uncertainties."""
     rows = []
 
-    def add(meaning: str, name: str, value: float | None, sigma: float | None, unit: str) -> None:
-        rows.append((meaning, name, f"{with_sigma(value, sigma)} {with_squares(unit)}".strip()))
+    def add(name: str, value: float | None, sigma: float | None, unit: str, meaning: str) -> None:
+        rows.append((name, f"{with_sigma(value, sigma)} {with_squares(unit)}".strip(), meaning))
 
     for name, c in fit["coefficients"].items():
-        add(MEANING.get(name, ""), name, c["value"], c["sigma"], c["unit"])
+        add(name, c["value"], c["sigma"], c["unit"], MEANING.get(name, ""))
     for name, value in fit["ratios"].items():
-        unit = "1/s2" if name in ("sigma", "kappa") else ""
-        add(MEANING.get(name, ""), f"{name}/psi", value, fit.get("ratio_sigmas", {}).get(name), unit)
-    for group in ("law", "joint"):
+        sigma = fit.get("ratio_sigmas", {}).get(name)
+        add(f"{name}/psi", value, sigma, _ratio_unit(name), MEANING.get(name, ""))
+    for group in SHARE:
         for name, c in fit["shares"].get(group, {}).items():
             value, sigma = (None if c[k] is None else 100 * c[k] for k in ("value", "sigma"))
-            add("share of the energy lost", f"{group} {name}", value, sigma, "%")
-    return Table(("meaning", "quantity", "value"), tuple(rows), numbers=frozenset({2}))
+            add(name, value, sigma, "%", SHARE[group])
+    for name, p in (prediction or {}).items():
+        for window, w in p.get("in_window", {}).items():
+            rms = ", ".join(f"{v:.2g}" for v in w["rms_deg"])
+            rows.append((f"{name} predicted", f"{rms} deg", f"RMS of phi1, phi2 in windows of {window} s"))
+    return [
+        Table(("quantity", "value", "meaning"), tuple(rows), numbers=frozenset({1})),
+        Text(SCALE, quiet=True),
+    ]
+
+
+def _ratio_unit(name: str) -> str:
+    return "" if RATIO_UNITS[name] == "1" else RATIO_UNITS[name]
+
+
+def _residuals(path: Path, group: str, title: str) -> list[Block]:
+    """What the fitted motion leaves of each angle, with the standard deviation it was weighted by."""
+    c = {k: v if k == "time_s" else np.degrees(v) for k, v in read_columns(path).items()}
+    out: list[Block] = []
+    for j in (1, 2):
+        if f"phi{j}_residual_rad" not in c:
+            continue
+        left, sigma = c[f"phi{j}_residual_rad"], c[f"phi{j}_sigma_rad"]
+        rms = np.sqrt(np.nanmean(left**2))
+        out.append(
+            Chart(
+                f"{group}-left{j}",
+                f"phi{j}{title}, measured minus fitted: RMS {rms:.2g} deg",
+                group,
+                c["time_s"],
+                (Series(f"difference of phi{j} (deg)", left, j - 1), *band(sigma)),
+                y_label="difference (deg)",
+                height=180,
+            )
+        )
+    return out
 
 
 def _energy(path: Path, group: str, title: str) -> list[Block]:
@@ -73,7 +138,7 @@ def _energy(path: Path, group: str, title: str) -> list[Block]:
             group,
             t,
             (
-                Series("of the motion (J)", energy, 0),
+                Series("of the fitted motion (J)", energy, 0),
                 Series("start minus all losses (J)", model, 1, dashed=True),
             ),
             y_label="energy (J)",
@@ -85,7 +150,7 @@ def _energy(path: Path, group: str, title: str) -> list[Block]:
             f"{group}-zoom",
             t[near],
             (
-                Series("of the motion (J)", energy[near], 0),
+                Series("of the fitted motion (J)", energy[near], 0),
                 Series("start minus all losses (J)", model[near], 1, dashed=True),
             ),
             y_label="energy (J)",
@@ -93,7 +158,7 @@ def _energy(path: Path, group: str, title: str) -> list[Block]:
         ),
         Chart(
             f"{group}-residual",
-            "Motion minus losses",
+            "Fitted motion minus losses",
             group,
             t,
             (Series("difference (mJ)", 1e3 * (energy - model), 2),),
@@ -108,13 +173,12 @@ def _energy(path: Path, group: str, title: str) -> list[Block]:
             tuple(Series(n.removesuffix("_j"), c[n], i % 6, dashed=i >= 6) for i, n in enumerate(laws)),
             y_label="energy (J)",
         ),
-        Reset(group),
     ]
 
 
 def sections(folder: Path, fit: dict[str, Any], prediction: dict[str, Any] | None) -> list[Section]:
     """Energy, identifiability, trials and prediction."""
-    blocks: list[Block] = [Text(fit["message"])]
+    blocks: list[Block] = [Text(sentence(_message(fit)))]
     blocks += [Listing(tuple(fit["notes"]))] if fit.get("notes") else []
     blocks.append(
         Figure(
@@ -124,8 +188,14 @@ def sections(folder: Path, fit: dict[str, Any], prediction: dict[str, Any] | Non
     names = [i.get("name", f"recording {k + 1}") for k, i in enumerate(fit["inputs"])]
     for k, name in enumerate(names):
         path = energy_path(folder, k)
+        title = f" of {name}" if len(names) > 1 else ""
+        left = path.with_name(path.name.replace("energy", "residuals"))
+        if left.exists():
+            blocks += _residuals(left, f"e{k}", title)
         if path.exists():
-            blocks += _energy(path, f"e{k}", f" of {name}" if len(names) > 1 else "")
+            blocks += _energy(path, f"e{k}", title)
+        if left.exists() or path.exists():
+            blocks.append(Reset(f"e{k}"))
     out = [Section("damping", "Damping", tuple(blocks))]
     told = fit["identifiability"]
     out.append(
@@ -133,7 +203,7 @@ def sections(folder: Path, fit: dict[str, Any], prediction: dict[str, Any] | Non
             "identifiability",
             "What the data can tell",
             (
-                Listing(tuple(told["sentences"])),
+                Listing(tuple(sentence(s) for s in told["sentences"])),
                 Text(
                     f"Condition number of the scaled information matrix: {told['condition']:.3g}.", quiet=True
                 ),
@@ -144,7 +214,9 @@ def sections(folder: Path, fit: dict[str, Any], prediction: dict[str, Any] | Non
     if len(names) > 1 and trials.exists():
         out.append(
             Section(
-                "trials", "The recordings beside each other", tuple(_trials(json.loads(trials.read_text())))
+                "trials",
+                "The recordings beside each other",
+                tuple(_trials(json.loads(trials.read_text("utf-8")), names)),
             )
         )
     if prediction:
@@ -152,33 +224,35 @@ def sections(folder: Path, fit: dict[str, Any], prediction: dict[str, Any] | Non
     return out
 
 
-def _trials(trials: dict[str, Any]) -> list[Block]:
+def _trials(trials: dict[str, Any], names: list[str]) -> list[Block]:
     rows = tuple(
         (
-            name,
+            f"{name}/psi" if name in RATIO_UNITS else name,
             *(with_sigma(v, s) for v, s in zip(c["values"], c["sigmas"], strict=True)),
             with_sigma(c["mean"], c["sigma"]),
+            f"{c['spread']:.2g}",
             "–" if c["p_value"] is None else f"{c['p_value']:.2g}",
-            with_squares(c["unit"]),
+            "" if c["unit"] == "1" else with_squares(c["unit"]),
         )
         for name, c in trials["coefficients"].items()
     )
-    count = len(next(iter(trials["coefficients"].values()))["values"]) if rows else 0
-    header = ("quantity", *(f"recording {i + 1}" for i in range(count)), "mean", "p of one value", "unit")
+    header = ("quantity", *names, "mean", "spread beyond errors", "p that all are one value", "unit")
     return [
-        Text(trials["message"]),
+        Text(sentence(trials["message"])),
         Figure(
             inline_svg(coefficients_figure(trials["coefficients"])),
-            "Each coefficient over the recordings, with standard uncertainties.",
+            f"Each coefficient over the recordings ({', '.join(names)}) and its mean, with standard uncertainties.",
         ),
-        Table(header, rows, numbers=frozenset(range(1, count + 3))),
+        Table(header, rows, numbers=frozenset(range(1, len(names) + 4))),
     ]
 
 
 def _prediction(folder: Path, prediction: dict[str, Any]) -> list[Block]:
     blocks: list[Block] = [
         Text(
-            "Each recording predicted from a fit of the others; only the state at each window's start was fitted."
+            "Each recording predicted from a fit of the others. In a window only the state at its start is fitted to "
+            "it; a forecast knows the half second before it and no more, and where the lower link tumbles a forecast "
+            "is lost to chaos whatever the model: compare its median."
         )
     ]
     for k, (name, p) in enumerate(prediction.items()):
@@ -186,7 +260,7 @@ def _prediction(folder: Path, prediction: dict[str, Any]) -> list[Block]:
             (
                 kind.replace("_", " "),
                 f"{window} s",
-                *(f"{v:.3f}" for v in (*w["rms_deg"], *w["median_deg"])),
+                *(f"{v:.3g}" for v in (*w["rms_deg"], *w["median_deg"])),
                 str(w["n"]),
             )
             for kind in ("in_window", "forecast")
@@ -201,8 +275,8 @@ def _prediction(folder: Path, prediction: dict[str, Any]) -> list[Block]:
                     "window",
                     "RMS phi1 (deg)",
                     "RMS phi2 (deg)",
-                    "median phi1",
-                    "median phi2",
+                    "median phi1 (deg)",
+                    "median phi2 (deg)",
                     "windows",
                 ),
                 rows,

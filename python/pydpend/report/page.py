@@ -80,6 +80,8 @@ class Reset(_Block):
     """How to move in the charts of a group, and the way back."""
 
     group: str
+    film: bool = False
+    """Whether a film moves with them."""
 
 
 @dataclass(frozen=True)
@@ -103,7 +105,7 @@ class Film(_Block):
 class Series:
     """One curve. ``band`` (i, j): fill between the series i and j places before this one (0 is itself).
 
-    ``edge``: no line, because it only bounds a band.
+    ``edge``: a thin line, because it bounds a band.
     """
 
     label: str
@@ -113,6 +115,11 @@ class Series:
     band: tuple[int, int] | None = None
     dashed: bool = False
     edge: bool = False
+
+
+def band(sigma: NDArray[np.float64]) -> tuple[Series, Series]:
+    """A band of ± sigma around zero; it comes after the curves that it is to be seen through."""
+    return Series("+ sigma", sigma, None, edge=True), Series("- sigma", -sigma, None, band=(1, 0), edge=True)
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,19 @@ from numpy.typing import NDArray
 
 from pydpend.angles import LinkAngles, read_angles
 from pydpend.nodes import Nodes, read_nodes
-from pydpend.report.page import Block, Chart, Figure, Film, Reset, Section, Series, StatusMap, Table, Text
+from pydpend.report.page import (
+    Block,
+    Chart,
+    Figure,
+    Film,
+    Reset,
+    Section,
+    Series,
+    StatusMap,
+    Table,
+    Text,
+    band,
+)
 from pydpend.report.words import with_sigma
 
 MOST_PLACES = 6
@@ -92,7 +104,7 @@ class Part:
                     height=180,
                 )
             )
-        blocks.append(Reset(id_))
+        blocks.append(Reset(id_, film=self.film is not None))
         return blocks
 
     def _place_blocks(self, id_: str) -> list[Block]:
@@ -115,7 +127,7 @@ class Part:
         ]
         if len(n.rig.nodes) > MOST_PLACES:
             blocks.append(Text(f"The first {MOST_PLACES} of {len(n.rig.nodes)} markers.", quiet=True))
-        return [*blocks, Reset(id_)]
+        return [*blocks, Reset(id_, film=self.film is not None)]
 
     def _node_blocks(self, id_: str) -> list[Block]:
         assert self.nodes is not None
@@ -186,8 +198,8 @@ class Part:
         clocks, shares = c["clocks"], c["shares"]
         rows = [
             ("readings compared", str(c["n"])),
-            ("RMS of film minus encoder (deg)", f"{c['rms_deg']:.4f}"),
-            ("largest (deg)", f"{c['largest_deg']:.3f}"),
+            ("RMS of film minus encoder (deg)", f"{c['rms_deg']:.3g}"),
+            ("largest (deg)", f"{c['largest_deg']:.3g}"),
             ("gain", with_sigma(c["gain"], c["gain_sigma"])),
             (
                 "zero of the encoder (deg)",
@@ -210,7 +222,10 @@ class Part:
         blocks: list[Block] = [Table(("quantity", "value"), tuple(rows), numbers=frozenset({1}))]
         if self.calibration is not None:
             blocks.append(
-                Figure(self.calibration, "Calibration line of the encoder and its residuals (Fig. 10).")
+                Figure(
+                    self.calibration,
+                    "Calibration line of the encoder and its residuals (the paper's Fig. 10).",
+                )
             )
         if self.compared is not None:
             t = self.compared["time_s"]
@@ -228,14 +243,10 @@ class Part:
                     "Film minus encoder; the band is ± the stated standard uncertainty of both",
                     id_,
                     t,
-                    (
-                        Series("+ sigma", sigma, 1, edge=True),
-                        Series("- sigma", -sigma, 1, band=(1, 0), edge=True),
-                        Series("difference (deg)", left, 0),
-                    ),
+                    (Series("difference (deg)", left, 0), *band(sigma)),
                     y_label="difference (deg)",
                 ),
-                Reset(id_),
+                Reset(id_, film=self.film is not None),
             ]
         return blocks
 
@@ -270,11 +281,14 @@ def read(folder: Path, facts: dict[str, Any], stages: set[str]) -> Part:
         seen = np.isin(nodes.status, (1, 2))
         rows += [
             ("frames", str(nodes.frame.size)),
-            ("duration", f"{nodes.t_s[-1] - nodes.t_s[0]:.3f} s"),
+            *_times(nodes.t_s),
             ("nodes, bodies", f"{len(nodes.rig.nodes)}, {len(nodes.rig.bodies)}"),
-            ("node-frames seen", f"{100 * seen.mean():.3f} %"),
-            ("median uncertainty of a centre", f"{np.nanmedian(nodes.sigma_px):.4f} px"),
+            ("nodes seen", f"{seen.sum()} of {seen.size} times ({100 * seen.mean():.1f} %)"),
+            ("median uncertainty of a centre", f"{np.nanmedian(nodes.sigma_px):.2g} px"),
         ]
+        source = nodes.meta.get("source")
+        if isinstance(source, dict):
+            part.warnings += [f"{part.label}: {w}" for w in _doubts_of_time(source)]
         part.warnings += [f"{part.label}: {w}" for w in nodes.meta.get("warnings", [])]
         ending = nodes.meta.get("ending")
         if isinstance(ending, dict) and ending.get("early"):
@@ -285,17 +299,19 @@ def read(folder: Path, facts: dict[str, Any], stages: set[str]) -> Part:
     if f"{name}/angles" in stages:
         part.angles = read_angles(here / "angles.parquet", name=part.label)
         part.meta = json.loads((here / "angles.json").read_text("utf-8"))
+        if part.nodes is None:
+            rows += [("instants", str(part.angles.t_s.size)), *_times(part.angles.t_s)]
         part.warnings += [f"{part.label}: {note}" for note in part.meta.get("notes", [])]
         for k in range(part.angles.links):
             sigma = part.angles.sigma_rad[:, k]
             if np.isfinite(sigma).any():
                 rows.append(
-                    (f"median uncertainty of phi{k + 1}", f"{math.degrees(np.nanmedian(sigma)):.4f} deg")
+                    (f"median uncertainty of phi{k + 1}", f"{math.degrees(np.nanmedian(sigma)):.2g} deg")
                 )
         turns = (np.nanmax(part.angles.phi_rad, axis=0) - np.nanmin(part.angles.phi_rad, axis=0)) / (
             2 * np.pi
         )
-        rows.append(("range in turns", ", ".join(f"{t:.2f}" for t in turns)))
+        rows += [(f"range of phi{k + 1}", f"{t:.2f} turns") for k, t in enumerate(turns)]
     if f"{name}/overlay" in stages:
         about = json.loads((here / "overlay.json").read_text("utf-8"))
         part.film = ((here / "overlay.mp4").read_bytes(), about)
@@ -308,10 +324,37 @@ def read(folder: Path, facts: dict[str, Any], stages: set[str]) -> Part:
             text = drawing.read_text("utf-8")
             part.calibration = text[text.index("<svg") :]
         part.warnings += [f"{part.label}: {note}" for note in part.comparison["notes"]]
-        rows.append(("film against encoder, RMS", f"{part.comparison['rms_deg']:.4f} deg"))
+        rms, neither = part.comparison["rms_deg"], part.comparison["shares"]["unexplained"]
+        rows.append(("film minus encoder, RMS", f"{rms:.3g} deg"))
+        if neither is not None and neither < 1:
+            rows.append(
+                ("the same, expected from the noise of both", f"{rms * math.sqrt(1 - neither):.3g} deg")
+            )
     if rows:
         part.answer = Table(("property", "value"), tuple(rows), numbers=frozenset({1}))
     return part
+
+
+def _times(t_s: NDArray[np.float64]) -> list[tuple[str, str]]:
+    step = float(np.median(np.diff(t_s))) if t_s.size > 1 else math.nan
+    return [("duration", f"{t_s[-1] - t_s[0]:.3f} s"), ("rate", f"{1 / step:.6g} per second")]
+
+
+PLAYERS_RATE_HZ = 60.0
+"""Up to this rate films are made for players; cameras for motion are faster."""
+
+
+def _doubts_of_time(source: dict[str, Any]) -> list[str]:
+    """Warnings where the frame rate may not be the camera's: every rate and coefficient scales with it."""
+    origin, rate = source.get("rate_origin"), source.get("rate_hz")
+    if origin == "unknown":
+        return ["nothing gives its frame rate, so times count frames. Give the camera's with --fps"]
+    if origin == "container" and rate is not None and rate <= PLAYERS_RATE_HZ:
+        return [
+            f"its {rate:g} frames a second are what the file tells a player. If the camera took them at another "
+            "rate, give that with --fps: every time and rate here hinges on it"
+        ]
+    return []
 
 
 def _columns(path: Path) -> dict[str, NDArray[np.float64]]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 
 
@@ -17,10 +19,20 @@ def with_sigma(value: float | None, sigma: float | None) -> str:
     digits = max(0, exponent + 1 - int(np.floor(np.log10(sigma))))
     scale = 10.0**exponent
     text = f"{value / scale:.{digits}f} ± {sigma / scale:.{digits}f}"
-    raised = str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
-    return text if exponent == 0 else f"({text}) × 10{raised}"
+    return text if exponent == 0 else f"({text}) × 10{_raised(exponent)}"
+
+
+def _raised(exponent: int) -> str:
+    return str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
 
 
 def with_squares(unit: str) -> str:
     """``N m s2`` as ``N m s²``."""
     return unit.replace("s2", "s²")
+
+
+def sentence(text: str) -> str:
+    """A stage's message as it stands on a page: ±, powers of ten and squares, and a capital where a word begins it."""
+    text = re.sub(r"(\d)e([+-]\d+)\b", lambda m: f"{m[1]} × 10{_raised(int(m[2]))}", text)
+    text = re.sub(r"(?<=m )s2\b", "s²", text.replace(" +- ", " ± "))
+    return text[0].upper() + text[1:] if re.match("[a-z]+ ", text) else text

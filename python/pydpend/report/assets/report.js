@@ -53,6 +53,15 @@
     return [min, max];
   }
 
+  // As wide as asked for and not beyond what there is.
+  function setWithin(g, a, b) {
+    const [lo, hi] = full(g);
+    if (b - a >= hi - lo) { a = lo; b = hi; }
+    if (a < lo) { b += lo - a; a = lo; }
+    if (b > hi) { a -= b - hi; b = hi; }
+    setRange(g, a, b);
+  }
+
   function putCursor(g, time) {
     g.time = time;
     for (const c of g.charts) {
@@ -112,11 +121,11 @@
     for (const s of spec.series) {
       const stroke = s.color === undefined ? "transparent" : css(`--s${s.color % 6}`);
       series.push({
-        label: s.label, stroke: s.edge ? "transparent" : stroke, width: s.points ? 0 : 1.25,
+        label: s.label, stroke: s.edge ? ink : stroke, width: s.points ? 0 : s.edge ? 0.75 : 1.25,
         points: s.points ? { show: true, size: 4, fill: stroke, stroke } : { show: false },
-        value: (u, v) => (v == null ? "–" : v.toPrecision(6)), scale: "y", spanGaps: false, dash: s.dashed ? [6, 4] : undefined,
+        value: (u, v) => (v == null ? "–" : v.toPrecision(6)), scale: "y", spanGaps: false, dash: s.dashed || s.edge ? [6, 4] : undefined,
       });
-      if (s.band) bands.push({ series: [series.length - 1 + s.band[0], series.length - 1 + s.band[1]], fill: stroke + "40" });
+      if (s.band) bands.push({ series: [series.length - 1 + s.band[0], series.length - 1 + s.band[1]], fill: ink + "20" });
     }
     const map = spec.kind === "status";
     return {
@@ -145,8 +154,7 @@
     u.over.addEventListener("wheel", (e) => {
       if (!(e.ctrlKey || e.shiftKey || e.altKey)) return; // plain scrolling scrolls the page
       e.preventDefault();
-      const { min, max } = u.scales.x, [lo, hi] = full(g);
-      const at = u.posToVal(e.offsetX, "x");
+      const { min, max } = u.scales.x, at = u.posToVal(e.offsetX, "x");
       let a, b;
       if (e.shiftKey) {
         const shift = ((e.deltaY || e.deltaX) > 0 ? 0.1 : -0.1) * (max - min);
@@ -155,11 +163,33 @@
         const f = e.deltaY > 0 ? 1.25 : 0.8;
         a = at - (at - min) * f; b = at + (max - at) * f;
       }
-      if (b - a >= hi - lo) { a = lo; b = hi; }
-      if (a < lo) { b += lo - a; a = lo; }
-      if (b > hi) { a -= b - hi; b = hi; }
-      setRange(g, a, b);
+      setWithin(g, a, b);
     }, { passive: false });
+  }
+
+  // Two fingers zoom, one moves; up and down scrolls the page.
+  function touch(u, g) {
+    const fingers = new Map();
+    let begun = null;
+    const begin = () => { begun = { min: u.scales.x.min, max: u.scales.x.max, at: [...fingers.values()] }; };
+    u.over.addEventListener("pointerdown", (e) => {
+      if (e.pointerType === "touch" && fingers.size < 2) { fingers.set(e.pointerId, e.clientX); begin(); }
+    });
+    u.over.addEventListener("pointermove", (e) => {
+      if (!fingers.has(e.pointerId)) return;
+      fingers.set(e.pointerId, e.clientX);
+      const now = [...fingers.values()], { left, width } = u.over.getBoundingClientRect();
+      let scale = (begun.max - begun.min) / width;
+      // The time under a finger stays under it.
+      const held = begun.at.map((x) => begun.min + (x - left) * scale);
+      if (now.length === 2) scale = (held[1] - held[0]) / (now[1] - now[0]);
+      if (!(scale > 0) || !Number.isFinite(scale)) return;
+      const a = held[0] - (now[0] - left) * scale;
+      setWithin(g, a, a + width * scale);
+    });
+    for (const end of ["pointerup", "pointercancel"]) {
+      u.over.addEventListener(end, (e) => { if (fingers.delete(e.pointerId)) begin(); });
+    }
   }
 
   function build(spec) {
@@ -169,6 +199,7 @@
     const u = new uPlot(options(spec, host.clientWidth, g), columns, host);
     g.charts.push(u);
     wheel(u, g);
+    touch(u, g);
     let down = null;
     u.over.addEventListener("mousedown", (e) => { down = e.clientX; });
     u.over.addEventListener("mouseup", (e) => {
