@@ -335,9 +335,23 @@ fn a_run_goes_on_only_with_what_it_began_with() {
     refused(&["--resume", "--threshold", "90"], "another detection settings");
     refused(&["--resume", "--frames", "0..9"], "another --frames");
     let other = film("film.avi");
-    let (status, _, error) = said(&["track", &other, "-o", &out, "--quiet", "--resume"]);
-    assert!(status == 2 && error.contains("another recording"), "{error}");
+    let another_film = || {
+        let (status, _, error) = said(&["track", &other, "-o", &out, "--quiet", "--resume"]);
+        assert!(status == 2 && error.contains("another recording"), "{error}");
+    };
+    another_film();
     assert_eq!(said(&["track", &input, "-o", &out, "--quiet", "--resume"]).0, 0);
+    // The same of a table that is whole.
+    let bytes = fs::read(&out).unwrap();
+    assert_eq!(said(&["track", &input, "-o", &out, "--quiet", "--resume"]).0, 0);
+    refused(&["--resume", "--fps", "77"], "another");
+    refused(&["--resume", "--threshold", "90"], "complete and had another detection settings");
+    refused(&["--resume", "--frames", "0..9"], "complete and had another --frames");
+    let rig = case.text("rig.toml");
+    fs::write(&rig, read_table(&case.path("t.parquet")).unwrap().meta.rig.to_toml().unwrap()).unwrap();
+    refused(&["--resume", "--rig", &rig], "complete and had another rig");
+    another_film();
+    assert!(fs::read(&out).unwrap() == bytes);
 }
 
 #[test]

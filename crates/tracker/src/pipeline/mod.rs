@@ -22,7 +22,7 @@ pub use state::partial_path;
 use crate::detect::{DetectSettings, Levels};
 use crate::discover::{Discovery, discover};
 use crate::error::{Error, Fault, Result};
-use crate::frame::{Ending, FrameSource};
+use crate::frame::{Ending, FrameSource, SourceInfo};
 use crate::rig::Rig;
 use crate::source::OpenOptions;
 use crate::store::DetectionStore;
@@ -67,6 +67,13 @@ pub struct RunSettings {
     pub threads: usize,
 }
 
+impl RunSettings {
+    /// The first frame and one past the last; `null` for an open end, as in `--frames 5..`.
+    fn frames_json(&self) -> serde_json::Value {
+        json!(self.frames.as_ref().map(|r| [Some(r.start), (r.end < u64::MAX).then_some(r.end)]))
+    }
+}
+
 /// What came of a run.
 #[derive(Debug, Clone)]
 pub struct RunSummary {
@@ -104,12 +111,13 @@ const SAMPLES: usize = 12;
 /// write; [`Error::Table`] if the output is there already.
 pub fn run(settings: &RunSettings, observer: &mut dyn Observer) -> Result<RunSummary> {
     check(settings)?;
-    if let Some(done) = already_done(settings)? {
-        return Ok(done);
-    }
     observer.stage(Stage::Open, None);
     let source = open(&settings.input, &settings.open, observer)?;
-    let (mut run, source) = Run::begin(settings, source, observer)?;
+    let request = Request::new(settings, source.info())?;
+    if let Some(done) = already_done(settings, &request)? {
+        return Ok(done);
+    }
+    let (mut run, source) = Run::begin(settings, request, source, observer)?;
     let fresh = run.resumed == 0;
     let outcome = run.detect(source, observer).and_then(|ending| run.finish(ending, observer));
     // Only a run that was stopped or ran out of disk can go on; any other would fail again.
@@ -157,8 +165,29 @@ fn check(settings: &RunSettings) -> Result<()> {
     Ok(())
 }
 
-/// The summary of a finished table, where there is nothing to go on with.
-fn already_done(settings: &RunSettings) -> Result<Option<RunSummary>> {
+/// What is asked of a recording, once it is open.
+struct Request {
+    facts: SourceFacts,
+    detect: DetectSettings,
+    state: State,
+}
+
+impl Request {
+    fn new(settings: &RunSettings, info: &SourceInfo) -> Result<Self> {
+        let facts = SourceFacts::of(info);
+        let mut detect = settings.detect.clone();
+        if let Some(rig) = &settings.rig {
+            fits(rig, &facts)?;
+            detect.region = detect.region.or_else(|| rig.region.clone());
+            detect.lens = detect.lens.or_else(|| rig.lens.clone());
+        }
+        let state = State::new(settings, &facts, &detect);
+        Ok(Self { facts, detect, state })
+    }
+}
+
+/// The summary of a finished table, where there is nothing to go on with. It must be the table that is asked for.
+fn already_done(settings: &RunSettings, request: &Request) -> Result<Option<RunSummary>> {
     let Some(output) = &settings.output else { return Ok(None) };
     if settings.existing != Existing::Resume || partial_path(output).exists() || !output.exists() {
         return Ok(None);
@@ -172,6 +201,14 @@ fn already_done(settings: &RunSettings) -> Result<Option<RunSummary>> {
                 format!("its run was stopped, but its state {} is gone", partial.display()),
             )
             .advice("Begin anew with --force"),
+        ));
+    }
+    request.state.made(&table.meta, output)?;
+    let rig = (table.meta.settings["rig"] == "given").then_some(&table.meta.rig);
+    if rig != settings.rig.as_ref() {
+        return Err(Error::Table(
+            Fault::new(output.display(), "its run is complete and had another rig")
+                .advice("Give --rig as it was then, or begin anew with --force"),
         ));
     }
     Ok(Some(RunSummary {
@@ -201,19 +238,12 @@ impl<'a> Run<'a> {
     /// Learns what detection needs, or takes it from an earlier run.
     fn begin(
         settings: &'a RunSettings,
+        request: Request,
         source: Box<dyn FrameSource>,
         observer: &mut dyn Observer,
     ) -> Result<(Self, Box<dyn FrameSource>)> {
-        let info = source.info();
-        let facts = SourceFacts::of(info);
-        let warnings = info.warnings.clone();
-        let mut detect = settings.detect.clone();
-        if let Some(rig) = &settings.rig {
-            fits(rig, &facts)?;
-            detect.region = detect.region.or_else(|| rig.region.clone());
-            detect.lens = detect.lens.or_else(|| rig.lens.clone());
-        }
-        let state = State::new(settings, &facts, &detect);
+        let Request { facts, detect, state } = request;
+        let warnings = source.info().warnings.clone();
         if settings.existing == Existing::Resume
             && let Some(output) = &settings.output
             && let Some(earlier) = state.resume(output)?
@@ -397,7 +427,7 @@ impl<'a> Run<'a> {
             "levels": *self.levels,
             "fps": self.settings.open.fps,
             "decoder": self.settings.open.decoder,
-            "frames": self.settings.frames.as_ref().map(|r| [Some(r.start), (r.end < u64::MAX).then_some(r.end)]),
+            "frames": self.settings.frames_json(),
             "rig": if self.settings.rig.is_some() { "given" } else { "found" },
         })
     }

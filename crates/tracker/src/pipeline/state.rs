@@ -49,9 +49,35 @@ impl State {
             "detection settings": detect,
             "--decoder": settings.open.decoder,
             "--fps": settings.open.fps,
-            "--frames": settings.frames.as_ref().map(|r| [r.start, r.end]),
+            "--frames": settings.frames_json(),
         });
         Self { identity }
+    }
+
+    /// Whether a finished table is what a run would make now.
+    pub fn made(&self, meta: &TableMeta, output: &Path) -> Result<()> {
+        let before = json!({
+            "program": meta.tool,
+            "recording": meta.source,
+            "detection settings": meta.settings["detect"],
+            "--decoder": meta.settings["decoder"],
+            "--fps": meta.settings["fps"],
+            "--frames": meta.settings["frames"],
+        });
+        self.same(&before, output, "its run is complete and had another")
+    }
+
+    /// Whether nothing differs from what was; `what` begins the message.
+    fn same(&self, before: &Value, path: &Path, what: &str) -> Result<()> {
+        let Some(object) = self.identity.as_object() else { return Ok(()) };
+        match object.iter().find(|&(key, value)| before.get(key) != Some(value)) {
+            None => Ok(()),
+            Some((key, value)) => Err(Error::Table(
+                Fault::new(path.display(), format!("{what} {key}"))
+                    .at(Place::Key(difference(before.get(key), value)))
+                    .advice("Run with what it had, or begin anew with --force"),
+            )),
+        }
     }
 
     /// Begins a new state; an older one is gone.
@@ -75,17 +101,7 @@ impl State {
                 Fault::new(path.display(), format!("its header is of another program ({e})")).advice(advice),
             )
         })?;
-        if let Some(object) = self.identity.as_object() {
-            for (key, value) in object {
-                if header.identity.get(key) != Some(value) {
-                    return Err(Error::Table(
-                        Fault::new(path.display(), format!("the earlier run had another {key}"))
-                            .at(Place::Key(difference(header.identity.get(key), value)))
-                            .advice("Run with what it had, or begin anew with --force"),
-                    ));
-                }
-            }
-        }
+        self.same(&header.identity, &path, "the earlier run had another")?;
         let ending = spool.finished().map(|f| read_ending(&f.ending, &path)).transpose()?;
         Ok(Some(Earlier { spool, levels: header.levels, ending }))
     }
