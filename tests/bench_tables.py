@@ -36,7 +36,7 @@ def film(folder: Path, name: str, frames: int, **more: Any) -> Path:
 def memory(folder: Path) -> None:
     short = film(folder, "short.mp4", 2000, speed="veryfast")
     long = folder / "long.mp4"
-    loop = ["ffmpeg", "-v", "error", "-stream_loop", "19", "-i", short, "-c", "copy", long]
+    loop: list[str | Path] = ["ffmpeg", "-v", "error", "-stream_loop", "19", "-i", short, "-c", "copy", long]
     subprocess.run(loop, check=True)
     raw = film(folder, "short.mraw", 2000, bits=8)
     for name, pair in (("H.264", (short, long)), ("MRAW", (raw, lengthened(raw, 40_000)))):
