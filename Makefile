@@ -64,6 +64,7 @@ wheel: .make/system .make/venv
 
 bench: build
 	cargo bench --workspace --locked
+	$(PY) -m tests.bench_tables
 
 fixtures: build
 	$(PY) fixtures/make.py
