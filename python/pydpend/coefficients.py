@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from pydpend.errors import FitError, fault
-from pydpend.model import UNITS, Model
+from pydpend.model import UNITS, Model, constants
 
 PAPER = ("mu_v1", "mu_v2", "mu_q1", "mu_q2", "rmu1", "rmu2")
 """The paper's laws (Table 5 corrected): viscous, quadratic and load-proportional dry friction at each
@@ -71,18 +71,5 @@ def unit(name: str) -> str:
 
 def parameters(model: Model) -> dict[str, float]:
     """The model's constants under the compiled part's names, SI."""
-    return {
-        "psi": model.psi_kg_m2,
-        "lambda": model.lambda_kg_m2,
-        "zeta": model.zeta_kg_m2,
-        "a3": model.a3_kg_m2,
-        "sigma": model.sigma_j,
-        "kappa": model.kappa_j,
-        "m1": model.m1_kg,
-        "m2": model.m2_kg,
-        "l1": model.l1_m,
-        "g": model.g_m_s2,
-        "lower_inner": model.lower_inner_m,
-        # A link of no stated extent gets a millimetre, so that strip drag is that of its end alone.
-        "lower_outer": max(model.lower_outer_m, model.lower_inner_m + 1e-3),
-    }
+    # A link of no stated extent gets a millimetre, so that strip drag is that of its end alone.
+    return constants(model) | {"lower_outer": max(model.lower_outer_m, model.lower_inner_m + 1e-3)}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pydpend.model.laws import UNITS, Damping, parameters
+from pydpend.model.laws import UNITS, Damping, constants, parameters
 from pydpend.model.pendulum import CONSTANTS, Model, uniform_bar
 from pydpend.model.reduce import (
     G_MM_S2,
@@ -23,6 +23,7 @@ __all__ = [
     "Damping",
     "Model",
     "ModelWarning",
+    "constants",
     "derived",
     "from_parts",
     "jacobian",

@@ -75,9 +75,9 @@ UNITS = {
 """Unit of each coefficient of `Damping`."""
 
 
-def parameters(model: Model, damping: Damping) -> dict[str, float]:
-    """The model and its damping under the names that the compiled half knows (`_tracker.simulate_motion`)."""
-    out = {
+def constants(model: Model) -> dict[str, float]:
+    """The model's constants, SI, under the names that the compiled half knows."""
+    return {
         "psi": model.psi_kg_m2,
         "lambda": model.lambda_kg_m2,
         "zeta": model.zeta_kg_m2,
@@ -91,4 +91,8 @@ def parameters(model: Model, damping: Damping) -> dict[str, float]:
         "lower_inner": model.lower_inner_m,
         "lower_outer": model.lower_outer_m,
     }
-    return out | {f.name: float(getattr(damping, f.name)) for f in fields(damping)}
+
+
+def parameters(model: Model, damping: Damping) -> dict[str, float]:
+    """The model and its damping under the names that the compiled half knows (`_tracker.simulate_motion`)."""
+    return constants(model) | {f.name: float(getattr(damping, f.name)) for f in fields(damping)}
