@@ -126,7 +126,16 @@ def test_an_error_names_the_flag(
 @pytest.mark.parametrize("ending", ["png", "svg", "pdf"])
 def test_each_figure_alone(ending: str, demo_run: Path, tmp_path: Path) -> None:
     magic = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}[ending]
-    for figure in ("nodes", "angles", "calibration", "comparison", "energy", "coefficients", "shares"):
+    for figure in (
+        "nodes",
+        "angles",
+        "calibration",
+        "comparison",
+        "residuals",
+        "energy",
+        "coefficients",
+        "shares",
+    ):
         path = tmp_path / f"{figure}.{ending}"
         assert main(["plot", figure, str(demo_run), "-o", str(path)]) == 0
         assert path.read_bytes().startswith(magic)

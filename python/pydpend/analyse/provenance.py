@@ -93,6 +93,8 @@ def about(name: str) -> str:
         )
     if last.startswith("residuals"):
         return "measured minus fitted angle of each link, and its standard deviation, rad"
+    if last.startswith("residuals") and last.endswith(".csv"):
+        return "measured minus fitted angles and the standard deviation of each, rad"
     return ABOUT.get(last, "")
 
 

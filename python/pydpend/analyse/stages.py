@@ -199,7 +199,7 @@ def encoder(r: Recording, options: Options, here: Path, into: Path) -> str:
     from pydpend.angles import read_angles
     from pydpend.encoder import calibrate, compare, encoder_angles, read_calibration, read_encoder, read_holds
     from pydpend.plots.encoder import calibration_figure, comparison_figure
-    from pydpend.plots.style import inline_svg, save
+    from pydpend.plots.style import save
 
     film = read_angles(here / "angles.parquet", name=r.name)
     signal = read_encoder(str(r.encoder), column=options.encoder_column)
@@ -208,7 +208,7 @@ def encoder(r: Recording, options: Options, here: Path, into: Path) -> str:
         path = Path(options.calibration)
         line = calibrate(read_holds([path])) if path.is_dir() else read_calibration(path)
         line.write(into / "encoder.json")
-        write_whole(into / "calibration.svg", inline_svg(calibration_figure(line)))
+        save(calibration_figure(line), into / "calibration.svg")
     found = compare(film, encoder_angles(signal, line))
     write_whole(into / "comparison.json", found.to_json())
     pq.write_table(pa.table(found.to_columns()), into / "comparison.parquet")

@@ -26,6 +26,7 @@ FIGURES = (
     "angles",
     "calibration",
     "comparison",
+    "residuals",
     "energy",
     "coefficients",
     "shares",

@@ -47,6 +47,32 @@ def energy_figure(energy: Mapping[str, Floats], zoom_s: float = 2.0) -> Figure:
     return figure
 
 
+def residuals_figure(residuals: Mapping[str, Floats]) -> Figure:
+    """Measured minus fitted angle of each link over time, between plus and minus the standard deviation it was
+    weighted by.
+
+    ``residuals``: columns ``time_s``, ``phi1_residual_rad``, ``phi1_sigma_rad``, ... of a residual table.
+    """
+    t = residuals["time_s"]
+    links = [j for j in (1, 2) if f"phi{j}_residual_rad" in residuals]
+    with style():
+        figure = new_figure(6.5, 1.9 * len(links))
+        for axes, j in zip(
+            figure.subplots(len(links), 1, squeeze=False, sharex=True).ravel(), links, strict=True
+        ):
+            left = np.degrees(residuals[f"phi{j}_residual_rad"])
+            sigma = np.degrees(residuals[f"phi{j}_sigma_rad"])
+            axes.plot(*thinned(t, left), color=COLORS[j - 1], lw=0.6)
+            for edge in (sigma, -sigma):
+                axes.plot(*thinned(t, edge), "k--", lw=0.7)
+            axes.set_ylabel(f"phi{j}, measured\nminus fitted (deg)")
+            axes.set_title(
+                f"RMS {np.sqrt(np.nanmean(left**2)):.3g} deg; dashed: ± standard deviation", fontsize=8
+            )
+        axes.set_xlabel("time (s)")
+    return figure
+
+
 def shares_figure(shares: Mapping[str, Mapping[str, Mapping[str, float]]]) -> Figure:
     """Fractions of the dissipated energy by law and by joint, with their standard errors.
 

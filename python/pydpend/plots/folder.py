@@ -23,6 +23,7 @@ from pydpend.plots.damping import (
     coefficients_figure,
     energy_figure,
     maps_figure,
+    residuals_figure,
     shares_figure,
     windows_figure,
 )
@@ -116,13 +117,17 @@ def _comparison(r: Stored) -> Figure:
 
 
 def _energy(r: Stored) -> Figure:
-    return energy_figure(read_columns(energy_path(r.run, r.index)))
+    return energy_figure(read_columns(table_of_fit("energy", r.run, r.index)))
 
 
-def energy_path(run: Path, index: int) -> Path:
-    """The energy table of a recording: ``energy.csv``, or ``energy-2.csv`` where there are several."""
-    alone = run / "fit" / "energy.csv"
-    return alone if alone.exists() else run / "fit" / f"energy-{index + 1}.csv"
+def _residuals(r: Stored) -> Figure:
+    return residuals_figure(read_columns(table_of_fit("residuals", r.run, r.index)))
+
+
+def table_of_fit(name: str, run: Path, index: int) -> Path:
+    """A recording's table of the fit: ``energy.csv``, or ``energy-2.csv`` where there are several recordings."""
+    alone = run / "fit" / f"{name}.csv"
+    return alone if alone.exists() else run / "fit" / f"{name}-{index + 1}.csv"
 
 
 def _shares(r: Stored) -> Figure:
@@ -176,6 +181,7 @@ DRAWINGS = {
     "comparison": Drawing(
         "film and encoder, two zooms, residuals (Fig. 15)", _comparison, "comparison.parquet"
     ),
+    "residuals": Drawing("measured minus fitted angles over time", _residuals, "fit/fit.json"),
     "energy": Drawing("energy of the motion and the model's, with a zoom (Fig. 19)", _energy, "fit/fit.json"),
     "coefficients": Drawing(
         "coefficients with their errors, over the recordings (Fig. 20)",

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pydpend.coefficients import RATIO_UNITS
 from pydpend.plots.damping import coefficients_figure, shares_figure
-from pydpend.plots.folder import energy_path, read_columns
+from pydpend.plots.folder import read_columns, table_of_fit
 from pydpend.plots.style import inline_svg
 from pydpend.report.page import (
     Block,
@@ -26,7 +26,7 @@ from pydpend.report.page import (
     Text,
     band,
 )
-from pydpend.report.words import sentence, with_sigma, with_squares
+from pydpend.report.words import digits, sentence, with_sigma, with_squares
 
 ZOOM_S = 2.0
 """The first seconds of the energy stand alone too (Fig. 19)."""
@@ -91,7 +91,7 @@ def answer(fit: dict[str, Any], prediction: dict[str, Any] | None) -> list[Block
             add(name, value, sigma, "%", SHARE[group])
     for name, p in (prediction or {}).items():
         for window, w in p.get("in_window", {}).items():
-            rms = ", ".join(f"{v:.2g}" for v in w["rms_deg"])
+            rms = ", ".join(digits(v) for v in w["rms_deg"])
             rows.append((f"{name} predicted", f"{rms} deg", f"RMS of phi1, phi2 in windows of {window} s"))
     return [
         Table(("quantity", "value", "meaning"), tuple(rows), numbers=frozenset({1})),
@@ -115,7 +115,7 @@ def _residuals(path: Path, group: str, title: str) -> list[Block]:
         out.append(
             Chart(
                 f"{group}-left{j}",
-                f"phi{j}{title}, measured minus fitted: RMS {rms:.2g} deg",
+                f"phi{j}{title}, measured minus fitted: RMS {digits(rms)} deg",
                 group,
                 c["time_s"],
                 (Series(f"difference of phi{j} (deg)", left, j - 1), *band(sigma)),
@@ -187,9 +187,8 @@ def sections(folder: Path, fit: dict[str, Any], prediction: dict[str, Any] | Non
     )
     names = [i.get("name", f"recording {k + 1}") for k, i in enumerate(fit["inputs"])]
     for k, name in enumerate(names):
-        path = energy_path(folder, k)
+        path, left = (table_of_fit(table, folder, k) for table in ("energy", "residuals"))
         title = f" of {name}" if len(names) > 1 else ""
-        left = path.with_name(path.name.replace("energy", "residuals"))
         if left.exists():
             blocks += _residuals(left, f"e{k}", title)
         if path.exists():
@@ -230,7 +229,7 @@ def _trials(trials: dict[str, Any], names: list[str]) -> list[Block]:
             f"{name}/psi" if name in RATIO_UNITS else name,
             *(with_sigma(v, s) for v, s in zip(c["values"], c["sigmas"], strict=True)),
             with_sigma(c["mean"], c["sigma"]),
-            f"{c['spread']:.2g}",
+            sentence(f"{c['spread']:.2g}"),
             "–" if c["p_value"] is None else f"{c['p_value']:.2g}",
             "" if c["unit"] == "1" else with_squares(c["unit"]),
         )
@@ -260,7 +259,7 @@ def _prediction(folder: Path, prediction: dict[str, Any]) -> list[Block]:
             (
                 kind.replace("_", " "),
                 f"{window} s",
-                *(f"{v:.3g}" for v in (*w["rms_deg"], *w["median_deg"])),
+                *(digits(v, 3) for v in (*w["rms_deg"], *w["median_deg"])),
                 str(w["n"]),
             )
             for kind in ("in_window", "forecast")

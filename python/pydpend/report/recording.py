@@ -12,7 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pydpend.angles import LinkAngles, read_angles
+from pydpend.encoder import read_calibration
 from pydpend.nodes import Nodes, read_nodes
+from pydpend.plots.encoder import calibration_figure
+from pydpend.plots.style import inline_svg
 from pydpend.report.page import (
     Block,
     Chart,
@@ -26,7 +29,7 @@ from pydpend.report.page import (
     Text,
     band,
 )
-from pydpend.report.words import with_sigma
+from pydpend.report.words import digits, with_sigma
 
 MOST_PLACES = 6
 """Curves of places in one chart."""
@@ -198,8 +201,8 @@ class Part:
         clocks, shares = c["clocks"], c["shares"]
         rows = [
             ("readings compared", str(c["n"])),
-            ("RMS of film minus encoder (deg)", f"{c['rms_deg']:.3g}"),
-            ("largest (deg)", f"{c['largest_deg']:.3g}"),
+            ("RMS of film minus encoder (deg)", digits(c["rms_deg"], 3)),
+            ("largest (deg)", digits(c["largest_deg"], 3)),
             ("gain", with_sigma(c["gain"], c["gain_sigma"])),
             (
                 "zero of the encoder (deg)",
@@ -283,8 +286,8 @@ def read(folder: Path, facts: dict[str, Any], stages: set[str]) -> Part:
             ("frames", str(nodes.frame.size)),
             *_times(nodes.t_s),
             ("nodes, bodies", f"{len(nodes.rig.nodes)}, {len(nodes.rig.bodies)}"),
-            ("nodes seen", f"{seen.sum()} of {seen.size} times ({100 * seen.mean():.1f} %)"),
-            ("median uncertainty of a centre", f"{np.nanmedian(nodes.sigma_px):.2g} px"),
+            ("nodes seen, times", f"{100 * seen.mean():.1f} % of {seen.size}"),
+            ("median uncertainty of a centre", f"{digits(float(np.nanmedian(nodes.sigma_px)))} px"),
         ]
         source = nodes.meta.get("source")
         if isinstance(source, dict):
@@ -306,7 +309,7 @@ def read(folder: Path, facts: dict[str, Any], stages: set[str]) -> Part:
             sigma = part.angles.sigma_rad[:, k]
             if np.isfinite(sigma).any():
                 rows.append(
-                    (f"median uncertainty of phi{k + 1}", f"{math.degrees(np.nanmedian(sigma)):.2g} deg")
+                    (f"median uncertainty of phi{k + 1}", f"{digits(math.degrees(np.nanmedian(sigma)))} deg")
                 )
         turns = (np.nanmax(part.angles.phi_rad, axis=0) - np.nanmin(part.angles.phi_rad, axis=0)) / (
             2 * np.pi
@@ -318,17 +321,17 @@ def read(folder: Path, facts: dict[str, Any], stages: set[str]) -> Part:
     if f"{name}/encoder" in stages:
         part.comparison = json.loads((here / "comparison.json").read_text("utf-8"))
         part.compared = _columns(here / "comparison.parquet")
-        drawing = here / "calibration.svg"
-        if drawing.exists():
-            # Written by pydpend's own plots; what precedes <svg> is XML's preamble.
-            text = drawing.read_text("utf-8")
-            part.calibration = text[text.index("<svg") :]
+        if (here / "encoder.json").exists():
+            part.calibration = inline_svg(calibration_figure(read_calibration(here / "encoder.json")))
         part.warnings += [f"{part.label}: {note}" for note in part.comparison["notes"]]
         rms, neither = part.comparison["rms_deg"], part.comparison["shares"]["unexplained"]
-        rows.append(("film minus encoder, RMS", f"{rms:.3g} deg"))
+        rows.append(("film minus encoder, RMS", f"{digits(rms, 3)} deg"))
         if neither is not None and neither < 1:
             rows.append(
-                ("the same, expected from the noise of both", f"{rms * math.sqrt(1 - neither):.3g} deg")
+                (
+                    "the same, expected from the noise of both",
+                    f"{digits(rms * math.sqrt(1 - neither), 3)} deg",
+                )
             )
     if rows:
         part.answer = Table(("property", "value"), tuple(rows), numbers=frozenset({1}))

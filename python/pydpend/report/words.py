@@ -26,9 +26,14 @@ def _raised(exponent: int) -> str:
     return str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
 
 
+def digits(value: float, count: int = 2) -> str:
+    """A number above 0 to so many significant digits, or all before its point."""
+    return f"{value:.{max(0, count - 1 - int(np.floor(np.log10(value))))}f}" if value > 0 else f"{value:g}"
+
+
 def with_squares(unit: str) -> str:
-    """``N m s2`` as ``N m s²``."""
-    return unit.replace("s2", "s²")
+    """``N m s2`` as ``N m s²``, on one line."""
+    return unit.replace("s2", "s²").replace(" ", "\u00a0")
 
 
 def sentence(text: str) -> str:
