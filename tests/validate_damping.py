@@ -23,7 +23,7 @@ def main(case: str, seeds: int) -> None:
     """Runs one case and prints."""
     true = derived("A")
     truth = ALL_TERMS if case == "all" else TRUTH
-    inside, z, worst, ratio_ppm = [], [], [], []
+    inside, z, worst, ratio_ppm, chi2, converged = [], [], [], [], [], []
     for seed in range(seeds):
         motion = released(seed, 60.0, 500.0 if case == "slow" else 1000.0, truth)
         if case == "exact":
@@ -53,6 +53,8 @@ def main(case: str, seeds: int) -> None:
         worst.append(max(error.values(), key=abs))
         z += score
         inside += [abs(s) < 1.96 for s in score]
+        chi2.append(result.chi2)
+        converged.append(result.status == "converged")
         ratio_ppm.append(float(np.abs(ppm).max()))
         words = ", ".join(f"{n} {e:+.2f} %" for n, e in error.items())
         print(
@@ -61,7 +63,8 @@ def main(case: str, seeds: int) -> None:
         )
     if z:
         print(
-            f"{case}: worst {max(np.abs(worst)):.2f} %, ratios {max(ratio_ppm):.1f} ppm, largest |z| "
+            f"{case}: {sum(converged)} of {seeds} converged, chi-square {min(chi2):.3f}-{max(chi2):.3f}, worst "
+            f"{max(np.abs(worst)):.2f} %, ratios {max(ratio_ppm):.1f} ppm, largest |z| "
             f"{np.abs(z).max():.2f}, 95 % intervals hold {100 * np.mean(inside):.1f} % of {len(z)}"
         )
 

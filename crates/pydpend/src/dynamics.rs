@@ -228,6 +228,9 @@ pub fn shooting_fit<'py>(
     out.set_item("stuck", fit.stuck)?;
     let spread: Vec<f64> = fit.state_covariance.iter().flat_map(|m| m.iter().copied()).collect();
     out.set_item("state_covariance", spread.to_pyarray(py).reshape([fit.state_covariance.len(), 4, 4])?)?;
+    let transfer: Vec<f64> =
+        fit.transfer.iter().flat_map(|m| m.transpose().iter().copied().collect::<Vec<_>>()).collect();
+    out.set_item("transfer", transfer.to_pyarray(py).reshape([fit.transfer.len(), 4, 4])?)?;
     out.set_item("iterations", fit.iterations)?;
     let status = match fit.status {
         Status::Converged => "converged",

@@ -75,6 +75,8 @@ def typical_hz(track: Track, span: tuple[float, float]) -> float:
     rate = np.convolve(x, weights[1][::-1], "valid") / dt
     acceleration = 2 * np.convolve(x, weights[2][::-1], "valid") / dt**2
     even = np.abs(t[2 * half :] - t[: -2 * half] - 2 * half * dt) < 0.5 * dt
+    if not even.any():
+        return float("nan")
     rms = float(np.sqrt(np.mean(rate[even] ** 2)))
     return float(np.sqrt(np.mean(acceleration[even] ** 2))) / rms / (2 * np.pi) if rms > 0 else float("nan")
 

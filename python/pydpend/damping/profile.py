@@ -46,6 +46,8 @@ class Smoothed:
     """Of each piece's state, (K, 4, 4)."""
     chi2: float
     """Of the angles."""
+    doubled: Segments
+    """The pieces two by two, for the next round."""
 
 
 def smooth(
@@ -53,7 +55,7 @@ def smooth(
 ) -> Smoothed:
     """The motion with given losses, each segment by itself. Raises FitError when there is none."""
     found = shooting.solve(tracks, segments, constants, zeros, slack=UNTIED, learned=False, max_iterations=30)
-    return Smoothed(found.segments, found.zeros_rad, found.state_covariance, found.chi2)
+    return Smoothed(found.segments, found.zeros_rad, found.state_covariance, found.chi2, found.merged(2))
 
 
 def profile(
@@ -136,10 +138,9 @@ def fit_energy(
     for round_ in range(DOUBLINGS + 1):
         few, _, smoothed = along(values)
         fit = fit_profiles(few)
-        values, segments, zeros = fit.values, smoothed.segments, smoothed.zeros_rad
-        if round_ < DOUBLINGS:
-            # Short pieces hardly know of losses, but cannot lose their way; each says enough for twice its length.
-            segments = segments.merged(2)
+        values, zeros = fit.values, smoothed.zeros_rad
+        # Short pieces hardly know of losses, but cannot lose their way; each says enough for twice its length.
+        segments = smoothed.doubled if round_ < DOUBLINGS else smoothed.segments
         if progress is not None:
             progress(round_ + 1, DOUBLINGS + 1 + ROUNDS, fit.chi2)
     # The energies and works themselves depend a little on the losses that the pieces were followed with.

@@ -22,6 +22,11 @@ Progress = Callable[[int, int, float], object]
 """Called with the step, the most there will be, and chi-square."""
 
 
+GROWTH = 300.0
+"""Most that a segment may make of an error of its start, states in units of what a piece's samples determine. Passing
+close by the upright makes 1e4 and more in a second: no linear step holds through that."""
+
+
 @dataclass(frozen=True)
 class Segments:
     """Pieces of recordings, each with its own free state."""
@@ -56,14 +61,21 @@ class Segments:
         rows[:, 3] = (np.arange(len(rows)) % size != size - 1).astype(np.int64)
         return replace(out, rows=rows)
 
-    def merged(self, size: int) -> Segments:
+    def merged(self, size: int, transfer: Floats | None = None) -> Segments:
         """Every ``size`` consecutive segments of a chain as one, from the first one's state; what is left over at
-        a chain's end is one too."""
+        a chain's end is one too. With ``transfer`` (K, 4, 4), the derivatives of each segment's end with respect to
+        its start in units that make them comparable, one ends where a start would grow beyond `GROWTH`."""
         rows: list[list[int]] = []
         times: list[list[float]] = []
         first: list[int] = []
         run = 0
+        grown = np.eye(4)
         for k in range(len(self)):
+            if transfer is not None:
+                further = transfer[k] @ grown
+                if run and np.linalg.norm(further, 2) > GROWTH:
+                    run = 0
+                grown = further if run else transfer[k]
             if run == 0:
                 first.append(k)
                 rows.append(self.rows[k].tolist())
@@ -98,6 +110,8 @@ class Solution:
     state_freedom: float
     state_covariance: Floats
     """Of each segment's state, (K, 4, 4)."""
+    transfer: Floats
+    """Derivatives of each segment's end with respect to its start, (K, 4, 4)."""
     stuck: int
     iterations: int
     status: str
@@ -108,6 +122,11 @@ class Solution:
         """Sum of squares over degrees of freedom, states and common unknowns counted."""
         freedom = float(self.counts.sum()) - self.state_freedom - len(self.names)
         return float(self.squares.sum()) / max(freedom, 1.0)
+
+    def merged(self, size: int) -> Segments:
+        """Its segments, ``size`` to one where the motion allows it."""
+        own = self.own_sigma
+        return self.segments.merged(size, self.transfer * own[None, None, :] / own[None, :, None])
 
 
 FASTEST_RAD_S = 300.0
@@ -185,7 +204,7 @@ def solve(
             progress=progress,
         )
     except ValueError as problem:
-        advice = "Look at the angles around their gaps, and check that the model is this pendulum's"
+        advice = "Give angles with fewer gaps, and check that the model is this pendulum's"
         raise FitError(fault("trajectory fit", str(problem), advice)) from problem
     names = (*free, *(("clock",) if clock else ()))
     if zeros:
@@ -209,6 +228,7 @@ def solve(
         np.array(out["counts"]),
         out["state_freedom"],
         out["state_covariance"],
+        out["transfer"],
         out["stuck"],
         out["iterations"],
         out["status"],
@@ -248,7 +268,7 @@ def settled(
         max_iterations=30,
         progress=progress,
     )
-    return replace(loose, segments=loose.segments.merged(size))
+    return replace(loose, segments=loose.merged(size))
 
 
 @dataclass(frozen=True)

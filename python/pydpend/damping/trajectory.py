@@ -134,7 +134,8 @@ def fit_trajectory(
             bounded=bounded,
             slack=FLOOR,
             clock=clock,
-            huber=HUBER,
+            # Where the angles' errors are not the noise between neighbours, all residuals would be outliers.
+            huber=HUBER * max(1.0, settled.chi2) ** 0.5,
             max_iterations=max_iterations,
             progress=progress,
         )

@@ -17,6 +17,8 @@ pub struct Block {
     pub border: Matrix4xX<f64>,
     /// Gradient.
     pub gradient: Vector4<f64>,
+    /// The samples' part of `own`'s diagonal.
+    pub damped: Vector4<f64>,
 }
 
 /// The whole system.
@@ -28,6 +30,8 @@ pub struct Arrow {
     pub corner: DMatrix<f64>,
     /// Border's gradient.
     pub gradient: DVector<f64>,
+    /// The samples' part of `corner`'s diagonal.
+    pub damped: DVector<f64>,
 }
 
 /// The system after the forward elimination.
@@ -43,7 +47,15 @@ pub struct Eliminated {
 }
 
 impl Arrow {
-    /// Eliminates the states, with each diagonal element multiplied by `1 + damping`. `None` when a block is not
+    /// The gradient along a step of states and border.
+    #[must_use]
+    pub fn slope(&self, states: &[Vector4<f64>], border: &DVector<f64>) -> f64 {
+        let along: f64 = self.blocks.iter().zip(states).map(|(b, s)| b.gradient.dot(s)).sum();
+        along + self.gradient.dot(border)
+    }
+
+    /// Eliminates the states, with `damping` times the samples' part of the diagonal added to it (the joints' part
+    /// would hold back steps along the continuous motion, the more the tighter they are). `None` when a block is not
     /// positive definite.
     #[must_use]
     pub fn eliminate(&self, damping: f64) -> Option<Eliminated> {
@@ -57,13 +69,13 @@ impl Arrow {
             corner_gradient: self.gradient.clone(),
         };
         for i in 0..self.corner.nrows() {
-            out.corner[(i, i)] *= 1.0 + damping;
+            out.corner[(i, i)] += damping * self.damped[i];
         }
         let mut carry: Option<(Matrix4<f64>, Matrix4xX<f64>, Vector4<f64>)> = None;
         for block in &self.blocks {
             let mut own = block.own;
             for i in 0..4 {
-                own[(i, i)] *= 1.0 + damping;
+                own[(i, i)] += damping * block.damped[i];
             }
             let (mut border, mut gradient) = (block.border.clone(), block.gradient);
             if let Some((o, b, g)) = carry.take() {
@@ -188,6 +200,7 @@ mod tests {
             blocks: Vec::new(),
             corner: DMatrix::zeros(g, g),
             gradient: DVector::from_fn(g, |i, _| i as f64 - 0.7),
+            damped: DVector::zeros(g),
         };
         for i in 0..size {
             for j in 0..size {
@@ -207,6 +220,7 @@ mod tests {
                 next: (k != 2 && k != 4).then(|| block(k, k + 1)),
                 border: Matrix4xX::from_fn(g, |i, j| dense[(4 * k + i, 4 * n + j)]),
                 gradient: Vector4::from_fn(|i, _| (i + k) as f64 * 0.3 - 1.0),
+                damped: Vector4::zeros(),
             });
         }
         arrow.corner = DMatrix::from_fn(g, g, |i, j| dense[(4 * n + i, 4 * n + j)]);

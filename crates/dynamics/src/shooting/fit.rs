@@ -40,6 +40,8 @@ pub struct Fit {
     pub state_freedom: f64,
     /// Covariance of each segment's state, that of the common unknowns included.
     pub state_covariance: Vec<Matrix4<f64>>,
+    /// Derivatives of each segment's end with respect to its start.
+    pub transfer: Vec<Matrix4<f64>>,
     /// Segments in which a joint stuck.
     pub stuck: usize,
     /// Steps taken.
@@ -47,6 +49,16 @@ pub struct Fit {
     /// How it ended.
     pub status: Status,
 }
+
+/// Half chi-square below which a step changes nothing: less than 0.05 standard deviations in any direction. Where the
+/// residuals are larger than their sigmas, so are the errors.
+const SMALL: f64 = 1e-3;
+/// Part of the cost below which the states have settled enough for another slack.
+const NEARLY: f64 = 0.01;
+/// Damping below which a step is as long as an undamped one.
+const FREE: f64 = 1e-2;
+/// Damping beyond which no step lowers the cost.
+const STUCK: f64 = 1e4;
 
 /// Fits. `start` gives parameters, zeros and states (one per segment); `progress` may stop it by returning false.
 ///
@@ -92,32 +104,10 @@ pub fn fit(
     let mut settled = !chained || matches!(settings.slack, Slack::Fixed(_));
     let mut joint_chi2 = [f64::NAN; 4];
     while iterations < settings.max_iterations {
-        let arrow = problem.assemble(&point, &locals, weight(slack));
-        let cost = problem.local_cost(&point, &locals, weight(slack));
-        let mut accepted = false;
-        let mut gain = 0.0;
-        for _ in 0..12 {
-            let Some(done) = arrow.eliminate(damping) else {
-                damping = (damping * 10.0).max(1e-6);
-                continue;
-            };
-            let Some(step) = problem.border_step(&point, &done) else {
-                damping = (damping * 10.0).max(1e-6);
-                continue;
-            };
-            let next = problem.moved(&point, &step, &done.states(&step));
-            let next_cost = problem.cost(&next, weight(slack));
-            if next_cost <= cost * (1.0 + 1e-12) {
-                gain = cost - next_cost;
-                point = next;
-                accepted = true;
-                damping = if damping < 1e-9 { 0.0 } else { damping * 0.1 };
-                break;
-            }
-            damping = (damping * 10.0).max(1e-6);
-        }
+        let step = problem.step(&point, &locals, weight(slack), &mut damping);
         iterations += 1;
-        if accepted {
+        if let Some(next) = step.next {
+            point = next;
             locals = problem.locals(&point);
         }
         let (sum, count) = locals
@@ -132,9 +122,8 @@ pub fn fit(
             status = Status::Stopped;
             break;
         }
-        // 1e-3 in half chi-square is a step of less than 0.05 standard deviations in any direction.
-        let still = gain < 1e-3;
-        if !settled && (still || gain < 0.01 * cost || !accepted) {
+        let still = step.gain < SMALL * report.chi2.max(1.0) && step.damping < FREE;
+        if !settled && (still || step.gain < NEARLY * step.cost) {
             own = own_sigma(&locals).unwrap_or(own);
             let lowest = floor(own);
             let next = match settings.slack {
@@ -158,12 +147,12 @@ pub fn fit(
                 settled = true;
             }
         }
-        if still && accepted {
+        if still {
             status = Status::Converged;
             break;
         }
-        if !accepted {
-            status = if damping > 1e3 { Status::Stalled } else { Status::Converged };
+        if step.damping > STUCK {
+            status = Status::Stalled;
             break;
         }
     }
@@ -200,6 +189,7 @@ pub fn fit(
         cost,
         state_freedom: state_freedom - absent as f64,
         state_covariance: spreads.iter().map(whole).collect(),
+        transfer: locals.iter().map(|l| l.end_state).collect(),
         iterations,
         status,
         point,

@@ -80,12 +80,17 @@ pub(super) fn learned(
     lowest: [f64; 4],
 ) -> Option<Learned> {
     let mut now = Learned { slack: start, chi2: [f64::NAN; 4] };
+    let mut solved: Option<Learned> = None;
     for _ in 0..MOST_GUESSES {
         let slack = now.slack;
         let weight = Vector4::from(slack.map(|s| 1.0 / (s * s)));
         let done = problem.assemble(point, locals, Some(weight)).eliminate(0.0);
         let step = done.and_then(|done| problem.border_step(point, &done).map(|border| (done, border)));
         let Some((done, border)) = step else {
+            if let Some(before) = solved {
+                // So tight that it is lost in rounding where the motion is not yet the right one.
+                return Some(before);
+            }
             if slack == lowest {
                 return None;
             }
@@ -95,6 +100,7 @@ pub(super) fn learned(
         };
         let (squares, freedom) = joints(problem, point, locals, &done, &border, slack);
         now.chi2 = std::array::from_fn(|i| squares[i] / (freedom[i].max(1e-9) * slack[i] * slack[i]));
+        solved = Some(now);
         now.slack = std::array::from_fn(|i| {
             let wanted = (squares[i] / freedom[i].max(1e-3)).sqrt();
             wanted.clamp(slack[i] / 10.0, slack[i] * 10.0).max(lowest[i])

@@ -22,6 +22,23 @@ pub(super) struct Problem<'a> {
 /// Least relative information that counts, tried in turn.
 const RIDGES: [f64; 4] = [1e-13, 1e-11, 1e-9, 1e-7];
 
+/// Most dampings tried in one step.
+const TRIES: usize = 12;
+/// Relative error of the cost from the integration's rounding, grown by the motion.
+const ROUNDING: f64 = 1e-9;
+
+/// What a step did.
+pub(super) struct Step {
+    /// Where it leads; `None` where the cost does not fall.
+    pub(super) next: Option<Point>,
+    /// What half chi-square falls by; what it might at most where it does not fall.
+    pub(super) gain: f64,
+    /// Half chi-square before.
+    pub(super) cost: f64,
+    /// The damping that it needed.
+    pub(super) damping: f64,
+}
+
 impl Problem<'_> {
     pub(super) fn locals(&self, point: &Point) -> Vec<Local> {
         let one = |(k, segment): (usize, &Segment)| {
@@ -90,6 +107,7 @@ impl Problem<'_> {
             blocks: Vec::with_capacity(locals.len()),
             corner: DMatrix::zeros(g, g),
             gradient: DVector::zeros(g),
+            damped: DVector::zeros(g),
         };
         for (segment, local) in self.segments.iter().zip(locals) {
             let column = self.columns(segment);
@@ -105,13 +123,16 @@ impl Problem<'_> {
                     arrow.corner[(column(r), to)] += local.hessian[(4 + r, 4 + c)];
                 }
             }
+            let own: Matrix4<f64> = local.hessian.fixed_view::<4, 4>(0, 0).into();
             arrow.blocks.push(Block {
-                own: local.hessian.fixed_view::<4, 4>(0, 0).into(),
+                own,
+                damped: own.diagonal(),
                 next: None,
                 border,
                 gradient: local.gradient.fixed_rows::<4>(0).into(),
             });
         }
+        arrow.damped = arrow.corner.diagonal();
         if let Some(weight) = weight {
             let w = Matrix4::from_diagonal(&weight);
             for (k, d) in self.jumps(point, locals) {
@@ -173,6 +194,40 @@ impl Problem<'_> {
             }
         }
         None
+    }
+
+    /// One Gauss-Newton step, damped until the cost falls.
+    pub(super) fn step(
+        &self,
+        point: &Point,
+        locals: &[Local],
+        weight: Option<Vector4<f64>>,
+        damping: &mut f64,
+    ) -> Step {
+        let arrow = self.assemble(point, locals, weight);
+        let cost = self.local_cost(point, locals, weight);
+        let mut out = Step { next: None, gain: f64::INFINITY, cost, damping: *damping };
+        for _ in 0..TRIES {
+            out.damping = *damping;
+            let found = arrow
+                .eliminate(*damping)
+                .and_then(|done| self.border_step(point, &done).map(|border| (done.states(&border), border)));
+            if let Some((states, border)) = found {
+                let promised = -0.5 * arrow.slope(&states, &border);
+                let next = self.moved(point, &border, &states);
+                let gain = cost - self.cost(&next, weight);
+                if gain >= -1e-12 * cost {
+                    *damping = if *damping < 1e-9 { 0.0 } else { *damping * 0.1 };
+                    return Step { next: Some(next), gain, ..out };
+                }
+                if promised < ROUNDING * cost {
+                    // What is left to gain is less than the cost is known to.
+                    return Step { gain: promised, ..out };
+                }
+            }
+            *damping = (*damping * 10.0).max(1e-6);
+        }
+        out
     }
 
     pub(super) fn moved(&self, point: &Point, border: &DVector<f64>, states: &[Vector4<f64>]) -> Point {
