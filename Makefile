@@ -53,7 +53,8 @@ check: build
 
 # Long: the eight scenes by twenty seeds, real motion filmed, then the estimators' sweeps.
 validate: build
-	cargo run $(CARGO_FLAGS) --example validate -- --seeds 100..120 --write docs/validation.md
+	cargo build $(CARGO_FLAGS) --example validate
+	target/release/examples/validate --seeds 100..120 --write docs/validation.md
 	$(PY) -m tests.validate_kinematics
 	$(PY) -m tests.validate_resume
 	for sweep in angles default physics; do $(PY) -m tests.validate_$$sweep || exit 1; done

@@ -71,3 +71,34 @@ pub fn residuals(rig: &Rig, rows: &Rows) -> Vec<NodeMotion> {
     }
     out
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::preset;
+    use crate::track::tests::bed::{Bed, QUIET, hide};
+
+    #[test]
+    fn gaps_residuals_and_speed_are_those_of_the_film() {
+        let mut scene = preset("clean", 2000).unwrap();
+        scene.links.iter_mut().for_each(|l| l.width_px = 0.0);
+        hide(&mut scene, 300, 20, &["n4"]);
+        hide(&mut scene, 500, 7, &["n4"]);
+        let bed = Bed::new(&scene, QUIET);
+        let rig = bed.film.rig(0);
+        let found = residuals(&rig, &bed.rows(&rig));
+        assert!(found[4].gaps >= 2 && found[0].gaps < found[4].gaps, "{found:?}");
+        for (k, f) in found.iter().enumerate() {
+            // Noise of 0.03 px less what the pose takes up: three of 2 n numbers, and unevenly between the nodes.
+            let residual = f.residual_px.unwrap();
+            assert!(residual > 0.3 * 0.03 && residual < 1.2 * 0.03, "n{k} {residual}");
+            let steps = bed.truth.frames.windows(2).map(|w| {
+                let (a, b) = (&w[0].nodes[k], &w[1].nodes[k]);
+                (b.x_px - a.x_px).hypot(b.y_px - a.y_px)
+            });
+            let fastest = steps.fold(0.0, f64::max);
+            // Noise of two places, at most five standard deviations.
+            assert!((f.fastest_px.unwrap() - fastest).abs() < 0.25, "n{k} {f:?} {fastest}");
+        }
+    }
+}

@@ -2,14 +2,18 @@
 //!
 //! Owns: [`find`], [`Setup`]. Must not: find markers, bodies or places itself, or write files.
 
+use std::sync::Arc;
+
 use opencv::core::Mat;
 
-use crate::detect::Flags;
+use crate::detect::{DetectSettings, Detection, Detector, Flags, Levels};
 use crate::discover::advice::advise;
-use crate::error::{Error, Fault, Result};
+use crate::error::{Error, Fault, Place, Result};
+use crate::frame::Frame;
 use crate::overlay;
 use crate::pipeline::{self, Existing, Observer, RunSettings};
 use crate::rig::Rig;
+use crate::source::{self, OpenOptions};
 use crate::table::RunEnding;
 
 /// What a recording shows.
@@ -51,7 +55,7 @@ pub fn find(settings: &RunSettings, observer: &mut dyn Observer) -> Result<Setup
         warnings.extend(advise(&rig, &table.rows, summary.meta.source.rate_hz));
     }
     let index = rig.reference_frame.unwrap_or(0);
-    let (frame, detections) = overlay::frame_at(&settings.input, &settings.open, &settings.detect, index)?;
+    let (frame, detections) = frame_at(&settings.input, &settings.open, &settings.detect, index)?;
     let saturated = detections.iter().filter(|d| d.flags.has(Flags::SATURATED)).count();
     if saturated > 0 {
         warnings.push(format!(
@@ -62,4 +66,23 @@ pub fn find(settings: &RunSettings, observer: &mut dyn Observer) -> Result<Setup
     }
     let picture = overlay::still(&frame, &rig, &detections)?;
     Ok(Setup { rig, warnings, picture })
+}
+
+/// A frame of a recording and what is detected in it.
+fn frame_at(
+    input: &str,
+    open: &OpenOptions,
+    detect: &DetectSettings,
+    index: u64,
+) -> Result<(Frame, Vec<Detection>)> {
+    let mut source = source::open(input, open)?;
+    let levels = Levels::learn(&source.sample(24)?, detect)?;
+    let mut detections = Vec::new();
+    while let Some(frame) = source.next_frame()? {
+        if frame.index == index {
+            Detector::new(Arc::new(levels), detect)?.detect(&frame, &mut detections)?;
+            return Ok((frame, detections));
+        }
+    }
+    Err(Error::Source(Fault::new(input, "it ends before this frame").at(Place::Frame(index))))
 }

@@ -4,11 +4,14 @@
 
 use std::path::Path;
 
+use opencv::prelude::MatTraitConst;
 use tracker::film::encode::Codec;
+use tracker::film::scene::{LinkMotion, Marker};
 use tracker::film::{Film, Scene, Truth, WriteOptions, preset, write};
 use tracker::frame::TimeBase;
 use tracker::pipeline::{RunSettings, Silent, run};
 use tracker::score::{LIMIT_PX, Tracked, score};
+use tracker::setup::{Setup, find};
 use tracker::source::{Ending, OpenOptions, open};
 
 /// The paper's layout in a small image, 12 frames.
@@ -212,4 +215,53 @@ fn stated_uncertainties_hold_through_every_codec() {
         }
     }
     assert!(wrong.is_empty(), "{wrong:?}");
+}
+
+/// What `tracker setup` says of a film of `scene`.
+fn setup(scene: &Scene) -> Setup {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("film.mp4");
+    let options =
+        WriteOptions { speed: Some("ultrafast".into()), quality: Some(10), ..WriteOptions::default() };
+    write(&Film::new(scene).unwrap(), &path, &options, &mut |_| Ok(())).unwrap();
+    let settings = RunSettings { input: path.display().to_string(), ..Default::default() };
+    find(&settings, &mut Silent).unwrap()
+}
+
+#[test]
+fn setup_draws_the_rig_and_tells_what_to_change() {
+    let mut scene = preset("clean", 2000).unwrap();
+    scene.frames = 300;
+    // Every marker is brighter than the camera can tell, and no bar hides what crosses.
+    scene.markers.iter_mut().for_each(|m| m.level = 400.0);
+    scene.links.iter_mut().for_each(|l| l.width_px = 0.0);
+    let found = setup(&scene);
+    assert_eq!((found.rig.nodes.len(), found.rig.bodies.len(), found.rig.joints.len()), (9, 2, 2));
+    let told = |said: &str| assert!(found.warnings.iter().any(|w| w.contains(said)), "{:?}", found.warnings);
+    told("markers are saturated");
+    told("is not at rest");
+    told("merge in the picture when their bodies cross");
+    assert_eq!((found.picture.cols(), found.picture.rows()), (720, 720));
+
+    // One link, too fast for its camera, with two markers as far from the others.
+    let mut scene = preset("clean", 2000).unwrap();
+    scene.rate_hz = 100.0;
+    scene.frames = 120;
+    scene.links.truncate(1);
+    scene.links[0].motion = Some(LinkMotion::Tumble { phi_rad: 0.0, rate_rad_s: 80.0, frequency_hz: 1.0 });
+    scene.markers.truncate(4);
+    let layout = [[10.0, 0.0], [110.0, 0.0], [50.0, 20.0], [50.0, -20.0]];
+    for (marker, at_px) in scene.markers.iter_mut().zip(layout) {
+        *marker = Marker { at_px, link: scene.links[0].name.clone(), ..marker.clone() };
+    }
+    let found = setup(&scene);
+    assert_eq!(found.rig.nodes.len(), 4);
+    let told = |said: &str| assert!(found.warnings.iter().any(|w| w.contains(said)), "{:?}", found.warnings);
+    told("have the same distances to its other nodes");
+    told("frames a second would do without");
+    assert!(
+        !found.warnings.iter().any(|w| w.contains("saturated") || w.contains("merge")),
+        "{:?}",
+        found.warnings
+    );
 }

@@ -1,13 +1,17 @@
-//! A film to what is detected in it and what is true of it.
+//! A film to what is detected in it, what is true of it and what the tracker makes of it.
 
 use std::sync::Arc;
 
 use anyhow::Result;
 use tracker::detect::{DetectSettings, Detector, Levels};
-use tracker::film::{Film, Truth, preset};
+use tracker::discover::discover;
+use tracker::film::{Film, Scene, Truth};
 use tracker::frame::FrameSource;
+use tracker::rig::Rig;
+use tracker::score::{LIMIT_PX, Score, Tracked, score};
 use tracker::source::synthetic::SyntheticSource;
 use tracker::store::{DetectionStore, FrameStamp};
+use tracker::track::{Status, track_recording};
 
 /// Frames whose detections are learned from, as in `pipeline`.
 const SAMPLES: usize = 12;
@@ -20,9 +24,9 @@ pub struct Filmed {
 }
 
 impl Filmed {
-    /// A scene by name and seed.
-    pub fn of(scene: &str, seed: u64) -> Result<Self> {
-        let film = Arc::new(Film::new(&preset(scene, seed)?)?);
+    /// A scene.
+    pub fn of(scene: &Scene) -> Result<Self> {
+        let film = Arc::new(Film::new(scene)?);
         let mut source = SyntheticSource::of(Arc::clone(&film));
         let settings = DetectSettings::default();
         let levels = Arc::new(Levels::learn(&source.sample(SAMPLES)?, &settings)?);
@@ -38,8 +42,48 @@ impl Filmed {
         Ok(Self { film: Arc::unwrap_or_clone(film), truth, store })
     }
 
-    /// The first frame in which every marker is fully visible.
-    pub fn whole(&self, full: f64) -> Option<usize> {
-        self.truth.frames.iter().position(|f| f.nodes.iter().all(|n| n.visible >= full))
+    /// What the tracker makes of it without a rig.
+    pub fn follow(&self) -> Result<Followed> {
+        let rig = discover(&self.store, self.film.scene().image_px)?.rig;
+        let mut tracked =
+            Tracked { nodes: rig.nodes.iter().map(|n| n.name.clone()).collect(), ..Tracked::default() };
+        let mut status = Vec::new();
+        track_recording(&self.store, &rig, &mut |stamp, row| {
+            tracked.frames.push(stamp.index);
+            for o in row {
+                tracked.xy_px.push([o.x_px, o.y_px]);
+                tracked.sigma_px.push(o.sigma_px);
+                status.push(o.status);
+            }
+            Ok(())
+        })?;
+        let score = score(&tracked, &self.truth, LIMIT_PX)?;
+        let rig_right = self.same_rig(&rig, &score);
+        Ok(Followed { tracked, status, score, rig_right })
     }
+
+    /// Whether the rig has every marker and no other, each in a body with those of its link and no other.
+    fn same_rig(&self, rig: &Rig, score: &Score) -> bool {
+        let scene = self.film.scene();
+        let link = |name: &str| scene.markers.iter().find(|m| m.name == name).map(|m| m.link.as_str());
+        let pairs: Vec<_> = rig
+            .nodes
+            .iter()
+            .zip(&score.matches)
+            .map(|(n, m)| (n.body.as_str(), m.truth.as_deref().and_then(link)))
+            .collect();
+        score.unmatched.is_empty()
+            && pairs.iter().all(|p| p.1.is_some())
+            && pairs.iter().all(|p| pairs.iter().all(|q| (p.0 == q.0) == (p.1 == q.1)))
+            && rig.bodies.len() == scene.links.len()
+    }
+}
+
+/// What the tracker made of a film.
+pub struct Followed {
+    pub tracked: Tracked,
+    /// By frame, then node.
+    pub status: Vec<Status>,
+    pub score: Score,
+    pub rig_right: bool,
 }

@@ -1,7 +1,8 @@
 //! The eight scenes by many seeds, without settings and without a file between: discover, track, score. Prints the
 //! tables of `docs/validation.md`, of the tracker and, on the same detections, of the paper's own method.
 //!
-//! `cargo run --release --workspace --example validate -- [--seeds A..B] [--scenes a,b,...] [--rows] [--write FILE]`
+//! `cargo build --release --workspace --locked --example validate`, then
+//! `target/release/examples/validate [--seeds A..B] [--scenes a,b,...] [--rows] [--write FILE]`
 //!
 //! `--rows` lists every film and every row that should have been given and was not. `--write` puts the tables
 //! between the two comment lines of FILE that name them.
@@ -16,13 +17,11 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
-use films::Filmed;
+use films::{Filmed, Followed};
 use rayon::prelude::*;
-use tracker::discover::discover;
-use tracker::film::{Film, NodeTruth, PRESETS};
-use tracker::rig::Rig;
-use tracker::score::{FULL, HALF, LIMIT_PX, Score, Tracked, score};
-use tracker::track::{Status, track_recording};
+use tracker::film::{NodeTruth, PRESETS, preset};
+use tracker::score::{FULL, HALF, LIMIT_PX, Score, Tracked};
+use tracker::track::Status;
 
 struct Outcome {
     score: Score,
@@ -35,23 +34,10 @@ struct Outcome {
 
 /// One film through detection, discovery and tracking.
 fn run(scene: &str, seed: u64) -> Result<Outcome> {
-    let filmed = Filmed::of(scene, seed)?;
-    let rig = discover(&filmed.store, filmed.film.scene().image_px)?.rig;
-    let mut tracked =
-        Tracked { nodes: rig.nodes.iter().map(|n| n.name.clone()).collect(), ..Tracked::default() };
-    let mut status = Vec::new();
-    track_recording(&filmed.store, &rig, &mut |stamp, row| {
-        tracked.frames.push(stamp.index);
-        for o in row {
-            tracked.xy_px.push([o.x_px, o.y_px]);
-            tracked.sigma_px.push(o.sigma_px);
-            status.push(o.status);
-        }
-        Ok(())
-    })?;
-    let score = score(&tracked, &filmed.truth, LIMIT_PX)?;
-    let rig_right = same_rig(&rig, &score, &filmed.film);
-    let paper = match filmed.whole(FULL) {
+    let filmed = Filmed::of(&preset(scene, seed)?)?;
+    let Followed { tracked, status, score, rig_right } = filmed.follow()?;
+    let whole = filmed.truth.frames.iter().position(|f| f.nodes.iter().all(|n| n.visible >= FULL));
+    let paper = match whole {
         Some(start) => {
             let told = paper::follow(&filmed.store, &filmed.film.rig(start as u64), start);
             let mut s = tracker::score::score(&told, &filmed.truth, LIMIT_PX)?;
@@ -118,21 +104,6 @@ fn missed(filmed: &Filmed, score: &Score, tracked: &Tracked, status: &[Status]) 
         }
     }
     out
-}
-
-/// Whether the rig has every marker and no other, each in a body with those of its link and no other.
-fn same_rig(rig: &Rig, score: &Score, film: &Film) -> bool {
-    let link = |name: &str| film.scene().markers.iter().find(|m| m.name == name).map(|m| m.link.as_str());
-    let pairs: Vec<_> = rig
-        .nodes
-        .iter()
-        .zip(&score.matches)
-        .map(|(n, m)| (n.body.as_str(), m.truth.as_deref().and_then(link)))
-        .collect();
-    score.unmatched.is_empty()
-        && pairs.iter().all(|p| p.1.is_some())
-        && pairs.iter().all(|p| pairs.iter().all(|q| (p.0 == q.0) == (p.1 == q.1)))
-        && rig.bodies.len() == film.scene().links.len()
 }
 
 struct Arguments {

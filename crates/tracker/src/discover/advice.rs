@@ -40,13 +40,18 @@ fn place(rows: &Rows, n: usize, t: usize, k: usize) -> Option<Vector2<f64>> {
     p.x.is_finite().then_some(p)
 }
 
-/// The greatest step against half the spacing, what plain nearest neighbours need.
+/// The greatest step against half the spacing, what plain nearest neighbours need. Markers of other bodies come as near
+/// as they like at any rate: they count only for a body of one.
 fn rate(rig: &Rig, home: &[Vector2<f64>], rows: &Rows, rate_hz: Option<f64>) -> Option<String> {
     let n = rig.nodes.len();
+    let bodies = rig.node_bodies();
+    let nearest = |k: usize, own: bool| {
+        let others = (0..n).filter(|&j| j != k && (!own || bodies[j] == bodies[k]));
+        others.map(|j| (home[k] - home[j]).norm()).fold(f64::INFINITY, f64::min)
+    };
     let mut worst: Option<(f64, usize, f64, f64)> = None;
     for k in 0..n {
-        let spacing =
-            (0..n).filter(|&j| j != k).map(|j| (home[k] - home[j]).norm()).fold(f64::INFINITY, f64::min);
+        let spacing = if nearest(k, true).is_finite() { nearest(k, true) } else { nearest(k, false) };
         for t in 1..rows.frames() {
             if let (Some(a), Some(b)) = (place(rows, n, t - 1, k), place(rows, n, t, k))
                 && rows.frame[t] == rows.frame[t - 1] + 1
@@ -62,13 +67,20 @@ fn rate(rig: &Rig, home: &[Vector2<f64>], rows: &Rows, rate_hz: Option<f64>) -> 
     let (ratio, k, step, spacing) = worst?;
     let least = rate_hz.map_or_else(
         || format!("{ratio:.1} times the frame rate"),
-        |r| format!("at least {:.0} frames a second", (r * ratio).ceil()),
+        |r| format!("{:.0} frames a second", round_up(r * ratio)),
     );
     Some(format!(
         "node {} moves up to {step:.0} px in a frame, over half its {spacing:.0} px from the next: only the motion \
-         of its body tells them apart. {least} would do without",
+         of its body tells them apart. At least {least} would do without",
         rig.nodes[k].name
     ))
+}
+
+/// The next number of two digits and zeros that is over by a percent at least: the greatest step lies between frames,
+/// and a chord is shorter than its arc.
+fn round_up(rate_hz: f64) -> f64 {
+    let unit = 10f64.powf(rate_hz.log10().floor() - 1.0);
+    (1.01 * rate_hz / unit).ceil() * unit
 }
 
 fn merging(rig: &Rig, rows: &Rows) -> Vec<String> {
@@ -122,13 +134,34 @@ fn not_at_rest(rig: &Rig, rows: &Rows) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::Scene;
+    use crate::film::scene::LinkMotion;
+    use crate::film::{Scene, preset};
     use crate::track::tests::bed::{Bed, QUIET, scene, tumble};
 
     fn advice(scene: &Scene) -> Vec<String> {
         let bed = Bed::new(scene, QUIET);
         let rig = bed.film.rig(0);
         advise(&rig, &bed.rows(&rig), Some(scene.rate_hz))
+    }
+
+    fn bare(rate_hz: f64, frames: u64) -> Scene {
+        let mut s = preset("clean", 2000).unwrap();
+        s.links.iter_mut().for_each(|l| l.width_px = 0.0);
+        s.rate_hz = rate_hz;
+        s.frames = frames;
+        s
+    }
+
+    #[test]
+    fn too_slow_a_camera_is_told_the_least_rate() {
+        let said = advice(&bare(100.0, 400));
+        let rate = said.iter().find(|w| w.contains("frames a second would do")).unwrap();
+        let words: Vec<&str> = rate.split_whitespace().collect();
+        let least: f64 = words[words.iter().position(|w| *w == "frames").unwrap() - 1].parse().unwrap();
+        assert!(least > 100.0, "{rate}");
+        // At that rate, over the same time, it is enough.
+        let again = advice(&bare(least, (4.0 * least) as u64));
+        assert!(!again.iter().any(|w| w.contains("frames a second would do")), "{again:?}");
     }
 
     #[test]
@@ -141,5 +174,24 @@ mod tests {
             "{said:?}"
         );
         assert!(!said.iter().any(|w| w.contains("m0 and")), "{said:?}");
+    }
+
+    #[test]
+    fn markers_that_merge_and_a_reference_that_moves_are_told() {
+        let said = advice(&bare(500.0, 1000));
+        assert!(said.iter().any(|w| w.contains("merge in the picture when their bodies cross")), "{said:?}");
+        assert!(said.iter().any(|w| w.contains("the reference frame 0 is not at rest")), "{said:?}");
+        let still = LinkMotion::Swing {
+            phi_rad: 0.0,
+            amplitude_rad: 1.0,
+            frequency_hz: 0.5,
+            phase_rad: std::f64::consts::FRAC_PI_2,
+            decay_per_s: 0.0,
+        };
+        // It begins at rest, at the turning point.
+        let layout = [[20.0, 5.0], [70.0, -9.0], [130.0, 3.0]];
+        let said =
+            advice(&scene(2000, &[("rod", None, [360.0, 360.0], still)], &layout.map(|at| ("rod", at))));
+        assert!(said.is_empty(), "{said:?}");
     }
 }

@@ -189,11 +189,15 @@ pub fn find_bodies(sample: &Sample) -> Vec<Link> {
         }
     }
     let mut links: Vec<Link> = best.into_iter().map(|p| link_of(p, FLOOR_PX)).collect();
-    complete(&mut links, sample);
+    // Two equal bodies are never told apart, so nothing can be added to them.
+    if alike(&links).is_none_or(|(a, b)| links[a].nodes.len() != links[b].nodes.len()) {
+        complete(&mut links, sample);
+    }
     links
 }
 
-fn looks_whole(d: &Detection) -> bool {
+/// Whether a detection is the whole of one marker, as far as its picture tells.
+pub fn looks_whole(d: &Detection) -> bool {
     !d.flags.has(Flags::MERGED | Flags::PARTIAL | Flags::BORDER)
 }
 

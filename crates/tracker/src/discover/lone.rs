@@ -5,7 +5,7 @@
 use nalgebra::{Isometry2, Vector2};
 
 use super::arrange::Found;
-use super::bodies::{self, FLOOR_PX, link_of};
+use super::bodies::{self, FLOOR_PX, link_of, looks_whole};
 use super::sample::Sample;
 use crate::detect::Detection;
 use crate::store::DetectionStore;
@@ -23,6 +23,8 @@ struct Path {
     at: Vec<(usize, Vector2<f64>)>,
     /// Areas and elongations of its detections.
     shape: Vec<(f32, f32)>,
+    /// Whether each is the whole of one marker: the others' centres are not its.
+    whole: Vec<bool>,
 }
 
 impl Path {
@@ -45,7 +47,9 @@ impl Path {
         let mut long: Vec<f32> = self.shape.iter().map(|s| s.1).collect();
         long.sort_by(f32::total_cmp);
         let n = areas.len();
-        // Four fifths within a factor of 1.6 in area: blur and compression change it, not more.
+        // Blur of length L makes a disc of radius r by 0.64 L / r larger and, in second moments, sqrt(1 + L^2 / 3 r^2)
+        // times as long as wide. Four fifths within 1.6 in area allow a speed that comes to blur of r; a median length
+        // of 1.8 allows blur of 2.6 r throughout.
         areas[n - 1 - n / 10] < 1.6 * areas[n / 10] && long[n / 2] < 1.8
     }
 
@@ -97,16 +101,16 @@ pub fn find_lone(
         store.read(i, &mut scratch);
         let Some(rest) = left_over(links, &scratch) else { continue };
         linked += 1;
-        let mut free: Vec<(Vector2<f64>, (f32, f32))> = rest
+        let mut free: Vec<(Vector2<f64>, (f32, f32), bool)> = rest
             .iter()
-            .map(|d| (Vector2::new(d.x_px, d.y_px), (d.area_px, d.elongation)))
-            .filter(|(p, _)| standing.iter().all(|s| (s - p).norm() > super::sample::STILL_PX))
+            .map(|d| (Vector2::new(d.x_px, d.y_px), (d.area_px, d.elongation), looks_whole(d)))
+            .filter(|(p, ..)| standing.iter().all(|s| (s - p).norm() > super::sample::STILL_PX))
             .collect();
         // Nearest pairs first, each used once.
         let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
         for (k, path) in open.iter().enumerate() {
             let Some(guess) = path.guess(i) else { continue };
-            for (d, (p, _)) in free.iter().enumerate() {
+            for (d, (p, ..)) in free.iter().enumerate() {
                 let gate = if path.at.len() == 1 { 40.0 } else { 15.0 };
                 let r = (p - guess).norm();
                 if r < gate {
@@ -123,6 +127,7 @@ pub fn find_lone(
                 grown[k] = true;
                 open[k].at.push((i, free[d].0));
                 open[k].shape.push(free[d].1);
+                open[k].whole.push(free[d].2);
             }
         }
         let mut still = Vec::new();
@@ -133,7 +138,11 @@ pub fn find_lone(
         open = still;
         let mut keep = used.iter();
         free.retain(|_| !keep.next().copied().unwrap_or(false));
-        open.extend(free.into_iter().map(|(p, s)| Path { at: vec![(i, p)], shape: vec![s] }));
+        open.extend(free.into_iter().map(|(p, s, w)| Path {
+            at: vec![(i, p)],
+            shape: vec![s],
+            whole: vec![w],
+        }));
     }
     done.append(&mut open);
     // Beside bodies that make a rig already, what is seen for a moment is no part of it.
@@ -156,7 +165,7 @@ pub fn find_lone(
     kept.iter()
         .map(|path| {
             let mut poses = vec![None; sample.frames.len()];
-            for &(f, p) in &path.at {
+            for (&(f, p), _) in path.at.iter().zip(&path.whole).filter(|(_, whole)| **whole) {
                 if let Ok(k) = sample.frames.binary_search(&f) {
                     poses[k] = Some(Isometry2::new(p, 0.0));
                 }

@@ -160,10 +160,8 @@ fn reference(sample: &Sample, found: &[Found], image_px: [u32; 2]) -> (usize, bo
     (best.0, best.1 == all)
 }
 
-/// Where a body is first seen, for a message.
+/// Where a body was found, for a message.
 fn place_words(found: &Found) -> String {
-    found.poses.iter().flatten().next().map_or_else(String::new, |p| {
-        let at = place(p, found.link.template[0]);
-        format!("one with a marker at ({:.0}, {:.0}) px", at.x, at.y)
-    })
+    let at = found.link.home + found.link.template[0];
+    format!("one with a marker at ({:.0}, {:.0}) px", at.x, at.y)
 }

@@ -1,11 +1,16 @@
 //! Half hidden markers: the detection beside the place that a firm body gives a node not seen.
 //!
 //! Owns: [`Beside`], [`look_beside`]. Must not: move a pose (what is beside is no part of it).
+//!
+//! A blob in which markers run together shows all of them of which its area leaves a half, each at the place that its
+//! own body gives it.
+
+use std::f64::consts::PI;
 
 use nalgebra::Vector2;
 
 use super::engine::BodySeen;
-use super::mechanism::Link;
+use super::mechanism::{Link, Mechanism};
 use super::nearest::Sky;
 use super::rigid::place;
 use crate::detect::Flags;
@@ -15,10 +20,14 @@ use crate::detect::Flags;
 const BESIDE_RADII: f64 = 0.5;
 /// The same where the marker's size is not known, px.
 const BESIDE_PX: f64 = 2.0;
+/// Part of a marker that must be left of a merged blob for it to be seen in it.
+const LEAST_PART: f64 = 0.5;
+/// Discs no farther apart than this run together in the picture, px: blur and the threshold's edge.
+const TOUCH_PX: f64 = 2.0;
 /// How well a node's place must be known for a detection beside it to be its, px.
 const FIRM_PX: f64 = 0.3;
 
-/// The visible part of a half hidden marker.
+/// The visible part of a half hidden marker, or the blob in which it runs together with others.
 #[derive(Debug, Clone, Copy)]
 pub struct Beside {
     /// The detection.
@@ -30,35 +39,107 @@ pub struct Beside {
 }
 
 /// Finds half hidden markers: where a body's pose is firm, the detection beside the place of a node not seen.
-pub fn look_beside(link: &Link, sky: &Sky<'_>, free: &mut [bool], seen: &mut BodySeen) {
-    let Some(fit) = &seen.fit else { return };
-    for j in 0..link.nodes.len() {
-        let local = link.template[j];
-        if seen.picks[j].is_some() || fit.sigma_at(local) > FIRM_PX {
-            continue;
-        }
-        let there = place(&fit.pose, local);
-        let (usual, scatter) = link.area_px[j];
-        let radius = (usual / std::f64::consts::PI).sqrt();
-        let limit = if usual > 0.0 { BESIDE_RADII * radius } else { BESIDE_PX };
-        let Some((d, r)) = sky.nearest(there, limit) else { continue };
-        // The more is hidden, the farther off is the rest: what is whole is not beside.
-        let part = &sky.get(d);
-        if part.flags.has(Flags::MERGED) {
-            // It may all be the other marker.
-            continue;
-        }
-        let hidden = (1.0 - (f64::from(part.area_px) - 3.0 * scatter) / usual).max(0.0);
-        let most = radius * (1.1 * hidden + 0.1) + 4.0 * f64::from(part.sigma_px);
-        let off = usual == 0.0 || r <= most;
-        let nearer = link
-            .template
-            .iter()
-            .enumerate()
-            .any(|(k, &t)| k != j && (place(&fit.pose, t) - sky.place(d)).norm() < r);
-        if free[d] && off && !nearer {
-            free[d] = false;
-            seen.beside[j] = Some(Beside { detection: d, place: there, off_px: r as f32 });
+pub fn look_beside(
+    mechanism: &Mechanism,
+    body: usize,
+    sky: &Sky<'_>,
+    free: &mut [bool],
+    seen: &mut [BodySeen],
+) {
+    for j in 0..mechanism.links[body].nodes.len() {
+        if let Some(found) = beside(mechanism, (body, j), sky, free, seen) {
+            free[found.detection] = false;
+            seen[body].beside[j] = Some(found);
         }
     }
+}
+
+/// The detection beside the place of a node not seen, if its body's pose is firm.
+fn beside(
+    mechanism: &Mechanism,
+    (body, j): (usize, usize),
+    sky: &Sky<'_>,
+    free: &[bool],
+    seen: &[BodySeen],
+) -> Option<Beside> {
+    let link = &mechanism.links[body];
+    if seen[body].picks.get(j).is_none_or(Option::is_some) {
+        return None;
+    }
+    let there = firm_place(link, &seen[body], j)?;
+    let (usual, scatter) = link.area_px[j];
+    let radius = (usual / PI).sqrt();
+    let near = if usual > 0.0 { BESIDE_RADII * radius } else { BESIDE_PX };
+    let found = |detection: usize, r: f64| Beside { detection, place: there, off_px: r as f32 };
+    let (d, r) = sky.nearest(there, near.max(2.0 * radius))?;
+    let part = sky.get(d);
+    let area_px = f64::from(part.area_px);
+    if part.flags.has(Flags::MERGED) {
+        // Only where every marker that may be in it is known is it told what of it is whose.
+        let company = company(mechanism, (body, j), there, d, seen)?;
+        if !company.is_empty() {
+            let others: f64 = company.iter().map(|c| c.1).sum();
+            let own = area_px - others;
+            let picked = seen.iter().any(|s| s.picks.contains(&Some(d)));
+            if picked || own < LEAST_PART * usual + 3.0 * scatter {
+                return None;
+            }
+            // Its centre is that of all of them.
+            let own = own.min(usual);
+            let sum = company.iter().map(|c| c.1 * c.0).sum::<Vector2<f64>>() + own * there;
+            let off = (sum / (others + own) - sky.place(d)).norm();
+            return (off <= near).then(|| found(d, r));
+        }
+        if area_px > usual + 4.0 * scatter {
+            return None;
+        }
+    }
+    // The more is hidden, the farther off is the rest: what is whole is not beside.
+    let hidden = (1.0 - (area_px - 3.0 * scatter) / usual).max(0.0);
+    let most = radius * (1.1 * hidden + 0.1) + 4.0 * f64::from(part.sigma_px);
+    let off = usual == 0.0 || r <= most;
+    let fit = seen[body].fit.as_ref()?;
+    let nearer = link
+        .template
+        .iter()
+        .enumerate()
+        .any(|(k, &t)| k != j && (place(&fit.pose, t) - sky.place(d)).norm() < r);
+    (r <= near && free[d] && off && !nearer).then(|| found(d, r))
+}
+
+/// Where a body's pose says that a node is, if it says so firmly.
+fn firm_place(link: &Link, seen: &BodySeen, j: usize) -> Option<Vector2<f64>> {
+    let local = link.template[j];
+    seen.fit.as_ref().filter(|f| f.sigma_at(local) <= FIRM_PX).map(|f| place(&f.pose, local))
+}
+
+/// The other markers that may be in the blob `d` with a node at `there`, each with its area; `None` where that is not
+/// known of all.
+fn company(
+    mechanism: &Mechanism,
+    (body, j): (usize, usize),
+    there: Vector2<f64>,
+    d: usize,
+    seen: &[BodySeen],
+) -> Option<Vec<(Vector2<f64>, f64)>> {
+    let radius = |area_px: f64| (area_px / PI).sqrt();
+    let own = radius(mechanism.links[body].area_px[j].0);
+    let mut out = Vec::new();
+    for (o, (link, s)) in mechanism.links.iter().zip(seen).enumerate() {
+        for k in 0..link.nodes.len() {
+            let elsewhere = s.picks.get(k).copied().flatten().is_some_and(|p| p != d);
+            if (o, k) == (body, j) || elsewhere {
+                continue;
+            }
+            let place = firm_place(link, s, k)?;
+            let area_px = link.area_px[k].0;
+            if area_px <= 0.0 {
+                return None;
+            }
+            if (place - there).norm() < own + radius(area_px) + TOUCH_PX {
+                out.push((place, area_px));
+            }
+        }
+    }
+    Some(out)
 }

@@ -13,8 +13,10 @@ use super::mechanism::{Link, Mechanism};
 use super::nearest::Sky;
 use crate::detect::Detection;
 
-/// How exactly the only node seen of a body must be expected, px.
+/// How exactly the only node seen of a body must be expected, px: within what a half hidden marker may be off.
 const LONE_GATE_PX: f64 = 1.5;
+/// The same where its area shows that it is whole.
+const WHOLE_GATE_PX: f64 = 3.0;
 
 /// Expected number of sightings as good as `s` that chance alone would give to `search` in `trials` poses.
 pub fn by_chance(search: &Search<'_>, s: &Sighting, trials: usize, habits: &Habits, image_px: f64) -> f64 {
@@ -30,9 +32,14 @@ pub fn by_chance(search: &Search<'_>, s: &Sighting, trials: usize, habits: &Habi
     let radius = REACH_SIGMA * picked.fold(0.0, f64::max);
     let hit = (density * PI * radius * radius).min(1.0);
     let base = 2 - search.anchors.len().min(2);
+    let gate = search.window.map_or(f64::INFINITY, |w| w.origin_px + w.angle_rad * reach + radius);
+    // Pairs of detections that lie in the window as two nodes of a body that hangs on nothing.
+    let by_pairs =
+        (n * n.saturating_sub(1) / 2) as f64 * (density * PI * gate * gate) * (density * 4.0 * radius * gate);
     if s.support > base {
         let k = s.support - base;
-        return trials as f64 * choose(n.saturating_sub(base).max(k), k) * hit.powi(k as i32);
+        let poses = if base == 2 { by_pairs.min(trials as f64) } else { trials as f64 };
+        return poses * choose(n.saturating_sub(base).max(k), k) * hit.powi(k as i32);
     }
     let turn = search.window.map_or(PI, |w| w.angle_rad.min(PI));
     if n == 1 && base == 2 {
@@ -40,18 +47,15 @@ pub fn by_chance(search: &Search<'_>, s: &Sighting, trials: usize, habits: &Habi
         let gate = search.window.map_or(f64::INFINITY, |w| w.origin_px + radius);
         return density * PI * gate * gate;
     }
+    let area_known = s.picks.iter().zip(&link.whole_px).any(|(p, &whole)| p.is_some() && whole > 0.0);
+    let lone_gate = if area_known { WHOLE_GATE_PX } else { LONE_GATE_PX };
     match base {
-        // One node on its circle about the anchor; half hidden it would not show, so it must be expected
-        // within what it may be off.
-        1 if n > 1 && turn * reach > LONE_GATE_PX => f64::INFINITY,
+        // One node on its circle about the anchor.
+        1 if n > 1 && turn * reach > lone_gate => f64::INFINITY,
         1 => n as f64 * density * 4.0 * radius * reach * turn,
         // One or two nodes of a body that hangs on nothing.
         _ if s.support == 1 => f64::INFINITY,
-        _ => {
-            let gate = search.window.map_or(f64::INFINITY, |w| w.origin_px + w.angle_rad * reach + radius);
-            let pairs = (n * (n - 1) / 2) as f64;
-            pairs * (density * PI * gate * gate) * density * 4.0 * radius * gate
-        }
+        _ => by_pairs,
     }
 }
 

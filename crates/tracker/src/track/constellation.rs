@@ -5,6 +5,8 @@
 //! A pose follows from two joints, from a joint and one node, or from two nodes. Every pose that follows from
 //! the detections is tested on all nodes of the body and refitted on those that agree.
 
+use std::f64::consts::PI;
+
 use nalgebra::{Isometry2, Vector2};
 
 use super::mechanism::Link;
@@ -67,7 +69,7 @@ pub struct Search<'a> {
 
 fn turned(a: f64) -> f64 {
     let t = a.rem_euclid(std::f64::consts::TAU);
-    if t > std::f64::consts::PI { t - std::f64::consts::TAU } else { t }
+    if t > PI { t - std::f64::consts::TAU } else { t }
 }
 
 impl Search<'_> {
@@ -194,7 +196,8 @@ impl Search<'_> {
     fn fit(&self, pairs: &[Pair], pose: &Isometry2<f64>) -> Option<PoseFit> {
         fit_pose(pairs).or_else(|| {
             let p = pairs.first()?;
-            let turn = self.window.map_or(std::f64::consts::PI, |w| w.angle_rad);
+            // No more than every angle: it comes back in the next forecast.
+            let turn = self.window.map_or(PI, |w| w.angle_rad.min(PI));
             Some(PoseFit {
                 pose: hung_at(pose, p.local, p.place),
                 centre: p.local,

@@ -6,6 +6,7 @@ pub mod beside;
 pub mod chance;
 pub mod constellation;
 pub mod engine;
+mod finding;
 pub mod habits;
 pub mod joints;
 pub mod learn;
@@ -18,6 +19,7 @@ pub mod rigid;
 pub mod rows;
 pub mod signature;
 pub mod tracker;
+mod undecided;
 
 #[cfg(test)]
 mod swing;

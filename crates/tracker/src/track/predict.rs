@@ -6,6 +6,10 @@ use nalgebra::{Isometry2, Vector2};
 
 use super::rigid::{PoseFit, place, pose_at};
 
+/// A prediction by one frame errs by no more than so many times the greatest error of the last ones: of some twenty
+/// errors that is two standard deviations, so this is four.
+const SETTLED: f64 = 2.0;
+
 /// A predicted pose and how far the body may be from it.
 #[derive(Debug, Clone, Copy)]
 pub struct Forecast {
@@ -15,6 +19,15 @@ pub struct Forecast {
     pub angle_rad: f64,
     /// Radius of the places of the origin that are possible, px.
     pub origin_px: f64,
+}
+
+impl Forecast {
+    /// The same of a body of which `local` is known to be at `there`.
+    pub fn hung(mut self, local: Vector2<f64>, there: Vector2<f64>) -> Self {
+        self.pose = hung_at(&self.pose, local, there);
+        self.origin_px = 0.0;
+        self
+    }
 }
 
 /// How a kind of motion errs when carried on by one frame.
@@ -138,7 +151,13 @@ impl Motion {
     /// The pose at `time` with no more room than the last predictions needed; `None` while that is not known.
     pub fn settled_forecast(&self, time: f64) -> Option<Forecast> {
         let own = self.unrest.filter(|_| self.past.len() == 3)?;
-        self.forecast(time, own, own)
+        let mut f = self.forecast(time, own, own)?;
+        if self.was_just_seen(time) {
+            // What predictions by one frame erred by holds the poses' noise already.
+            f.angle_rad = f.angle_rad.min(SETTLED * own.angle_rad);
+            f.origin_px = f.origin_px.min(SETTLED * own.origin_px);
+        }
+        Some(f)
     }
 
     fn unrest(&self, floor: Unrest) -> Unrest {

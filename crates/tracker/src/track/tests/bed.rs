@@ -28,6 +28,26 @@ pub struct Followed {
     pub status: Vec<Status>,
 }
 
+impl Followed {
+    /// Runs of frames in which a node is not given, for messages.
+    pub fn runs(&self) -> String {
+        let n = self.score.matches.len();
+        let mut out = String::new();
+        for k in 0..n {
+            out += &format!("\n{} {:.3}:", self.score.matches[k].node, self.score.matches[k].coverage);
+            let column: Vec<Status> = self.status.iter().skip(k).step_by(n).copied().collect();
+            let mut first = 0;
+            for run in column.chunk_by(|a, b| a.is_seen() == b.is_seen()) {
+                if !run[0].is_seen() {
+                    out += &format!(" {first}..{} {}", first + run.len(), run[0].as_str());
+                }
+                first += run.len();
+            }
+        }
+        out
+    }
+}
+
 /// What makes detections of a truth.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Faults {
@@ -77,24 +97,22 @@ impl Bed {
                 seen.push((size.map(|s| s * rng.random::<f64>()), 5.0, 1.0));
             }
             let mut detections: Vec<Detection> = Vec::new();
-            for (i, &(p, r, part)) in seen.iter().enumerate() {
-                let touches = |q: &([f64; 2], f64, f64)| (q.0[0] - p[0]).hypot(q.0[1] - p[1]) < q.1 + r;
-                // What touches what came before it is one blob with it.
-                let merged = seen.iter().enumerate().any(|(k, q)| k != i && touches(q));
-                if merged && seen[..i].iter().any(touches) {
-                    continue;
-                }
+            for blob in blobs(&seen) {
+                let area = |&i: &usize| std::f64::consts::PI * seen[i].1.powi(2) * seen[i].2;
+                let area_px: f64 = blob.iter().map(area).sum();
+                let middle =
+                    |axis: usize| blob.iter().map(|i| area(i) * seen[*i].0[axis]).sum::<f64>() / area_px;
                 detections.push(Detection {
-                    x_px: p[0] + noise.sample(&mut rng),
-                    y_px: p[1] + noise.sample(&mut rng),
+                    x_px: middle(0) + noise.sample(&mut rng),
+                    y_px: middle(1) + noise.sample(&mut rng),
                     sigma_px: faults.noise_px as f32,
-                    area_px: (std::f64::consts::PI * r * r * part) as f32,
+                    area_px: area_px as f32,
                     peak: 200.0,
                     elongation: 1.0,
-                    flags: Flags(match (merged, part < 0.99) {
-                        (true, _) => Flags::MERGED,
-                        (_, true) => Flags::PARTIAL,
-                        _ => 0,
+                    flags: Flags(match blob[..] {
+                        [i] if seen[i].2 < 0.99 => Flags::PARTIAL,
+                        [_] => 0,
+                        _ => Flags::MERGED,
                     }),
                 });
             }
@@ -138,6 +156,18 @@ impl Bed {
     pub fn discover(&self) -> Discovery {
         discover(&self.store, self.film.scene().image_px).unwrap()
     }
+}
+
+/// Discs (place, radius, part seen) that touch are one blob: the indices of each blob's.
+fn blobs(discs: &[([f64; 2], f64, f64)]) -> Vec<Vec<usize>> {
+    let mut out: Vec<Vec<usize>> = Vec::new();
+    for (i, &(p, r, _)) in discs.iter().enumerate() {
+        let touches = |&k: &usize| (discs[k].0[0] - p[0]).hypot(discs[k].0[1] - p[1]) < discs[k].1 + r;
+        let (mut with, apart): (Vec<_>, Vec<_>) = out.into_iter().partition(|b| b.iter().any(touches));
+        out = apart;
+        out.push(with.drain(..).flatten().chain([i]).collect());
+    }
+    out
 }
 
 /// A scene of links without bars, so that nothing hides anything: name, parent, joint, motion.
