@@ -1,15 +1,19 @@
-//! Detection against a plain maximum over the same bytes and against OpenCV's threshold, `findContours` and
-//! `moments`, one thread each: `cargo bench --workspace --locked --bench detect`.
+//! Detection's speed against what the machine can do, in one run: `cargo bench --workspace --locked --bench detect`,
+//! with `-- frame`, `-- mraw` or `-- h264` behind it for one part.
 //!
-//! Sixteen frames of 1280 x 1024 8-bit pixels in turn, 9, 100 and 1000 markers; then a whole Photron recording in
-//! the page cache against a plain parallel maximum over its map. Ratios of medians count; times are the machine's.
+//! Frame: sixteen frames of 1280 x 1024 8-bit pixels in turn with 9, 100 and 1000 markers, against a plain maximum
+//! over the same bytes and OpenCV's threshold, `findContours` and `moments`, one thread each. MRAW: a recording in
+//! the page cache through the pipeline on all cores against a parallel byte maximum over its map. H.264: the program
+//! against `ffmpeg -i FILE -f null -`. Ratios of medians count; times are the machine's. `README.md` beside this file
+//! has the figures of one run.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout, missing_docs)]
 
-use std::fs::File;
+use std::fs::{self, File};
 use std::hint::black_box;
 use std::path::Path;
+use std::process::{Command, Stdio};
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use criterion::{Criterion, Throughput};
 use opencv::core::{Mat, Point, Vector};
@@ -20,16 +24,43 @@ use tracker::detect::{DetectSettings, Detection, Detector, Levels};
 use tracker::film::scene::{Link, Marker};
 use tracker::film::{Film, Scene, WriteOptions, preset, write};
 use tracker::frame::Frame;
-use tracker::source::{OpenOptions, open};
+use tracker::pipeline::{Observer, RunSettings, Stage, run};
 
 const SIZE: [u32; 2] = [1280, 1024];
 const FRAMES: u64 = 16;
 /// Turns of which the median counts.
 const TURNS: usize = 41;
 
+/// Frames of the whole recordings.
+const MRAW_FRAMES: u64 = 400;
+const H264_FRAMES: u64 = 1500;
+
 fn main() {
     opencv::core::set_num_threads(1).unwrap();
-    let mut criterion = Criterion::default().sample_size(20).configure_from_args();
+    let arguments: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
+    let wanted = |part: &str| arguments.is_empty() || arguments.iter().any(|a| a == part);
+    if wanted("frame") {
+        frames();
+    }
+    let folder = tempfile::tempdir().unwrap();
+    if wanted("mraw") {
+        println!(
+            "\n| MRAW | ours GB/s | plain maximum GB/s | ratio of rates | learning s |\n|---|---|---|---|---|"
+        );
+        [8, 10, 12, 16].into_iter().for_each(|bits| mraw(folder.path(), bits));
+    }
+    if wanted("h264") {
+        println!("\n| H.264, {H264_FRAMES} frames | tracker s | ffmpeg s | ratio |\n|---|---|---|---|");
+        h264(folder.path());
+    }
+}
+
+/// One thread on single frames.
+fn frames() {
+    let mut criterion = Criterion::default()
+        .sample_size(10)
+        .warm_up_time(Duration::from_millis(300))
+        .measurement_time(Duration::from_secs(1));
     println!("| markers | plain maximum us | ours us | OpenCV us | ours / maximum | OpenCV / ours |");
     println!("|---|---|---|---|---|---|");
     for count in [9, 100, 1000] {
@@ -59,7 +90,7 @@ fn main() {
         }
         let [plain, we, theirs] = times.map(median);
         println!("| {count} | {plain:.1} | {we:.1} | {theirs:.1} | {:.2} | {:.1} |", we / plain, theirs / we);
-        let mut group = criterion.benchmark_group(format!("16 frames of {} markers", count));
+        let mut group = criterion.benchmark_group(format!("16 frames of {count} markers"));
         group.throughput(Throughput::Bytes(FRAMES * u64::from(SIZE[0] * SIZE[1])));
         group.bench_function("plain maximum", |b| b.iter(|| frames.iter().map(maximum).max()));
         group.bench_function("ours", |b| b.iter(|| frames.iter().map(|f| ours.count(f)).sum::<usize>()));
@@ -68,7 +99,6 @@ fn main() {
         });
         group.finish();
     }
-    whole_run();
 }
 
 /// Markers of radius 6 px on a grid, each flying on its own.
@@ -151,60 +181,60 @@ fn median(mut values: Vec<f64>) -> f64 {
     values[values.len() / 2]
 }
 
-/// Detection of a whole recording on all cores, through the source and in batches as `pipeline` does.
-fn whole_run() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("film.cih");
-    let mut long = scene(9);
-    long.frames = 400;
-    let film = Film::new(&long).unwrap();
-    write(&film, &path, &WriteOptions::default(), &mut |_| Ok(())).unwrap();
-    let bytes = std::fs::metadata(path.with_extension("mraw")).unwrap().len() as f64;
-    let settings = DetectSettings::default();
-    let samples = open(path.to_str().unwrap(), &OpenOptions::default()).unwrap().sample(12).unwrap();
-    let levels = Arc::new(Levels::learn(&samples, &settings).unwrap());
-    let (mut ours, mut plain) = (Vec::new(), Vec::new());
+/// The paper's layout, in the middle of the image.
+fn long_scene(frames: u64) -> Scene {
+    let mut scene = preset("clean", 1).unwrap();
+    scene.image_px = SIZE;
+    scene.links[0].joint_px = [640.0, 512.0];
+    scene.frames = frames;
+    scene
+}
+
+/// When a run began to detect and when it was done with it.
+#[derive(Default)]
+struct Watch {
+    stages: Vec<(Stage, Instant)>,
+}
+
+impl Observer for Watch {
+    fn stage(&mut self, stage: Stage, _: Option<u64>) {
+        self.stages.push((stage, Instant::now()));
+    }
+}
+
+/// A Photron recording in the page cache through the pipeline, all cores, against a parallel maximum over its map.
+fn mraw(folder: &Path, bits: u32) {
+    let path = folder.join(format!("film{bits}.cih"));
+    let mut scene = long_scene(MRAW_FRAMES);
+    if bits > 8 {
+        let gain = f64::from(1u32 << (bits.min(12) - 8));
+        scene.camera.depth_bits = bits.min(12);
+        scene.camera.read_noise *= gain;
+        scene.light.background *= gain;
+        scene.links.iter_mut().for_each(|l| l.level *= gain);
+        scene.markers.iter_mut().for_each(|m| m.level *= gain);
+    }
+    let options = WriteOptions { bits: Some(bits), ..WriteOptions::default() };
+    write(&Film::new(&scene).unwrap(), &path, &options, &mut |_| Ok(())).unwrap();
+    let bytes = fs::metadata(path.with_extension("mraw")).unwrap().len() as f64;
+    let settings = RunSettings { input: path.to_str().unwrap().into(), ..RunSettings::default() };
+    let (mut detecting, mut learning, mut plain) = (Vec::new(), Vec::new(), Vec::new());
     for _ in 0..9 {
-        let start = Instant::now();
-        black_box(detected(&path, &levels, &settings));
-        ours.push(start.elapsed().as_secs_f64());
+        let mut watch = Watch::default();
+        run(&settings, &mut watch).unwrap();
+        let took = |stage: Stage| {
+            let at = watch.stages.iter().position(|s| s.0 == stage).unwrap();
+            (watch.stages[at + 1].1 - watch.stages[at].1).as_secs_f64()
+        };
+        detecting.push(took(Stage::Detect));
+        learning.push(took(Stage::Learn));
         let start = Instant::now();
         black_box(mapped(&path));
         plain.push(start.elapsed().as_secs_f64());
     }
-    let (a, b) = (median(ours), median(plain));
-    println!(
-        "whole Photron recording of 400 frames in the page cache, all cores: ours {:.2} GB/s, plain maximum {:.2} \
-         GB/s, ratio of rates {:.2}",
-        bytes / a / 1e9,
-        bytes / b / 1e9,
-        b / a
-    );
-}
-
-/// Number of detections.
-fn detected(path: &Path, levels: &Arc<Levels>, settings: &DetectSettings) -> usize {
-    let mut source = open(path.to_str().unwrap(), &OpenOptions::default()).unwrap();
-    let mut sum = 0;
-    loop {
-        let batch: Vec<Frame> = (0..64).map_while(|_| source.next_frame().unwrap()).collect();
-        if batch.is_empty() {
-            return sum;
-        }
-        let start = || (Detector::new(Arc::clone(levels), settings).unwrap(), Vec::new());
-        sum += batch
-            .par_chunks(8)
-            .map_init(start, |(detector, found), frames| {
-                frames
-                    .iter()
-                    .map(|f| {
-                        detector.detect(f, found).unwrap();
-                        found.len()
-                    })
-                    .sum::<usize>()
-            })
-            .sum::<usize>();
-    }
+    let (a, b, l) = (median(detecting), median(plain), median(learning));
+    println!("| {bits} bit | {:.2} | {:.2} | {:.2} | {l:.2} |", bytes / a / 1e9, bytes / b / 1e9, b / a);
+    fs::remove_file(path.with_extension("mraw")).unwrap();
 }
 
 fn mapped(path: &Path) -> u64 {
@@ -212,4 +242,40 @@ fn mapped(path: &Path) -> u64 {
     // SAFETY: the file is this program's own and nobody changes it.
     let map = unsafe { memmap2::Mmap::map(&file) }.unwrap();
     map.par_chunks((SIZE[0] * SIZE[1]) as usize).map(|c| u64::from(c.iter().copied().fold(0, u8::max))).sum()
+}
+
+/// The program `tracker track` against `ffmpeg -i FILE -f null -`, all cores each, wall time.
+fn h264(folder: &Path) {
+    for (name, quality) in [("hard to decode", 18), ("easy to decode", 28)] {
+        let path = folder.join("film.mp4");
+        let options = WriteOptions {
+            quality: Some(quality),
+            speed: Some("veryfast".into()),
+            ..WriteOptions::default()
+        };
+        write(&Film::new(&long_scene(H264_FRAMES)).unwrap(), &path, &options, &mut |_| Ok(())).unwrap();
+        let megabytes = fs::metadata(&path).unwrap().len() as f64 / 1e6;
+        let mut times = [Vec::new(), Vec::new()];
+        for _ in 0..7 {
+            for (which, all) in times.iter_mut().enumerate() {
+                let mut command = if which == 0 {
+                    let mut c = Command::new(env!("CARGO_BIN_EXE_tracker"));
+                    c.arg("track")
+                        .arg(&path)
+                        .args(["--quiet", "--force", "-o"])
+                        .arg(folder.join("out.parquet"));
+                    c
+                } else {
+                    let mut c = Command::new("ffmpeg");
+                    c.args(["-v", "error", "-nostdin", "-i"]).arg(&path).args(["-f", "null", "-"]);
+                    c
+                };
+                let start = Instant::now();
+                assert!(command.stdout(Stdio::null()).status().unwrap().success());
+                all.push(start.elapsed().as_secs_f64());
+            }
+        }
+        let [ours, theirs] = times.map(median);
+        println!("| {name}, {megabytes:.0} MB | {ours:.2} | {theirs:.2} | {:.3} |", ours / theirs);
+    }
 }

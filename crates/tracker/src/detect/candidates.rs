@@ -5,7 +5,8 @@
 use super::background::Background;
 use super::levels::Side;
 use super::pixels::Pixels;
-use super::runs::{Blob, Labeller, Plan, Segment};
+use super::plan::Plan;
+use super::runs::{Blob, Labeller};
 use crate::frame::PixelFormat;
 
 /// Sample images and what is known of them.
@@ -158,13 +159,7 @@ fn top_height(maps: &[Vec<u8>]) -> f64 {
 /// Blobs at a height that are compact, not small, and steep at their edge.
 fn markers(field: &Field<'_>, maps: &[Vec<u8>], height: f64, sigma: f64) -> Vec<Candidate> {
     let threshold = height.ceil().clamp(1.0, 65535.0) as u16;
-    let segment = Segment { start: 0, end: field.width as u32, threshold, edge: (true, true) };
-    let plan = Plan::new(
-        vec![segment; field.height],
-        (0..=field.height as u32).collect(),
-        (0, field.height - 1),
-        Side::Bright,
-    );
+    let plan = Plan::uniform(field.width, field.height, threshold, Side::Bright);
     let most = field.width * field.height / 5;
     let mut labeller = Labeller::default();
     let mut blobs: Vec<Blob> = Vec::new();

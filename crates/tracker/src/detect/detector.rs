@@ -14,7 +14,8 @@ use super::levels::{Levels, Side};
 use super::marker::LARGEST_MISFIT;
 use super::mask::Spans;
 use super::pixels::Pixels;
-use super::runs::{Blob, Labeller, Plan, Segment};
+use super::plan::Plan;
+use super::runs::{Blob, Labeller};
 use super::{Centroid, DetectSettings, Detection, Flags, shape};
 use crate::error::{Error, Fault, Place, Result};
 use crate::frame::Frame;
@@ -37,9 +38,6 @@ pub struct Detector {
     row: Vec<u16>,
 }
 
-/// Width of the stretches of a row that share one threshold where the background is not flat, px.
-const STRETCH_PX: u32 = 64;
-
 impl Detector {
     /// A detector for recordings with these levels.
     ///
@@ -48,7 +46,7 @@ impl Detector {
     pub fn new(levels: Arc<Levels>, settings: &DetectSettings) -> Result<Self> {
         let [width, height] = levels.image_px.map(|n| n as usize);
         let spans = Spans::new(settings.region.as_ref(), width, height)?;
-        let plan = plan(&levels, &spans, height);
+        let plan = Plan::new(&levels, &spans, height);
         let lens = settings.lens.as_ref().map(Undistort::new).transpose()?;
         let table = levels.marker.map(|m| EdgeTable::new(m.radius_px, m.blur_px));
         Ok(Self {
@@ -205,8 +203,7 @@ impl Detector {
         self.mask.clear();
         self.mask.resize(pixels.width * pixels.height, 0);
         for y in 0..pixels.height {
-            for s in self.plan.first[y]..self.plan.first[y + 1] {
-                let s = self.plan.segments[s as usize];
+            for s in self.plan.row(y) {
                 self.row.resize((s.end - s.start) as usize, 0);
                 pixels.read(y, s.start as usize, &mut self.row);
                 let at = y * pixels.width + s.start as usize;
@@ -249,8 +246,7 @@ impl Detector {
 
 fn disc_fit<'a>(table: &'a EdgeTable, levels: &Levels) -> DiscFit<'a> {
     // In much noise more pixels beside the edge are worth their time.
-    let clear = levels.contrast > 30.0 * levels.noise.variance(levels.noise.dark).sqrt();
-    let band_px = if clear { 0.5 } else { 2.0 };
+    let band_px = if levels.clear() { 0.5 } else { 2.0 };
     DiscFit {
         table,
         noise: levels.noise,
@@ -284,34 +280,4 @@ fn detection(blob: &Blob, centre: &Centre, levels: &Levels) -> Detection {
         elongation: blob.elongation() as f32,
         flags: shape::judge(blob, centre, levels),
     }
-}
-
-/// Spans with thresholds: one segment a span where the threshold is the same all over it.
-fn plan(levels: &Levels, spans: &Spans, height: usize) -> Plan {
-    let (mut segments, mut first, mut edge_rows) = (Vec::<Segment>::new(), vec![0], (usize::MAX, 0));
-    for y in 0..height {
-        for &(start, end) in spans.row(y) {
-            edge_rows = (edge_rows.0.min(y), y);
-            let mut from = start;
-            while from < end {
-                let to = (from + STRETCH_PX).min(end);
-                let t = levels.threshold(f64::from(from + to - 1) / 2.0, y as f64);
-                let threshold = match levels.side {
-                    Side::Bright => t.ceil().clamp(1.0, 65535.0),
-                    Side::Dark => t.floor().clamp(0.0, 65534.0),
-                } as u16;
-                let edge = (from == start, to == end);
-                match segments.last_mut() {
-                    Some(last) if !edge.0 && last.threshold == threshold && first.len() == y + 1 => {
-                        last.end = to;
-                        last.edge.1 = edge.1;
-                    }
-                    _ => segments.push(Segment { start: from, end: to, threshold, edge }),
-                }
-                from = to;
-            }
-        }
-        first.push(segments.len() as u32);
-    }
-    Plan::new(segments, first, edge_rows, levels.side)
 }

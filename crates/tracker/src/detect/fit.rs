@@ -37,8 +37,12 @@ pub(crate) struct Fitted {
     pub height: f64,
     /// Standard uncertainty of x and y by the noise model, the greater of the two, px.
     pub sigma_px: f64,
+    /// Standard uncertainty of the radius by the noise model, px.
+    pub radius_sigma_px: f64,
     /// Weighted sum of squared residuals over its degrees of freedom.
     pub chi2: f64,
+    /// Those: pixels less free numbers.
+    pub freedom: f64,
     /// Root mean square residual, raw units.
     pub rms: f64,
     /// Pixels that were saturated.
@@ -242,14 +246,17 @@ impl DiscFit<'_> {
                 let variance = |i: usize| factor.solve(&unit(i))[i];
                 // What the last step gains.
                 let chi2 = n.chi2 - step.dot(&n.gradient);
+                let freedom = (n.count - N as f64).max(1.0);
                 return Some(Fitted {
                     x_px: at[0],
                     y_px: at[1],
                     radius_px: p[2],
                     base: sign * p[3],
                     height: sign * p[4],
+                    radius_sigma_px: variance(2).sqrt(),
                     sigma_px: variance(0).max(variance(1)).sqrt(),
-                    chi2: chi2.max(0.0) / (n.count - N as f64).max(1.0),
+                    chi2: chi2.max(0.0) / freedom,
+                    freedom,
                     rms: (n.squares / n.count.max(1.0)).sqrt(),
                     saturated: ring.saturated,
                     smear_px: if N == MOVING { [p[N - 2], p[N - 1]] } else { [0.0; 2] },

@@ -7,7 +7,7 @@ use opencv::core::{Mat, Point2d, TermCriteria, TermCriteria_COUNT, TermCriteria_
 use opencv::prelude::*;
 
 use super::Detection;
-use crate::error::{Error, Fault, Place, Result};
+use crate::error::{Error, Fault, Result};
 use crate::rig::Lens;
 
 /// OpenCV's `undistortPoints` with one camera matrix and one set of coefficients. Corrected centres are in
@@ -29,7 +29,6 @@ impl std::fmt::Debug for Undistort {
 fn failed(e: opencv::Error) -> Error {
     Error::Detect(
         Fault::new("lens", e.to_string())
-            .at(Place::Key("lens".into()))
             .advice("Give the camera matrix and the coefficients as OpenCV's calibrateCamera does"),
     )
 }
@@ -55,7 +54,6 @@ impl Undistort {
                         m[0][0], m[1][1]
                     ),
                 )
-                .at(Place::Key("lens".into()))
                 .advice("Give focal lengths above 0 and 0, 4, 5, 8, 12 or 14 coefficients"),
             ));
         }

@@ -209,6 +209,11 @@ impl Levels {
         })
     }
 
+    /// Whether markers stand out so far that a misfit of one pixel shows.
+    pub(crate) fn clear(&self) -> bool {
+        self.contrast > 30.0 * self.noise.variance(self.noise.dark).sqrt()
+    }
+
     /// The threshold at a place, raw units: a pixel of a bright marker is at least this, of a dark one at most.
     pub fn threshold(&self, x_px: f64, y_px: f64) -> f64 {
         self.fixed_threshold

@@ -2,7 +2,7 @@
 //!
 //! Owns: [`Spans`]. Must not: read a pixel.
 
-use crate::error::{Error, Fault, Place, Result};
+use crate::error::{Error, Fault, Result};
 use crate::rig::Region;
 
 /// For each row the columns to look at, `start..end`, in order and apart.
@@ -22,7 +22,6 @@ impl Spans {
         let fault = |problem: String| {
             Error::Detect(
                 Fault::new("region", problem)
-                    .at(Place::Key("region".into()))
                     .advice(format!("Give it in px inside the image of {width} x {height} px")),
             )
         };

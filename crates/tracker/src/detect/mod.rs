@@ -15,6 +15,7 @@ mod levels;
 mod marker;
 mod mask;
 mod pixels;
+mod plan;
 mod runs;
 mod shape;
 mod skip;

@@ -6,7 +6,8 @@
 
 use super::levels::Side;
 use super::pixels::Pixels;
-use super::skip::{Sample, Skip};
+use super::plan::{CELL_PX, Plan, Segment};
+use super::skip::{FEW, Sample, Skip};
 use crate::frame::PixelFormat;
 
 /// What one pass adds up about a connected set of pixels beyond the threshold.
@@ -94,57 +95,6 @@ impl Blob {
     }
 }
 
-/// Columns `start..end` of a row with the threshold to apply there, raw units.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Segment {
-    pub start: u32,
-    pub end: u32,
-    /// A bright marker's pixel is at least this, a dark marker's at most this.
-    pub threshold: u16,
-    /// The region or the image ends at `start` / at `end`.
-    pub edge: (bool, bool),
-}
-
-/// What to look at and with which threshold, row by row.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub(crate) struct Plan {
-    pub segments: Vec<Segment>,
-    /// Index of the first segment of each row, and one more at the end.
-    pub first: Vec<u32>,
-    /// Whether the region begins at a row or ends after it.
-    pub edge_rows: (usize, usize),
-    /// [`BAND`] rows after another: columns from the first looked at to the last, and the threshold that is the
-    /// easiest to exceed in them; nothing to look at is an empty range.
-    pub bands: Vec<Segment>,
-}
-
-/// Rows that are tested at once, before each is looked at on its own.
-pub(crate) const BAND: usize = 4;
-
-impl Plan {
-    /// The plan of segments, row by row as `first` says.
-    pub fn new(segments: Vec<Segment>, first: Vec<u32>, edge_rows: (usize, usize), side: Side) -> Self {
-        let rows = first.len().saturating_sub(1);
-        let bands = (0..rows)
-            .step_by(BAND)
-            .map(|y| {
-                let here = &segments[first[y] as usize..first[(y + BAND).min(rows)] as usize];
-                let easiest = match side {
-                    Side::Bright => here.iter().map(|s| s.threshold).min(),
-                    Side::Dark => here.iter().map(|s| s.threshold).max(),
-                };
-                Segment {
-                    start: here.iter().map(|s| s.start).min().unwrap_or(0),
-                    end: here.iter().map(|s| s.end).max().unwrap_or(0),
-                    threshold: easiest.unwrap_or(0),
-                    edge: (false, false),
-                }
-            })
-            .collect();
-        Self { segments, first, edge_rows, bands }
-    }
-}
-
 #[derive(Debug, Clone, Copy)]
 struct Run {
     x0: u32,
@@ -163,10 +113,6 @@ pub(crate) struct Labeller {
     skip: Skip,
 }
 
-/// Pixels of a row tested at once, first a piece, then few, before any is looked at on its own.
-const PIECE: usize = 256;
-const FEW: usize = 16;
-
 impl Labeller {
     /// Appends the blobs of a frame to `out` (cleared first), in order of their first pixel.
     pub fn find(&mut self, pixels: &Pixels<'_>, plan: &Plan, side: Side, out: &mut Vec<Blob>) {
@@ -174,24 +120,26 @@ impl Labeller {
         self.parents.clear();
         self.blobs.clear();
         self.above.clear();
-        for (k, band) in plan.bands.iter().enumerate() {
-            let rows = k * BAND..((k + 1) * BAND).min(pixels.height);
-            let columns = (band.start, band.end);
-            if columns.0 >= columns.1
-                || !self.skip.may_hold(pixels, rows.clone(), columns, band.threshold, side)
-            {
-                self.above.clear();
-                continue;
+        self.here.clear();
+        let mut skip = std::mem::take(&mut self.skip);
+        skip.find(pixels, plan, side);
+        let mut row = None;
+        for (y, column) in skip.marks() {
+            if row != Some(y) {
+                self.next_row(row.is_some_and(|r| r + 1 == y));
+                row = Some(y);
             }
-            for y in rows {
-                self.here.clear();
-                for s in plan.first[y]..plan.first[y + 1] {
-                    self.scan(pixels, y, plan.segments[s as usize], plan.edge_rows, side);
+            let (left, right) = (column * CELL_PX, (column + 1) * CELL_PX);
+            for s in plan.row(y as usize) {
+                let (start, end) = (s.start.max(left), s.end.min(right));
+                if start < end {
+                    let edge = (s.edge.0 && start == s.start, s.edge.1 && end == s.end);
+                    self.scan(pixels, y as usize, Segment { start, end, edge, ..*s }, plan.edge_rows, side);
                 }
-                self.join();
-                std::mem::swap(&mut self.above, &mut self.here);
             }
         }
+        self.next_row(true);
+        self.skip = skip;
         for i in 0..self.blobs.len() {
             if self.parents[i] as usize == i {
                 out.push(self.blobs[i]);
@@ -199,25 +147,28 @@ impl Labeller {
         }
     }
 
+    /// Ends a row; the next one may lie right below it.
+    fn next_row(&mut self, below: bool) {
+        self.join();
+        std::mem::swap(&mut self.above, &mut self.here);
+        self.here.clear();
+        if !below {
+            self.above.clear();
+        }
+    }
+
     fn scan(&mut self, pixels: &Pixels<'_>, y: usize, s: Segment, edge_rows: (usize, usize), side: Side) {
         let edge_row = y == edge_rows.0 || y == edge_rows.1;
-        for start in (s.start..s.end).step_by(PIECE) {
-            let end = (start + PIECE as u32).min(s.end);
-            if !self.skip.may_hold(pixels, y..y + 1, (start, end), s.threshold, side) {
-                continue;
-            }
-            let edge = (s.edge.0 && start == s.start, s.edge.1 && end == s.end);
-            let piece = Segment { start, end, edge, ..s };
-            if pixels.format == PixelFormat::Gray8 {
-                let from = pixels.start(y, start as usize).0;
-                self.runs(&pixels.bytes[from..from + (end - start) as usize], y, piece, edge_row, side);
-            } else {
-                let mut row = std::mem::take(&mut self.row);
-                row.resize((end - start) as usize, 0);
-                pixels.read(y, start as usize, &mut row);
-                self.runs(&row, y, piece, edge_row, side);
-                self.row = row;
-            }
+        let count = (s.end - s.start) as usize;
+        if pixels.format == PixelFormat::Gray8 {
+            let from = pixels.start(y, s.start as usize).0;
+            self.runs(&pixels.bytes[from..from + count], y, s, edge_row, side);
+        } else {
+            let mut row = std::mem::take(&mut self.row);
+            row.resize(count, 0);
+            pixels.read(y, s.start as usize, &mut row);
+            self.runs(&row, y, s, edge_row, side);
+            self.row = row;
         }
     }
 
@@ -227,42 +178,30 @@ impl Labeller {
         let mut open: Option<u32> = None;
         let mut x = s.start;
         let (few, rest) = row.as_chunks::<FEW>();
-        for few in few {
-            if open.is_none() && !T::any(few, limit, side) {
-                x += FEW as u32;
+        let tail = rest.iter().enumerate().fold(0, |m, (i, v)| m | u32::from(v.beyond(limit, side)) << i);
+        for mask in few.iter().map(|few| T::beyond_of(few, limit, side)).chain([tail]) {
+            // What begins or ends: beyond here and not just before, or the other way round.
+            let mut turns = mask ^ (mask << 1 | u32::from(open.is_some()));
+            if x + FEW as u32 > s.end {
+                turns &= (1 << (s.end - x)) - 1;
             } else {
-                self.pixels(few, limit, (y, edge_row), &s, side, &mut x, &mut open);
+                turns &= 0xffff;
             }
+            while turns != 0 {
+                let at = x + turns.trailing_zeros();
+                turns &= turns - 1;
+                open = match open {
+                    None => Some(at),
+                    Some(x0) => {
+                        self.run(y as u32, x0, at, edge_row || (s.edge.0 && x0 == s.start));
+                        None
+                    }
+                };
+            }
+            x += FEW as u32;
         }
-        self.pixels(rest, limit, (y, edge_row), &s, side, &mut x, &mut open);
         if let Some(x0) = open {
-            self.run(y as u32, x0, x, edge_row || (s.edge.0 && x0 == s.start) || s.edge.1);
-        }
-    }
-
-    /// Goes on pixel by pixel from `x`; `open` is where a run began that has not ended.
-    #[inline(always)]
-    #[allow(clippy::too_many_arguments, reason = "the state of one loop")]
-    fn pixels<T: Sample>(
-        &mut self,
-        values: &[T],
-        limit: T,
-        (y, edge_row): (usize, bool),
-        s: &Segment,
-        side: Side,
-        x: &mut u32,
-        open: &mut Option<u32>,
-    ) {
-        for &v in values {
-            match (v.beyond(limit, side), *open) {
-                (true, None) => *open = Some(*x),
-                (false, Some(x0)) => {
-                    self.run(y as u32, x0, *x, edge_row || (s.edge.0 && x0 == s.start));
-                    *open = None;
-                }
-                _ => {}
-            }
-            *x += 1;
+            self.run(y as u32, x0, s.end, edge_row || (s.edge.0 && x0 == s.start) || s.edge.1);
         }
     }
 

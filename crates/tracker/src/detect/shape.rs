@@ -4,6 +4,7 @@
 
 use super::Flags;
 use super::centre::Centre;
+use super::fit::Fitted;
 use super::levels::Levels;
 use super::runs::Blob;
 
@@ -11,6 +12,27 @@ use super::runs::Blob;
 /// the learned markers have.
 pub(crate) fn misfit_limit(levels: &Levels) -> f64 {
     levels.marker.map_or(f64::INFINITY, |m| 3.0 * m.chi2_high.max(1.0))
+}
+
+/// Whether a disc fits worse than any whole marker. Where the learned ones fit as well as their noise lets them, six
+/// standard deviations of chi-square beyond that are too many.
+fn misfit(f: &Fitted, levels: &Levels) -> bool {
+    let Some(m) = levels.marker else { return false };
+    let spread = (2.0 / f.freedom).sqrt();
+    // A ninth decile is 1.28 standard deviations up.
+    let usual = (m.chi2 - 1.0).max(m.chi2_high - 1.0 - 1.28 * spread).max(0.0);
+    f.chi2 > misfit_limit(levels).min(1.0 + 6.0 * spread + 15.0 * usual)
+}
+
+/// By how much a disc is too large (above 1) or too small (below -1) for a marker: in noise a hidden edge and a second
+/// marker behind show in the radius before they do in the misfit. The limit is 4.5 standard deviations of what the
+/// noise and the markers' own radii do, at least a hundredth. Where markers are clear the misfit is enough, and one
+/// marker may well be a little larger than the others.
+fn wrong_size(f: &Fitted, levels: &Levels) -> f64 {
+    let Some(m) = levels.marker.filter(|_| !levels.clear()) else { return 0.0 };
+    let own = m.radius_spread * m.radius_px / 1.28;
+    let sigma = own.max(f.radius_sigma_px * f.chi2.max(1.0).sqrt());
+    (f.radius_px - m.radius_px) / (4.5 * sigma).max(0.01 * m.radius_px)
 }
 
 /// Flags of a blob: saturated, at a border, more than one marker, less than one.
@@ -32,10 +54,11 @@ pub(crate) fn judge(blob: &Blob, centre: &Centre, levels: &Levels) -> Flags {
         let slack = (4.0 * marker.radius_spread).max(0.5 * edge).max(0.06);
         let noise = levels.noise.variance(levels.noise.dark).sqrt() / levels.contrast;
         let ratio = area / whole;
-        let misfit = centre.fitted.map_or(f64::INFINITY, |f| f.chi2) > misfit_limit(levels);
-        if ratio > 1.3 && (misfit || blob.elongation() > 1.4) {
+        let misfit = centre.fitted.is_none_or(|f| misfit(&f, levels));
+        let size = centre.fitted.map_or(0.0, |f| wrong_size(&f, levels));
+        if (ratio > 1.3 && (misfit || blob.elongation() > 1.4)) || size > 1.0 {
             flags |= Flags::MERGED;
-        } else if misfit || ratio < 1.0 - slack - 2.0 * noise {
+        } else if misfit || size < -1.0 || ratio < 1.0 - slack - 2.0 * noise {
             flags |= Flags::PARTIAL;
         }
     }

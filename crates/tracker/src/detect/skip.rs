@@ -1,30 +1,39 @@
-//! Passing over background at vector speed: whether any pixel of a stretch is beyond the threshold.
+//! Passing over background at the speed of memory: which cells may hold a pixel beyond the threshold.
 //!
-//! Owns: [`Skip`], the trait [`Sample`]. Must not: say where. Written so that the compiler makes vector
-//! instructions of it: the extreme of many bytes, or saturating differences or-ed together, one test at the end.
+//! Owns: [`Skip`], the trait [`Sample`]. Must not: say where in a cell. The extreme of many bytes, or saturating
+//! differences or-ed together, and one test at the end.
 
+use std::array::from_fn;
+use std::marker::PhantomData;
 use std::ops::Range;
 
 use multiversion::multiversion;
+use wide::{u8x16, u16x8};
 
 use super::levels::Side;
 use super::pixels::Pixels;
+use super::plan::{Cell, Plan};
 use crate::frame::PixelFormat;
+
+/// Samples whose bits are found together.
+pub(crate) const FEW: usize = 16;
 
 /// A sample that can be compared with a threshold many at a time.
 pub(crate) trait Sample: Copy {
     /// The threshold as a limit to subtract; `None` where no sample of this type can be beyond it.
     fn limit(threshold: u16, side: Side) -> Option<Self>;
-    /// Whether any sample is beyond the limit.
-    fn any(values: &[Self], limit: Self, side: Side) -> bool;
+    /// Whether any sample in blocks of little-endian bytes is beyond the limit.
+    fn any(blocks: &[Block], limit: Self, side: Side) -> bool;
+    /// Which of a few samples are beyond the limit, as bits from the lowest on.
+    fn beyond_of(few: &[Self; FEW], limit: Self, side: Side) -> u32;
     /// Whether this one is.
     fn beyond(self, limit: Self, side: Side) -> bool;
 }
 
 macro_rules! sample {
-    ($t:ty, $any:ident) => {
+    ($t:ty, $any:ident, $beyond_of:ident) => {
         impl Sample for $t {
-            #[inline]
+            #[inline(always)]
             fn limit(threshold: u16, side: Side) -> Option<Self> {
                 // Beyond is above the limit for bright markers and below it for dark ones.
                 match side {
@@ -33,12 +42,17 @@ macro_rules! sample {
                 }
             }
 
-            #[inline]
-            fn any(values: &[Self], limit: Self, side: Side) -> bool {
-                $any(values, limit, side)
+            #[inline(always)]
+            fn any(blocks: &[Block], limit: Self, side: Side) -> bool {
+                $any(blocks, limit, side)
             }
 
-            #[inline]
+            #[inline(always)]
+            fn beyond_of(few: &[Self; FEW], limit: Self, side: Side) -> u32 {
+                $beyond_of(few, limit, side)
+            }
+
+            #[inline(always)]
             fn beyond(self, limit: Self, side: Side) -> bool {
                 match side {
                     Side::Bright => self > limit,
@@ -48,50 +62,183 @@ macro_rules! sample {
         }
     };
 }
-sample!(u8, any_u8);
-sample!(u16, any_u16);
+sample!(u8, any_u8, bits_u8);
+sample!(u16, any_u16, bits_u16);
 
-/// Every processor has an instruction for the extreme of bytes.
 #[inline(always)]
-fn any_u8(values: &[u8], limit: u8, side: Side) -> bool {
-    match side {
-        Side::Bright => values.iter().fold(0, |a, &v| a.max(v)) > limit,
-        Side::Dark => values.iter().fold(u8::MAX, |a, &v| a.min(v)) < limit,
+fn bits_u8(few: &[u8; FEW], limit: u8, side: Side) -> u32 {
+    let (values, limit) = (u8x16::new(*few), u8x16::splat(limit));
+    let beyond = match side {
+        Side::Bright => values.saturating_sub(limit),
+        Side::Dark => limit.saturating_sub(values),
+    };
+    0xffff ^ beyond.simd_eq(u8x16::splat(0)).to_bitmask()
+}
+
+#[inline(always)]
+fn bits_u16(few: &[u16; FEW], limit: u16, side: Side) -> u32 {
+    few.iter().enumerate().fold(0, |m, (i, v)| m | u32::from(v.beyond(limit, side)) << i)
+}
+
+/// Bytes that are worked on together: four vectors of every processor.
+const BLOCK: usize = 64;
+type Block = [u8; BLOCK];
+
+/// The extreme of bytes.
+#[inline(always)]
+fn any_u8(blocks: &[Block], limit: u8, side: Side) -> bool {
+    let further = |a: u8x16, b: u8x16| match side {
+        Side::Bright => a.max(b),
+        Side::Dark => a.min(b),
+    };
+    let mut extremes = [u8x16::splat(limit); 4];
+    for block in blocks {
+        for (e, few) in extremes.iter_mut().zip(block.as_chunks().0) {
+            *e = further(*e, u8x16::new(*few));
+        }
+    }
+    let [a, b, c, d] = extremes;
+    further(further(a, b), further(c, d)).simd_eq(u8x16::splat(limit)).to_bitmask() != 0xffff
+}
+
+/// Not every processor has that for 16 bits, but all have saturating differences. Little-endian samples in bytes.
+#[inline(always)]
+fn any_u16(blocks: &[Block], limit: u16, side: Side) -> bool {
+    let limit = u16x8::splat(limit);
+    let mut beyond = [u16x8::splat(0); 4];
+    for block in blocks {
+        for (b, few) in beyond.iter_mut().zip(block.as_chunks::<16>().0) {
+            let pairs: [[u8; 2]; 8] = from_fn(|i| [few[2 * i], few[2 * i + 1]]);
+            let values = u16x8::new(pairs.map(u16::from_le_bytes));
+            *b |= match side {
+                Side::Bright => values.saturating_sub(limit),
+                Side::Dark => limit.saturating_sub(values),
+            };
+        }
+    }
+    let [a, b, c, d] = beyond;
+    ((a | b) | (c | d)).simd_eq(u16x8::splat(0)).to_bitmask() != 0xff
+}
+
+/// Parts of a frame that are read side by side: a processor that reads one row after another waits for memory half
+/// of the time.
+const STREAMS: usize = 4;
+
+/// The cell of a row that may hold a pixel beyond: row, and column of cells.
+pub(crate) type Mark = (u32, u32);
+
+type Marks = [Vec<Mark>; STREAMS];
+
+/// Whether a stretch of bytes in a row may hold a pixel beyond a threshold. A trait and no closure, since a closure is
+/// not compiled for the instructions of the function that it is in.
+trait Test {
+    fn any(&mut self, pixels: &Pixels<'_>, y: usize, at: Range<usize>, threshold: u16) -> bool;
+}
+
+/// Asks of every cell of every row, and notes where the answer is yes.
+#[inline(always)]
+fn pass(pixels: &Pixels<'_>, plan: &Plan, marks: &mut Marks, mut test: impl Test) {
+    let rows = pixels.height.div_ceil(STREAMS);
+    let bits = pixels.format.bits_per_pixel() as usize;
+    marks.iter_mut().for_each(Vec::clear);
+    for row in 0..rows {
+        for column in 0..plan.columns {
+            for (stream, marks) in marks.iter_mut().enumerate() {
+                let y = stream * rows + row;
+                if y >= pixels.height {
+                    break;
+                }
+                let Cell { start, end, threshold } = plan.cell(y, column);
+                let (from, skip) = pixels.start(y, start as usize);
+                let to = from + (skip + (end - start) as usize * bits).div_ceil(8);
+                if start < end && test.any(pixels, y, from..to, threshold) {
+                    marks.push((y as u32, column as u32));
+                }
+            }
+        }
     }
 }
 
-/// Not so for 16 bits, but all have saturating differences.
-#[inline(always)]
-fn any_u16(values: &[u16], limit: u16, side: Side) -> bool {
-    let beyond = match side {
-        Side::Bright => values.iter().fold(0, |a, &v| a | v.saturating_sub(limit)),
-        Side::Dark => values.iter().fold(0, |a, &v| a | limit.saturating_sub(v)),
-    };
-    beyond != 0
+/// Samples of 8 or 16 bits in whole blocks, which reach beyond the stretch; at the end of the plane the last one is
+/// filled up with what is there. The side is a constant for the compiler's sake.
+struct Blocks<T, const BRIGHT: bool>(PhantomData<T>);
+
+impl<T: Sample, const BRIGHT: bool> Test for Blocks<T, BRIGHT> {
+    #[inline(always)]
+    fn any(&mut self, pixels: &Pixels<'_>, _: usize, at: Range<usize>, threshold: u16) -> bool {
+        let side = if BRIGHT { Side::Bright } else { Side::Dark };
+        let Some(limit) = T::limit(threshold, side) else { return false };
+        let (whole, rest) = pixels.bytes[at.start..].as_chunks::<BLOCK>();
+        match whole.get(..at.len().div_ceil(BLOCK)) {
+            Some(whole) => T::any(whole, limit, side),
+            None => {
+                let mut last = [0; BLOCK];
+                last.iter_mut().zip(rest.iter().cycle()).for_each(|(to, &v)| *to = v);
+                T::any(whole, limit, side) || T::any(&[last], limit, side)
+            }
+        }
+    }
 }
 
-/// The same for little-endian samples in bytes.
-#[inline(always)]
-fn any_pair(bytes: &[u8], limit: u16, side: Side) -> bool {
-    let values = bytes.as_chunks().0.iter().map(|&b| u16::from_le_bytes(b));
-    let beyond = match side {
-        Side::Bright => values.fold(0, |a, v| a | v.saturating_sub(limit)),
-        Side::Dark => values.fold(0, |a, v| a | limit.saturating_sub(v)),
-    };
-    beyond != 0
+fn pass_u8(pixels: &Pixels<'_>, plan: &Plan, side: Side, marks: &mut Marks) {
+    match side {
+        Side::Bright => pass(pixels, plan, marks, Blocks::<u8, true>(PhantomData)),
+        Side::Dark => pass(pixels, plan, marks, Blocks::<u8, false>(PhantomData)),
+    }
 }
 
-/// Bytes from which on the widest instructions of the processor are worth the call.
-const LONG: usize = 1024;
+fn pass_u16(pixels: &Pixels<'_>, plan: &Plan, side: Side, marks: &mut Marks) {
+    match side {
+        Side::Bright => pass(pixels, plan, marks, Blocks::<u16, true>(PhantomData)),
+        Side::Dark => pass(pixels, plan, marks, Blocks::<u16, false>(PhantomData)),
+    }
+}
+
+/// Packed samples.
+struct Packed<'a> {
+    known: &'a mut Vec<(u16, Words)>,
+    side: Side,
+    bits: usize,
+}
+
+impl Test for Packed<'_> {
+    #[inline(always)]
+    fn any(&mut self, pixels: &Pixels<'_>, y: usize, at: Range<usize>, threshold: u16) -> bool {
+        let found = self.known.binary_search_by_key(&threshold, |k| k.0);
+        let i = found.unwrap_or_else(|i| {
+            self.known.insert(i, (threshold, Words::new(self.bits, threshold, self.side)));
+            i
+        });
+        let words = &self.known[i].1;
+        // Back to the start of a group of samples that begins on a byte.
+        let (origin, period) = (pixels.group_origin(y), if self.bits == 12 { 3 } else { 5 });
+        let mut from = origin + (at.start - origin) / period * period;
+        while from < at.end {
+            let count = (at.end - from).next_multiple_of(32).min(2 * LANES);
+            // At the end of the plane each is looked at.
+            let Some(chunk) = pixels.bytes.get(from..from + count + 1) else { return true };
+            if words.any(chunk, self.side) {
+                return true;
+            }
+            from += count;
+        }
+        false
+    }
+}
 
 #[multiversion(targets("x86_64+avx2"))]
-fn long_u8(values: &[u8], limit: u8, side: Side) -> bool {
-    any_u8(values, limit, side)
-}
-
-#[multiversion(targets("x86_64+avx2"))]
-fn long_pair(bytes: &[u8], limit: u16, side: Side) -> bool {
-    any_pair(bytes, limit, side)
+fn pass_packed<'a>(
+    pixels: &Pixels<'a>,
+    plan: &Plan,
+    side: Side,
+    known: &mut Vec<(u16, Words)>,
+    marks: &mut Marks,
+) {
+    let bits = pixels.format.bits_per_pixel() as usize;
+    match side {
+        Side::Bright => pass(pixels, plan, marks, Packed { known, side: Side::Bright, bits }),
+        Side::Dark => pass(pixels, plan, marks, Packed { known, side: Side::Dark, bits }),
+    }
 }
 
 /// Sixteen-bit words of a packed stretch tested at once: a multiple of the packing's period and of a vector.
@@ -133,12 +280,12 @@ impl Words {
         this
     }
 
-    /// Whether any sample in `2 * LANES` bytes is beyond; `bytes` has one more.
-    #[inline]
+    /// Whether any sample in `bytes` is beyond, but for those of the last byte: at most `2 * LANES + 1`.
+    #[inline(always)]
     fn any(&self, bytes: &[u8], side: Side) -> bool {
         let mut beyond = 0;
         for phase in 0..2 {
-            let words = bytes[phase..phase + 2 * LANES].chunks_exact(2);
+            let words = bytes[phase..phase + bytes.len() - 1].chunks_exact(2);
             for ((b, keep), limit) in words.zip(&self.keep[phase]).zip(&self.limit[phase]) {
                 let v = u16::from_be_bytes([b[0], b[1]]) & keep;
                 beyond |= match side {
@@ -151,68 +298,42 @@ impl Words {
     }
 }
 
-/// Says whether a stretch may hold a pixel beyond the threshold. Never wrongly no.
+/// Finds the cells of a frame that may hold a pixel beyond the threshold; owns its scratch.
 #[derive(Debug, Default)]
 pub(crate) struct Skip {
-    words: Option<(u16, Side, PixelFormat, Box<Words>)>,
+    marks: Marks,
+    /// By threshold, for one packed format and side.
+    words: Vec<(u16, Words)>,
+    words_of: Option<(PixelFormat, Side)>,
 }
 
 impl Skip {
-    /// Whether any pixel from the first column of the first row to the last column of the last may be beyond the
-    /// threshold. What lies between rows is looked at too, and where packed rows do not end on whole bytes the
-    /// pixels just before and behind.
-    #[inline]
-    pub fn may_hold(
-        &mut self,
-        pixels: &Pixels<'_>,
-        rows: Range<usize>,
-        columns: (u32, u32),
-        threshold: u16,
-        side: Side,
-    ) -> bool {
-        let from = pixels.start(rows.start, columns.0 as usize).0;
-        let (last, skip) = pixels.start(rows.end - 1, columns.1 as usize);
-        let last = last + usize::from(skip > 0);
+    /// The cells that may hold a pixel beyond their threshold, row by row. None is left out that does; pixels just
+    /// beside a cell may be the reason that it is there.
+    pub fn find(&mut self, pixels: &Pixels<'_>, plan: &Plan, side: Side) {
         match pixels.format {
-            PixelFormat::Gray8 => {
-                let Some(limit) = u8::limit(threshold, side) else { return false };
-                let bytes = &pixels.bytes[from..last];
-                if bytes.len() < LONG { any_u8(bytes, limit, side) } else { long_u8(bytes, limit, side) }
-            }
-            PixelFormat::Gray16 => {
-                let Some(limit) = u16::limit(threshold, side) else { return false };
-                let bytes = &pixels.bytes[from..last];
-                if bytes.len() < LONG { any_pair(bytes, limit, side) } else { long_pair(bytes, limit, side) }
-            }
+            PixelFormat::Gray8 => pass_u8(pixels, plan, side, &mut self.marks),
+            PixelFormat::Gray16 => pass_u16(pixels, plan, side, &mut self.marks),
             PixelFormat::Packed10 | PixelFormat::Packed12 => {
-                let bits = pixels.format.bits_per_pixel() as usize;
-                let known = matches!(&self.words, Some((t, s, f, _))
-                    if *t == threshold && *s == side && *f == pixels.format);
-                if !known {
-                    let words = Box::new(Words::new(bits, threshold, side));
-                    self.words = Some((threshold, side, pixels.format, words));
+                if self.words_of != Some((pixels.format, side)) {
+                    self.words.clear();
+                    self.words_of = Some((pixels.format, side));
                 }
-                let Some((_, _, _, words)) = &self.words else { return true };
-                // Back to the start of a group of samples that begins on a byte.
-                let origin = pixels.group_origin(rows.start);
-                let period = if bits == 12 { 3 } else { 5 };
-                let mut at = origin + (from - origin) / period * period;
-                while at < last {
-                    let Some(chunk) = pixels.bytes.get(at..at + 2 * LANES + 1) else { return true };
-                    if words.any(chunk, side) {
-                        return true;
-                    }
-                    at += 2 * LANES;
-                }
-                false
+                pass_packed(pixels, plan, side, &mut self.words, &mut self.marks);
             }
         }
+    }
+
+    /// What [`Skip::find`] found, in order.
+    pub fn marks(&self) -> impl Iterator<Item = Mark> {
+        self.marks.iter().flatten().copied()
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::detect::plan::CELL_PX;
 
     #[test]
     fn a_single_pixel_is_never_passed_over_in_any_format() {
@@ -220,29 +341,33 @@ mod tests {
         {
             let bits = format.bits_per_pixel() as usize;
             let top = if bits == 16 { 4095 } else { (1u32 << bits) - 1 } as u16;
-            // An odd width, so that packed rows end inside bytes.
-            let (w, h) = (701usize, 3usize);
+            // An odd width, so that packed rows end inside bytes; a height that is no multiple of four.
+            let (w, h) = (701usize, 7usize);
             for side in [Side::Bright, Side::Dark] {
                 let (ground, t) = match side {
                     Side::Bright => (top / 2, top / 2 + 1),
                     Side::Dark => (top / 2, top / 2 - 1),
                 };
-                for x in [0, 1, 2, 3, 4, 5, 158, 159, 160, 161, 350, 697, 698, 699, 700] {
-                    let mut values = vec![ground; w * h];
-                    values[w + x] = t;
-                    let bytes = crate::detect::pixels::pack(&values, bits);
-                    let pixels = Pixels::of_samples(&bytes, w, h, format);
-                    let mut skip = Skip::default();
-                    assert!(skip.may_hold(&pixels, 1..2, (0, w as u32), t, side), "{format:?} {side:?} {x}");
-                    // A step farther and nothing is beyond; the last row's tail may be looked at in full.
-                    let farther = match side {
-                        Side::Bright => t + 1,
-                        Side::Dark => t - 1,
-                    };
-                    assert!(
-                        !skip.may_hold(&pixels, 0..1, (0, w as u32), farther, side),
-                        "{format:?} {side:?} {x} farther"
-                    );
+                for x in [0, 1, 2, 3, 4, 5, 158, 159, 160, 161, 319, 320, 321, 639, 640, 697, 698, 699, 700] {
+                    for y in [0, 1, 3, 6] {
+                        let mut values = vec![ground; w * h];
+                        values[y * w + x] = t;
+                        let bytes = crate::detect::pixels::pack(&values, bits);
+                        let pixels = Pixels::of_samples(&bytes, w, h, format);
+                        let mut skip = Skip::default();
+                        skip.find(&pixels, &Plan::uniform(w, h, t, side), side);
+                        let mark = (y as u32, x as u32 / CELL_PX);
+                        assert!(skip.marks().any(|m| m == mark), "{format:?} {side:?} {x} {y}");
+                        // The pixel's own cell, one beside it, and of packed rows the last one.
+                        assert!(skip.marks().count() <= 3, "{format:?} {side:?} {x} {y}");
+                        // A step farther and nothing is beyond.
+                        let farther = match side {
+                            Side::Bright => t + 1,
+                            Side::Dark => t - 1,
+                        };
+                        skip.find(&pixels, &Plan::uniform(w, h, farther, side), side);
+                        assert!(skip.marks().all(|m| m == (6, 2)), "{format:?} {side:?} {x} {y} farther");
+                    }
                 }
             }
         }

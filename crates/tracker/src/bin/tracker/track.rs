@@ -33,7 +33,7 @@ pub struct Args {
     #[arg(long, value_name = "A..B", value_parser = frames)]
     frames: Option<Range<u64>>,
     /// Threshold in the recording's units, or `auto`
-    #[arg(long, default_value = "auto", value_name = "auto|N", value_parser = threshold)]
+    #[arg(long, default_value = "auto", value_name = "auto|N", value_parser = threshold, allow_hyphen_values = true)]
     threshold: Threshold,
     /// Whether markers are brighter or darker than what is around them
     #[arg(long, default_value = "auto", value_enum)]
