@@ -10,11 +10,13 @@ import numpy as np
 import pytest
 from pydpend import energy
 from pydpend.angles import LinkAngles
-from pydpend.damping import DampingFit, fit_damping, single
+from pydpend.damping import DampingFit, compare_terms, fit_damping, single
+from pydpend.damping.trajectory import prepare
 from pydpend.energy import Motion
 from pydpend.errors import FitError
 from pydpend.model import Damping, derived
 from pydpend.simulate import simulate
+from pydpend.trials import combine
 from scipy.integrate import solve_ivp
 
 from tests.free_decays import ALL_TERMS, TRUTH, measured, released
@@ -127,6 +129,27 @@ def test_a_wrong_model_shows(wrong: str) -> None:
         angles = measured(released(6, 12.0, 500.0, strong), 6, 0.05)
         fit = fit_damping(angles, MODEL, laws="mu_v1,mu_v2,mu_q1,mu_q2", ratios=False)
     assert fit.chi2 > 1.1
+
+
+def test_terms_that_made_the_data_are_asked_for_and_others_rejected() -> None:
+    truth = replace(TRUTH, tau_c1=1e-3, rmu1=0.0)
+    recording = prepare(measured(released(3, 12.0, 500.0, truth), 3, 0.05), MODEL)
+    terms = {t.name: t for t in compare_terms([recording], MODEL, ("mu_q1", "mu_q2", "tau_c1", "strip_drag"))}
+    for name in ("mu_q1", "mu_q2", "tau_c1"):
+        assert terms[name].verdict == "asked for", terms[name].sentence
+    assert terms["strip_drag"].verdict != "asked for", terms["strip_drag"].sentence
+
+
+def test_trials_that_differ_have_their_spread_in_the_mean() -> None:
+    alike = combine(np.array([1.0, 1.1, 0.95]), np.full(3, 0.1), "1")
+    assert alike.spread == 0.0
+    assert alike.sigma == pytest.approx(0.1 / np.sqrt(3))
+    assert alike.p_value > 0.05
+    # Spread between trials far beyond their errors: DerSimonian and Laird's is then the plain one.
+    apart = combine(np.array([1.0, 2.0, 3.0]), np.full(3, 0.01), "1")
+    assert apart.spread == pytest.approx(1.0, rel=1e-3)
+    assert apart.sigma == pytest.approx(1 / np.sqrt(3), rel=1e-3)
+    assert apart.p_value < 1e-6
 
 
 def test_published_constants_are_refused_in_words() -> None:

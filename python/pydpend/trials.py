@@ -102,7 +102,7 @@ def fit_trials(recordings: Sequence[LinkAngles], model: Model, **options: Any) -
     if len(recordings) < 2:
         raise FitError(fault("trials", "there is one recording", "Give at least two"))
     joint = fit_damping(recordings, model, **options)
-    each_options = {k: v for k, v in options.items() if k not in ("predict", "progress")}
+    each_options = {k: v for k, v in options.items() if k not in ("predict", "compare", "progress")}
     each = tuple(fit_damping(r, model, **each_options) for r in recordings)
     return summary(each, joint)
 

@@ -239,7 +239,8 @@ def fit(found: tuple[Recording, ...], options: Options, folder: Path, into: Path
         "stop_s": options.stop_s,
         "angle_maps": options.angle_maps,
     }
-    fitted = fit_damping(recordings, model, progress=_steps(tell), **settings)
+    compare = options.method == "trajectory"
+    fitted = fit_damping(recordings, model, progress=_steps(tell), compare=compare, **settings)
     trials = None
     if len(recordings) > 1:
         each = []

@@ -52,6 +52,11 @@ def add_arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument(
         "--no-prediction", action="store_true", help="do not fit again without each part to predict it"
     )
+    p.add_argument(
+        "--no-comparison",
+        action="store_true",
+        help="do not leave each term out in turn to see if the data ask for it",
+    )
     p.add_argument("--no-figures", action="store_true")
     add_output_arguments(p)
 
@@ -148,6 +153,7 @@ def run(args: argparse.Namespace) -> int:
         recordings,
         model,
         predict=args.method == "trajectory" and not args.no_prediction,
+        compare=args.method == "trajectory" and not args.no_comparison,
         progress=report,
         **options,
     )
@@ -197,4 +203,4 @@ def describe(fit: DampingFit) -> list[str]:
     for window, p in fit.prediction.items():
         errors = slashed([p[key] for key in ("phi1_deg", "phi2_deg") if key in p])
         lines.append(f"prediction, {window} s windows: {errors} deg RMS")
-    return [*lines, *fit.identifiability.sentences, *fit.notes]
+    return [*lines, *(t.sentence for t in fit.terms), *fit.identifiability.sentences, *fit.notes]

@@ -3,10 +3,11 @@ docs/damping.md)."""
 
 from __future__ import annotations
 
+from pydpend.damping.compare import compare_terms
 from pydpend.damping.fit import fit_damping
 from pydpend.damping.maps import Maps
 from pydpend.damping.prediction import Prediction, Window, predict
-from pydpend.damping.result import DampingFit, EnergyCurve, Estimate, Identifiability, Residuals
+from pydpend.damping.result import DampingFit, EnergyCurve, Estimate, Identifiability, Residuals, Term
 
 __all__ = [
     "DampingFit",
@@ -16,7 +17,9 @@ __all__ = [
     "Maps",
     "Prediction",
     "Residuals",
+    "Term",
     "Window",
+    "compare_terms",
     "fit_damping",
     "predict",
 ]

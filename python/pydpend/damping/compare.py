@@ -7,7 +7,6 @@ in likelihood says what the fitted data think of a term, the prediction of the r
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +14,8 @@ from numpy.typing import NDArray
 from pydpend.coefficients import FULL, parameters, ratios_of
 from pydpend.damping import shooting
 from pydpend.damping.prediction import predict, split
+from pydpend.damping.result import Term
+from pydpend.damping.shooting import Progress
 from pydpend.damping.trajectory import FLOOR, HUBER, SEGMENT_S, Recording, length_of
 from pydpend.damping.uncertainty import covariance
 from pydpend.model import Model
@@ -29,37 +30,6 @@ WORSE = 2.0
 """Standard errors by which a prediction must differ to count."""
 
 
-@dataclass(frozen=True)
-class Term:
-    """What the data say of one term."""
-
-    name: str
-    gain: float
-    """Twice the gain in log-likelihood that it brings beside all others, over the residuals' chi-square."""
-    prediction: float
-    """How much worse the rest is predicted without it: change of the mean square, relative."""
-    prediction_z: float
-    """The same over its standard error, from the windows."""
-    partner: str
-    """The term it is most correlated with."""
-    correlation: float
-    verdict: str
-    """``asked for``, ``rejected``, ``cannot be told apart``, ``not decided``."""
-
-    @property
-    def sentence(self) -> str:
-        """The verdict in words."""
-        word = self.verdict
-        if word == "cannot be told apart":
-            word += f" from {self.partner} (correlation {self.correlation:+.2f})"
-        said = word if word.startswith("cannot") else f"is {word}"
-        return (
-            f"{self.name} {said}: without it twice the log-likelihood falls by {self.gain:.1f} and the mean square "
-            f"of the prediction of unused data changes by {100 * self.prediction:+.2f} % "
-            f"({self.prediction_z:+.1f} standard errors)"
-        )
-
-
 def verdict(gain: float, prediction_z: float, correlation: float) -> str:
     """The word for a term from its three numbers."""
     if gain > ASKED and prediction_z > -WORSE:
@@ -72,16 +42,21 @@ def verdict(gain: float, prediction_z: float, correlation: float) -> str:
 
 
 def compare_terms(
-    recordings: Sequence[Recording], model: Model, names: Sequence[str] = FULL
+    recordings: Sequence[Recording],
+    model: Model,
+    names: Sequence[str] = FULL,
+    *,
+    ratios: bool = True,
+    progress: Progress | None = None,
 ) -> tuple[Term, ...]:
     """The terms ``names`` judged on recordings ready for a fit: all but the last recording are fitted and the last
-    one predicted, or of a single one the last part.
+    one predicted, or of a single one the last part. ``ratios``: whether the inertial ratios are free.
 
     Raises FitError as a fit does, and when nothing can be left out.
     """
     known, unknown = split(recordings)
     tracks = [r.track for r in known]
-    wanted = [*ratios_of(known[0].angles.links), *names]
+    wanted = [*(ratios_of(known[0].angles.links) if ratios else ()), *names]
     begun = shooting.settled(
         tracks,
         [r.span for r in known],
@@ -112,7 +87,9 @@ def compare_terms(
 
     with_all = squares(full.parameters)
     terms = []
-    for name in names:
+    for k, name in enumerate(names):
+        if progress is not None:
+            progress(k + 1, len(names), full.chi2)
         others = [n for n in wanted if n != name]
         without = shooting.solve(
             tracks,

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pydpend.angles import LinkAngles
 from pydpend.coefficients import JOINT_OF, coefficients, parameters, ratios_of, unit
 from pydpend.damping import shooting
+from pydpend.damping.compare import compare_terms
 from pydpend.damping.plausible import modes_hz
 from pydpend.damping.prediction import held_out
 from pydpend.damping.profile import fit_energy
@@ -40,6 +41,7 @@ def fit_damping(
     angle_maps: bool = False,
     pinned: bool = False,
     predict: bool = False,
+    compare: bool = False,
     progress: Progress | None = None,
 ) -> DampingFit:
     """Damping coefficients of a double pendulum from its free motion.
@@ -51,7 +53,8 @@ def fit_damping(
     (``added_inertia``, ``tilt``, ``offset1``, ``offset2``); ``clock``: the camera clock's scale.
     ``pinned``: the elbow is pinned, and the pendulum a single one; angles of one link are a single pendulum's too,
     and ``model``'s upper link alone is theirs. ``angle_maps``: learn repeatable angle bias. ``predict``: also
-    fit without each part in turn and predict it. The free decay is found unless ``start_s`` and ``stop_s`` state it.
+    fit without each part in turn and predict it. ``compare``: also leave each term out in turn, and say which the data
+    ask for (`compare_terms`; trajectory only). The free decay is found unless ``start_s`` and ``stop_s`` state it.
 
     Raises FitError for recordings without a free decay and models the recordings refute.
     """
@@ -92,6 +95,12 @@ def fit_damping(
     if predict:
         prediction, note = held_out(recordings, lambda some: run(some, quiet=True))
         fit = replace(fit, prediction=prediction, notes=(*fit.notes, note))
+    if compare:
+        try:
+            terms = compare_terms(recordings, model, names, ratios=ratios, progress=progress)
+        except FitError as problem:
+            return replace(fit, notes=(*fit.notes, f"the terms were not compared: {problem}"))
+        fit = replace(fit, terms=terms)
     return fit
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
@@ -64,6 +64,41 @@ class Identifiability:
 
 
 @dataclass(frozen=True)
+class Term:
+    """What the data say of one term."""
+
+    name: str
+    gain: float
+    """Twice the gain in log-likelihood that it brings beside all others, over the residuals' chi-square."""
+    prediction: float
+    """How much worse the rest is predicted without it: change of the mean square, relative."""
+    prediction_z: float
+    """The same over its standard error, from the windows."""
+    partner: str
+    """The term it is most correlated with."""
+    correlation: float
+    verdict: str
+    """``asked for``, ``rejected``, ``cannot be told apart``, ``not decided``."""
+
+    def to_json(self) -> dict[str, Any]:
+        """As in ``fit.json``."""
+        return {**asdict(self), "sentence": self.sentence}
+
+    @property
+    def sentence(self) -> str:
+        """The verdict in words."""
+        word = self.verdict
+        if word == "cannot be told apart":
+            word += f" from {self.partner} (correlation {self.correlation:+.2f})"
+        said = word if word.startswith("cannot") else f"is {word}"
+        return (
+            f"{self.name} {said}: without it twice the log-likelihood falls by {self.gain:.1f} and the mean square "
+            f"of the prediction of unused data changes by {100 * self.prediction:+.2f} % "
+            f"({self.prediction_z:+.1f} standard errors)"
+        )
+
+
+@dataclass(frozen=True)
 class DampingFit:
     """Damping coefficients with everything needed to judge them."""
 
@@ -95,6 +130,8 @@ class DampingFit:
     """Of each recording; ``residuals.csv`` in the fit's folder."""
     prediction: dict[str, dict[str, Any]] = field(default_factory=dict)
     """Window in s: RMS per link in degrees of data the fit did not see."""
+    terms: tuple[Term, ...] = ()
+    """What the data say of each term, if the terms were compared."""
     chi2_slack: float = math.nan
     """The same mean square with the slack of `slack`."""
     slack: dict[str, float] = field(default_factory=dict)
@@ -129,6 +166,7 @@ class DampingFit:
                 "correlations": self.identifiability.correlations,
                 "sentences": list(self.identifiability.sentences),
             },
+            "terms": {t.name: t.to_json() for t in self.terms},
             "inputs": list(self.inputs),
             "version": package_version(),
             "chi2_slack": self.chi2_slack,

@@ -83,7 +83,8 @@ def fit_trajectory(
     """Fits the coefficients ``names`` (and the inertial ratios) to one or several recordings with them in
     common.
 
-    ``free``: further parameters (``added_inertia``, ``tilt``, ``offset1``, ``offset2``). Raises FitError for
+    ``free``: further parameters (``added_inertia``, ``tilt``, ``offset1``, ``offset2``). Where segments of
+    ``segment_s`` do not converge, shorter ones are taken, down to `shooting.PIECE_S`. Raises FitError for
     constants the recordings refute, and where nothing is determined.
     """
     tracks = [r.track for r in recordings]
@@ -144,6 +145,19 @@ def fit_trajectory(
             segments, start, zeros = solution.segments, solution.parameters, solution.zeros_rad
             if pass_ == 2:
                 break
+    if solution.status in ("stalled", "iteration_limit") and length > 1.01 * shooting.PIECE_S:
+        return fit_trajectory(
+            recordings,
+            model,
+            names,
+            ratios=ratios,
+            free=free,
+            clock=clock,
+            angle_maps=angle_maps,
+            segment_s=max(shooting.PIECE_S, length / 2),
+            max_iterations=max_iterations,
+            progress=progress,
+        )
     used = tracks if bias is None else maps.corrected(tracks, bias)
     return _judge(recordings, used, model, names, wanted, solution, bias, progress)
 

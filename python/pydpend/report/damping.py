@@ -202,7 +202,7 @@ def sections(folder: Path, fit: dict[str, Any], prediction: dict[str, Any] | Non
             "identifiability",
             "What the data can tell",
             (
-                Listing(tuple(sentence(s) for s in told["sentences"])),
+                Listing(tuple(sentence(s) for s in (*_terms(fit), *told["sentences"]))),
                 Text(
                     f"Condition number of the scaled information matrix: {told['condition']:.3g}.", quiet=True
                 ),
@@ -221,6 +221,11 @@ def sections(folder: Path, fit: dict[str, Any], prediction: dict[str, Any] | Non
     if prediction:
         out.append(Section("prediction", "Prediction", tuple(_prediction(folder, prediction))))
     return out
+
+
+def _terms(fit: dict[str, Any]) -> list[str]:
+    """What the data say of each term, where the terms were compared."""
+    return [f"{t['sentence']}." for t in fit.get("terms", {}).values()]
 
 
 def _trials(trials: dict[str, Any], names: list[str]) -> list[Block]:
