@@ -8,7 +8,7 @@ import shutil
 import signal
 import subprocess
 import sys
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +16,9 @@ import pyarrow.parquet as pq
 import pytest
 from pydpend.analyse import Options, analyse, read_config, write_config
 from pydpend.analyse.folder import RunFolder
+from pydpend.analyse.options import flag_of
 from pydpend.angles import read_angles
-from pydpend.cli import main
+from pydpend.cli import main, parser
 from pydpend.errors import PydpendError
 from pydpend.nodes import read_nodes
 from pydpend.report import report_page
@@ -161,12 +162,6 @@ def test_the_page_has_every_part(demo_run: Path) -> None:
     assert len(html) < 25e6
 
 
-def test_angles_of_anyone_are_enough(tmp_path: Path) -> None:
-    outcome = analyse(Options(inputs=(str(DEMO / "motion.parquet"),)), tmp_path / "run")
-    assert outcome.status == "done", outcome.stages
-    assert (tmp_path / "run" / "README.txt").read_text("utf-8").startswith("A run of pydpend")
-
-
 def test_a_stage_that_cannot_be_done_says_why_and_the_rest_is_there(tmp_path: Path) -> None:
     table = tmp_path / "still.csv"
     rows = [f"{i / 500},0.0,0.0" for i in range(2000)]
@@ -198,6 +193,48 @@ def test_config_there_and_back(tmp_path: Path, demo_options: Options) -> None:
     path.write_text("fps = 'fast'\n", encoding="utf-8")
     with pytest.raises(PydpendError, match="key fps"):
         read_config(path)
+
+
+def test_a_config_says_whatever_a_flag_can(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    given: dict[str, object] = {
+        "inputs": ("a b.mp4", 'c"d.csv'), "rig": "r.toml", "fps": 1000.5, "encoder": "e.csv", "encoder_column": "V 1",
+        "calibration": "holds", "model": "m.toml", "method": "energy", "laws": "paper", "start_s": 1.5, "stop_s": 9.0,
+        "angle_maps": True, "zero": "-178,-182", "link_length_m": 0.17, "estimator": "linkage",
+        "columns": "time_s=t", "hanging_deg": -180.0, "overlay": False, "threads": 3,
+    }  # fmt: skip
+    assert set(given) == {f.name for f in fields(Options)}
+    plain = Options()
+    assert all(value != getattr(plain, name) for name, value in given.items())
+    words = ["analyse", "--write-config"]
+    for name, value in given.items():
+        if name == "inputs":
+            words += list(value) if isinstance(value, tuple) else []
+        elif isinstance(value, bool):
+            words.append(flag_of(name) if value else flag_of(name).replace("--", "--no-", 1))
+        else:
+            words.append(f"{flag_of(name)}={value}")
+    assert main(words) == 0
+    (tmp_path / "run.toml").write_text(capsys.readouterr().out, encoding="utf-8")
+    assert read_config(tmp_path / "run.toml") == Options(**given)  # type: ignore[arg-type]
+    # Every other flag says how to run, not what.
+    flags = set(vars(parser().parse_args(["analyse"]))) - {"command", "run"}
+    how = {"output", "config", "write_config", "dry_run", "json", "quiet"}
+    assert flags == set(given) | how
+
+
+def test_angles_of_anyone_are_enough_and_json_and_dry_run_tell_what_is_done(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["analyse", str(DEMO / "motion.parquet"), "-o", str(tmp_path / "run"), "--json"]
+    assert main([*words, "--dry-run"]) == 0
+    assert json.loads(capsys.readouterr().out) == {"motion/angles": "to do", "fit": "to do"}
+    assert not (tmp_path / "run").exists()
+    assert main([*words, "--quiet"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert (told["status"], told["stages"]) == ("done", {"motion/angles": "done", "fit": "done"})
+    assert (tmp_path / "run" / "README.txt").read_text("utf-8").startswith("A run of pydpend")
+    assert main([*words, "--dry-run", "--laws", "paper"]) == 0
+    assert json.loads(capsys.readouterr().out) == {"motion/angles": "kept", "fit": "to do"}
 
 
 def test_a_folder_with_other_things_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
