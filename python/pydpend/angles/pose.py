@@ -15,7 +15,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy.special import gammaincinv
 
 from pydpend.angles.markers import BodyMarkers
 from pydpend.angles.scale import (
@@ -266,7 +266,7 @@ def _robust_scale2(fitted: Fitted) -> float:
     frames = dof > 0
     if np.count_nonzero(frames) < 30:
         return 1.0
-    middle = np.asarray(stats.chi2.median(np.arange(1, int(dof.max()) + 1)))
+    middle = 2 * gammaincinv(np.arange(1, int(dof.max()) + 1) / 2, 0.5)
     return max(float(np.median(fitted.chi2[frames] / middle[dof[frames] - 1])), 1e-12)
 
 

@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
-from scipy.signal import savgol_coeffs, savgol_filter
 
 from pydpend.angles.table import LinkAngles
 from pydpend.errors import EncoderError, fault
@@ -109,6 +108,9 @@ class Course:
     @staticmethod
     def of(angles: LinkAngles, link: int) -> Course:
         """A cubic spline through the seen frames. Raises :class:`EncoderError` if there are too few."""
+        # All of scipy.stats comes with it: half of what `import pydpend` would take.
+        from scipy.signal import savgol_coeffs, savgol_filter
+
         if not 0 <= link < angles.links:
             raise EncoderError(fault(angles.name, f"it has {angles.links} link(s), not a link {link + 1}"))
         seen = angles.seen[:, link]
