@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page
 from pydpend.report import page as p
+from pydpend.report import words
 
 from tests.browsing import open_report, until
 
@@ -99,6 +100,24 @@ def film_time(page: Page) -> float:
 
 def cursor_time(page: Page) -> float:
     return float(page.evaluate("window.pydpendReport.groups.get('g').time"))
+
+
+@pytest.mark.parametrize(
+    ("said", "meant"),
+    [
+        (words.digits(0.02), "0.020"),
+        (words.digits(66.588, 3), "66.6"),
+        (words.digits(1234.5), "1234"),
+        (words.with_sigma(2.0026e-3, 1.1e-5), "0.002003 ± 0.000011"),
+        (words.with_sigma(2.5e-6, 1.2e-9), "(2.5000 ± 0.0012) × 10⁻⁶"),
+        (words.with_sigma(None, 1.0), "–"),
+        (words.sentence("rmu2: 1.9e-05 +- 1.0e-05 N m s2"), "rmu2: 1.9 × 10⁻⁵ ± 1.0 × 10⁻⁵ N m s²"),
+        (words.sentence("converged in 6 steps"), "Converged in 6 steps"),
+        (words.sentence("trial1: free decay"), "trial1: free decay"),
+    ],
+)  # fmt: skip
+def test_numbers_as_people_read_them(said: str, meant: str) -> None:
+    assert said == meant
 
 
 def test_plots_draw(opened: Page) -> None:

@@ -51,8 +51,8 @@ MEANING = {
 SHARE = {"law": "share of the energy lost, by law", "joint": "share of the energy lost, by joint"}
 
 SCALE = (
-    "± is one standard uncertainty of the fit. All coefficients are in proportion to psi, the inertia of the upper "
-    "joint, which is the model's; its relative uncertainty is common to them and comes on top."
+    "± is one standard uncertainty of the fit. All coefficients are in proportion to psi, half the moment of inertia "
+    "about the upper joint, which is the model's; its relative uncertainty is common to them and comes on top."
 )
 
 
