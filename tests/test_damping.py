@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from pydpend import energy
 from pydpend.angles import LinkAngles
-from pydpend.damping import DampingFit, compare_terms, fit_damping, single
+from pydpend.damping import DampingFit, Maps, compare_terms, fit_damping, single
 from pydpend.damping.trajectory import prepare
 from pydpend.energy import Motion
 from pydpend.errors import FitError
@@ -138,6 +138,22 @@ def test_terms_that_made_the_data_are_asked_for_and_others_rejected() -> None:
     for name in ("mu_q1", "mu_q2", "tau_c1"):
         assert terms[name].verdict == "asked for", terms[name].sentence
     assert terms["strip_drag"].verdict != "asked for", terms["strip_drag"].sentence
+
+
+def test_repeatable_bias_is_learned_and_taken_off_another_recording() -> None:
+    def biased(seed: int) -> tuple[LinkAngles, np.ndarray]:
+        angles = measured(released(seed, 16.0, 500.0), seed, 0.05)
+        bias = np.radians(0.15) * np.column_stack(
+            [np.cos(2 * angles.phi_rad[:, 0]), np.sin(3 * angles.phi_rad[:, 1])]
+        )
+        return replace(angles, phi_rad=angles.phi_rad + bias), bias
+
+    fit = fit_damping(biased(14)[0], MODEL, laws="paper", angle_maps=True)
+    assert fit.maps is not None
+    unseen, bias = biased(15)
+    left = Maps.from_json(fit.maps).bias(unseen.phi_rad) - bias
+    # Zeros belong to the recording. A sixth of the variance may stay: what the motion itself can imitate.
+    assert (left.std(axis=0) < 0.4 * bias.std(axis=0)).all(), np.degrees(left.std(axis=0))
 
 
 def test_trials_that_differ_have_their_spread_in_the_mean() -> None:

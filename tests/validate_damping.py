@@ -1,12 +1,15 @@
 """The issue's table of accuracies over seeds held back (0-19): ``python -m tests.validate_damping CASE [SEEDS]``.
 
 Cases: exact, energy, inertias (true inertias), ratios (inertias up to 2 % off), slow (500 fps, 0.1 deg), all (every
-law). Prints each seed's worst relative error, and over all how often 95 % intervals hold the truth. Not run by pytest.
+law); speed (wall and processor time, memory; no seeds). Prints each seed's errors, and over all the worst and how often
+95 % intervals hold the truth. Not run by pytest.
 """
 
 from __future__ import annotations
 
+import resource
 import sys
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -19,8 +22,31 @@ from tests.free_decays import ALL_TERMS, TRUTH, measured, released
 RATIOS = {"lambda": "lambda_kg_m2", "sigma": "sigma_j", "kappa": "kappa_j", "a3": "a3_kg_m2"}
 
 
+def speed() -> None:
+    """Times of the trajectory fit with ratios free over 15, 30 and 60 s at 1000 fps, and of the energy fit's least
+    squares; largest memory of this process."""
+    true = derived("A")
+    for seconds in (15.0, 30.0, 60.0):
+        angles = measured(released(0, seconds), 0, 0.05)
+        wall, processor = time.perf_counter(), time.process_time()
+        result = fit_damping(angles, true, laws="paper")
+        wall, processor = time.perf_counter() - wall, time.process_time() - processor
+        most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+        print(
+            f"{seconds:.0f} s: {result.status}, {wall:.2f} s wall, {processor:.2f} s CPU, {most:.0f} MiB",
+            flush=True,
+        )
+    profile = energy.energy_profile(released(0, 60.0), true, "paper")
+    wall = time.perf_counter()
+    energy.fit_profiles([profile])
+    print(f"energy fit of {profile.t_s.size} samples: {time.perf_counter() - wall:.3f} s wall")
+
+
 def main(case: str, seeds: int) -> None:
     """Runs one case and prints."""
+    if case == "speed":
+        speed()
+        return
     true = derived("A")
     truth = ALL_TERMS if case == "all" else TRUTH
     inside, z, worst, ratio_ppm, chi2, converged = [], [], [], [], [], []

@@ -66,6 +66,7 @@ def compare_terms(
         free=wanted,
         bounded=names,
     )
+    huber = HUBER * max(1.0, begun.chi2) ** 0.5
     full = shooting.solve(
         tracks,
         begun.segments,
@@ -74,7 +75,7 @@ def compare_terms(
         free=wanted,
         bounded=names,
         slack=FLOOR,
-        huber=HUBER,
+        huber=huber,
     )
     cov = covariance(full, model_error=True)
     scale = np.sqrt(np.diag(cov))
@@ -90,26 +91,28 @@ def compare_terms(
     for k, name in enumerate(names):
         if progress is not None:
             progress(k + 1, len(names), full.chi2)
-        others = [n for n in wanted if n != name]
-        without = shooting.solve(
-            tracks,
-            full.segments,
-            full.parameters | {name: 0.0},
-            full.zeros_rad,
-            free=others,
-            slack=list(full.slack),
-            learned=False,
-            bounded=[n for n in names if n != name],
-            huber=HUBER,
-        )
-        gain = 2 * (without.cost - full.cost) / max(1.0, full.chi2)
-        change = squares(without.parameters) - with_all
-        error = float(change.std(ddof=1) / np.sqrt(change.size)) if change.size > 1 else 0.0
+        gain = relative = z = 0.0
+        # A term that is zero beside the others is left out already.
+        if full.parameters[name] > 0:
+            without = shooting.solve(
+                tracks,
+                full.segments,
+                full.parameters | {name: 0.0},
+                full.zeros_rad,
+                free=[n for n in wanted if n != name],
+                slack=list(full.slack),
+                learned=False,
+                bounded=[n for n in names if n != name],
+                huber=huber,
+            )
+            gain = 2 * (without.cost - full.cost) / max(1.0, full.chi2)
+            change = squares(without.parameters) - with_all
+            error = float(change.std(ddof=1) / np.sqrt(change.size)) if change.size > 1 else 0.0
+            z = float(change.mean()) / error if error > 0 else 0.0
+            relative = float(change.mean() / with_all.mean())
         at = full.names.index(name)
         partners = {n: float(related[at, full.names.index(n)]) for n in names if n != name}
         partner = max(partners, key=lambda n: abs(partners[n])) if partners else ""
         correlation = partners.get(partner, 0.0)
-        z = float(change.mean()) / error if error > 0 else 0.0
-        relative = float(change.mean() / with_all.mean())
         terms.append(Term(name, gain, relative, z, partner, correlation, verdict(gain, z, correlation)))
     return tuple(terms)
