@@ -20,8 +20,9 @@ use crate::detect::Flags;
 const BESIDE_RADII: f64 = 0.5;
 /// The same where the marker's size is not known, px.
 const BESIDE_PX: f64 = 2.0;
-/// Part of a marker that must be left of a merged blob for it to be seen in it.
-const LEAST_PART: f64 = 0.5;
+/// Part of a marker that must be left of a merged blob for it to be seen in it, and of a cut one for its own centre
+/// to be given.
+pub(super) const LEAST_PART: f64 = 0.5;
 /// Discs no farther apart than this run together in the picture, px: blur and the threshold's edge.
 const TOUCH_PX: f64 = 2.0;
 /// How well a node's place must be known for a detection beside it to be its, px.
@@ -34,8 +35,8 @@ pub struct Beside {
     pub detection: usize,
     /// Where the body says the marker's centre is, px.
     pub place: Vector2<f64>,
-    /// How far the detection's centre is from it, px.
-    pub off_px: f32,
+    /// The detection's centre from there, px.
+    pub off: Vector2<f64>,
 }
 
 /// Finds half hidden markers: where a body's pose is firm, the detection beside the place of a node not seen.
@@ -70,7 +71,7 @@ fn beside(
     let (usual, scatter) = link.area_px[j];
     let radius = (usual / PI).sqrt();
     let near = if usual > 0.0 { BESIDE_RADII * radius } else { BESIDE_PX };
-    let found = |detection: usize, r: f64| Beside { detection, place: there, off_px: r as f32 };
+    let found = |detection: usize| Beside { detection, place: there, off: sky.place(detection) - there };
     let (d, r) = sky.nearest(there, near.max(2.0 * radius))?;
     let part = sky.get(d);
     let area_px = f64::from(part.area_px);
@@ -88,7 +89,7 @@ fn beside(
             let own = own.min(usual);
             let sum = company.iter().map(|c| c.1 * c.0).sum::<Vector2<f64>>() + own * there;
             let off = (sum / (others + own) - sky.place(d)).norm();
-            return (off <= near).then(|| found(d, r));
+            return (off <= near).then(|| found(d));
         }
         if area_px > usual + 4.0 * scatter {
             return None;
@@ -104,7 +105,7 @@ fn beside(
         .iter()
         .enumerate()
         .any(|(k, &t)| k != j && (place(&fit.pose, t) - sky.place(d)).norm() < r);
-    (r <= near && free[d] && off && !nearer).then(|| found(d, r))
+    (r <= near && free[d] && off && !nearer).then(|| found(d))
 }
 
 /// Where a body's pose says that a node is, if it says so firmly.

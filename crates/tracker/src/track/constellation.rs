@@ -9,6 +9,7 @@ use std::f64::consts::PI;
 
 use nalgebra::{Isometry2, Vector2};
 
+use super::beside::LEAST_PART;
 use super::mechanism::Link;
 use super::nearest::Sky;
 use super::predict::{Forecast, hung_at};
@@ -91,6 +92,11 @@ impl Search<'_> {
         one && area_px >= whole_px
     }
 
+    /// Whether so little is left of node `j` that its centre says nothing.
+    fn remnant(&self, j: usize, d: usize) -> bool {
+        f64::from(self.sky.get(d).area_px) < LEAST_PART * self.link.area_px[j].0
+    }
+
     fn usual_sigma(&self, j: usize) -> f64 {
         let own = self.sky.widest_px();
         (own * own + self.link.slack_px[j].powi(2) + self.floor_px.powi(2)).sqrt()
@@ -158,7 +164,7 @@ impl Search<'_> {
             if let Some(d) = *pick {
                 let r = (place(&fit.pose, self.link.template[j]) - self.sky.place(d)).norm();
                 let s = self.sigma(j, d);
-                if r > self.reach_sigma * s {
+                if r > self.reach_sigma * s || self.remnant(j, d) {
                     *pick = None;
                 } else if self.whole(j, d) {
                     support += 1;

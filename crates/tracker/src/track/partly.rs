@@ -5,23 +5,30 @@
 
 use std::collections::VecDeque;
 
+use nalgebra::Vector2;
+
 use super::{Observation, Status};
 use crate::store::FrameStamp;
 
 /// Frames that wait for what comes after them, at most.
 const LONGEST: usize = 64;
 
-/// A run of so many frames in which the marker went so far is no chance, px.
+/// A run of so many frames in which something went along with the marker's place is no chance: one glint in 10^3
+/// falls beside a place, three in a row one in 10^9.
 const RUN: usize = 3;
-const RUN_PX: f64 = 8.0;
+/// So far must the place go in a run, px: well above what a firm pose is uncertain by.
+const RUN_PX: f64 = 2.0;
+/// Part of the place's way that what is seen must go too. What stands still goes none of it; what is left of a marker
+/// goes all of it, give or take the edge that hides it.
+const ALONG: f64 = 0.5;
 
 /// One frame's nodes and, for each, whether only a part of it is seen.
 #[derive(Debug, Clone)]
 struct Held {
     stamp: FrameStamp,
     row: Vec<Observation>,
-    /// Whether a node waits to be believed.
-    doubt: Vec<bool>,
+    /// Of a node that waits to be believed how far what is seen of it is from its place, px.
+    doubt: Vec<Option<Vector2<f64>>>,
 }
 
 /// Frames whose half hidden markers are not yet believed or given up.
@@ -33,24 +40,24 @@ pub struct Partly {
 }
 
 impl Partly {
-    /// Takes the next frame in order; `partly` says for each node whether only a part of it is seen.
-    pub fn push(&mut self, stamp: FrameStamp, row: Vec<Observation>, partly: &[bool]) {
+    /// Takes the next frame in order; `partly` says for each node of which only a part is seen how far that is from
+    /// its place, px.
+    pub fn push(&mut self, stamp: FrameStamp, row: Vec<Observation>, partly: &[Option<Vector2<f64>>]) {
         let n = row.len();
         self.given.resize(n, false);
-        let mut doubt = vec![false; n];
+        let mut doubt = vec![None; n];
         for k in 0..n {
             let seen = row[k].status == Status::Seen;
-            if seen && partly[k] {
-                doubt[k] = !self.given[k];
+            if seen && partly[k].is_some() {
+                doubt[k] = partly[k].filter(|_| !self.given[k]);
                 continue;
             }
             if seen {
                 // Whole: what led up to it was it.
                 for h in self.held.iter_mut().rev() {
-                    if !h.doubt[k] {
+                    if h.doubt[k].take().is_none() {
                         break;
                     }
-                    h.doubt[k] = false;
                 }
             } else {
                 self.give_up(k);
@@ -66,24 +73,33 @@ impl Partly {
     }
 
     /// Ends a run that touched no frame in which the node is whole. One that went along with the body is believed
-    /// all the same: glints do not last, and what stands still is soon farther off than half a marker.
+    /// all the same.
     fn give_up(&mut self, node: usize) {
-        let run: Vec<(f64, f64)> = self
-            .held
-            .iter()
-            .filter(|h| h.doubt[node])
-            .map(|h| (h.row[node].x_px, h.row[node].y_px))
-            .collect();
-        let far = match (run.first(), run.last()) {
-            (Some(a), Some(b)) => (a.0 - b.0).hypot(a.1 - b.1),
-            _ => 0.0,
-        };
-        let believed = run.len() >= RUN && far > RUN_PX;
+        let believed = self.went_along(node);
         for h in &mut self.held {
-            if std::mem::take(&mut h.doubt[node]) && !believed {
+            if h.doubt[node].take().is_some() && !believed {
                 h.row[node] = Observation::MISSING;
             }
         }
+    }
+
+    /// Whether what is seen of a node in doubt moves as its place does, which what stands there does not.
+    fn went_along(&self, node: usize) -> bool {
+        let run: Vec<(Vector2<f64>, Vector2<f64>)> = self
+            .held
+            .iter()
+            .filter_map(|h| {
+                let place = Vector2::new(h.row[node].x_px, h.row[node].y_px);
+                h.doubt[node].map(|off| (place, place + off))
+            })
+            .collect();
+        let Some(&first) = run.first() else { return false };
+        let ways = run.iter().map(|at| (at.0 - first.0, at.1 - first.1));
+        let farthest = ways.max_by(|a, b| a.0.norm_squared().total_cmp(&b.0.norm_squared()));
+        run.len() >= RUN
+            && farthest.is_some_and(|(place, seen)| {
+                place.norm() > RUN_PX && seen.dot(&place) > ALONG * place.norm_squared()
+            })
     }
 
     /// The next frame that waits for nothing; at the `end` of the recording every frame.
@@ -93,7 +109,7 @@ impl Partly {
                 self.give_up(k);
             }
         }
-        if self.held.front()?.doubt.contains(&true) {
+        if self.held.front()?.doubt.iter().any(Option::is_some) {
             return None;
         }
         self.held.pop_front().map(|h| (h.stamp, h.row))
@@ -119,7 +135,7 @@ mod tests {
                 row[0].status = Status::Seen;
             }
             let stamp = FrameStamp { index: i as u64, ticks: i as i64, decoded: true };
-            partly.push(stamp, row, &[c == 'p']);
+            partly.push(stamp, row, &[(c == 'p').then(Vector2::zeros)]);
             take(&mut partly, false, &mut out);
         }
         take(&mut partly, true, &mut out);
@@ -128,7 +144,10 @@ mod tests {
 
     #[test]
     fn a_run_that_goes_along_with_the_body_is_believed() {
-        for (step_px, seen) in [(5.0, true), (1.0, false)] {
+        // What goes along, what stands still where the place comes by, and too short a way to tell.
+        for (step_px, goes, seen) in
+            [(1.0, 1.0, true), (1.0, 0.8, true), (1.0, 0.0, false), (0.5, 1.0, false)]
+        {
             let mut partly = Partly::default();
             for i in 0..6_u32 {
                 let mut row = vec![Observation::MISSING];
@@ -142,7 +161,8 @@ mod tests {
                     };
                 }
                 let stamp = FrameStamp { index: u64::from(i), ticks: i64::from(i), decoded: true };
-                partly.push(stamp, row, &[true]);
+                let off = Vector2::new((goes - 1.0) * step_px * f64::from(i), 1.5);
+                partly.push(stamp, row, &[Some(off)]);
             }
             let rows: Vec<bool> = std::iter::from_fn(|| partly.pop(true))
                 .map(|(_, row)| row[0].status == Status::Seen)

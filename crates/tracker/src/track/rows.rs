@@ -2,6 +2,8 @@
 //!
 //! Owns: [`observations`], [`partly`], [`Returns`]. Must not: decide anything.
 
+use nalgebra::Vector2;
+
 use super::engine::BodySeen;
 use super::mechanism::Mechanism;
 use super::{Observation, Status};
@@ -32,7 +34,7 @@ pub fn observations(mechanism: &Mechanism, seen: &[BodySeen], sky: &[Detection])
                 out[node] = Observation {
                     x_px: b.place.x,
                     y_px: b.place.y,
-                    sigma_px: d.sigma_px.hypot(b.off_px),
+                    sigma_px: d.sigma_px.hypot(b.off.norm() as f32),
                     area_px: d.area_px,
                     status: Status::Seen,
                 };
@@ -44,12 +46,12 @@ pub fn observations(mechanism: &Mechanism, seen: &[BodySeen], sky: &[Detection])
     out
 }
 
-/// For each node of the rig whether only a part of it is seen.
-pub fn partly(mechanism: &Mechanism, seen: &[BodySeen]) -> Vec<bool> {
-    let mut out = vec![false; mechanism.nodes];
+/// For each node of the rig of which only a part is seen, how far that is from where its body says, px.
+pub fn partly(mechanism: &Mechanism, seen: &[BodySeen]) -> Vec<Option<Vector2<f64>>> {
+    let mut out = vec![None; mechanism.nodes];
     for (link, s) in mechanism.links.iter().zip(seen) {
         for (&node, b) in link.nodes.iter().zip(&s.beside) {
-            out[node] = b.is_some();
+            out[node] = b.map(|b| b.off);
         }
     }
     out

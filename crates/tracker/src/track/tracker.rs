@@ -56,7 +56,7 @@ impl Tracker {
         let mut row = observations(&self.engine.mechanism, &seen, detections);
         for (k, partly) in partly(&self.engine.mechanism, &seen).into_iter().enumerate() {
             // Live, a part is believed only if the marker was seen in the frame before.
-            if partly && !self.returns.in_last(k) {
+            if partly.is_some() && !self.returns.in_last(k) {
                 row[k] = Observation::MISSING;
             }
         }
