@@ -92,8 +92,8 @@ def compare_terms(
         if progress is not None:
             progress(k + 1, len(names), full.chi2)
         gain = relative = z = 0.0
-        # A term that is zero beside the others is left out already.
-        if full.parameters[name] > 0:
+        # A term that is zero beside the others is left out already, also of the parameters.
+        if full.parameters.get(name, 0.0) > 0:
             without = shooting.solve(
                 tracks,
                 full.segments,
