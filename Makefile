@@ -58,7 +58,7 @@ validate: build
 	$(PY) -m tests.validate_kinematics
 	$(PY) -m tests.validate_resume
 	for sweep in angles default physics; do $(PY) -m tests.validate_$$sweep || exit 1; done
-	for part in energy inertias ratios slow all; do $(PY) -m tests.validate_damping $$part || exit 1; done
+	for part in energy inertias ratios slow all none added; do $(PY) -m tests.validate_damping $$part || exit 1; done
 
 wheel: .make/system .make/venv
 	tools/wheel.sh
