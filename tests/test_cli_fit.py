@@ -67,6 +67,17 @@ def test_a_fit_of_two_recordings_writes_everything(folder: Path) -> None:
     assert "small oscillations" in said
 
 
+def test_profile_intervals_are_written_and_said(folder: Path) -> None:
+    options = ["--laws", "mu_q1,mu_q2", "--ratios", "fixed", "--intervals", "profile"]
+    options += ["--no-prediction", "--no-comparison", "--no-figures", "--quiet"]
+    done = command("fit", folder / "21.csv", "-o", folder / "profile", *options)
+    assert done.returncode == 0, done.stderr
+    fit = json.loads((folder / "profile" / "fit.json").read_text())
+    for name, interval in fit["intervals"].items():
+        assert interval["low"] < fit["coefficients"][name]["value"] < interval["high"]
+        assert f"{name} is within {interval['low']:.4e} to" in done.stdout
+
+
 def test_trials_agree_and_their_mean_lies_between(folder: Path) -> None:
     trials = json.loads((folder / "out" / "trials.json").read_text())
     assert "agree" in trials["message"]
@@ -99,6 +110,7 @@ def test_bad_input_is_refused_in_words(folder: Path, tmp_path: Path) -> None:
         "is not a coefficient": (folder / "21.csv", ["--laws", "mu_x"]),
         "Check the units": (folder / "21.csv", ["--model", str(_thousandfold(tmp_path))]),
         "goes up and down": (folder / "21.csv", ["--model", "published"]),
+        "Use covariance": (folder / "21.csv", ["--method", "energy", "--intervals", "profile"]),
         "not pinned": (folder / "21.csv", ["--pinned"]),
     }
     for words, (path, options) in cases.items():

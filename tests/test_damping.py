@@ -140,6 +140,37 @@ def test_terms_that_made_the_data_are_asked_for_and_others_rejected() -> None:
     assert terms["strip_drag"].verdict != "asked for", terms["strip_drag"].sentence
 
 
+def test_profile_of_a_coefficient_inside_its_bounds_is_its_standard_error() -> None:
+    angles = measured(released(8, 8.0, 250.0, replace(TRUTH, mu_v1=0.0, rmu1=0.0)), 8, 0.05)
+    fit = fit_damping(angles, MODEL, laws="mu_v2,mu_q1,mu_q2,rmu2", ratios=False, intervals="profile")
+    for name, estimate in fit.coefficients.items():
+        interval = fit.intervals[name]
+        # An end is found to 0.02 in the rise, 0.005 sigma; minima are known to 0.002, 0.001 sigma; the likelihood bends
+        # by about the coefficient's relative error, at most 3 % here: 0.06 sigma.
+        for end, expected in ((interval.low, -1.96), (interval.high, 1.96)):
+            assert (end - estimate.value) / estimate.sigma == pytest.approx(expected, abs=0.07), name
+        assert not interval.note
+        assert min(interval.rises) == 0.0
+
+
+def test_profile_of_a_coefficient_at_zero_is_one_sided_and_bends_the_others() -> None:
+    truth = Damping(mu_q1=TRUTH.mu_q1, mu_q2=TRUTH.mu_q2)
+    angles = measured(released(8, 8.0, 250.0, truth), 8, 0.05)
+    fit = fit_damping(angles, MODEL, laws="mu_q1,mu_q2,tau_c1", ratios=False, intervals="profile")
+    at_zero = fit.intervals["tau_c1"]
+    assert fit.coefficients["tau_c1"].value == 0.0
+    # The misfit has a slope at the bound, so that the end comes before that of a parabola.
+    assert at_zero.low == 0.0 < at_zero.high < 1.96 * fit.coefficients["tau_c1"].sigma
+    assert "open at the bound zero" in at_zero.note
+    # More drag would want less dry torque, of which there is none to take: only drag's lower side is wide.
+    drag, estimate = fit.intervals["mu_q1"], fit.coefficients["mu_q1"]
+    assert drag.high - estimate.value < 0.5 * (estimate.value - drag.low)
+    assert drag.low < truth.mu_q1 < drag.high
+    assert fit.to_json()["intervals"]["tau_c1"]["low"] == 0.0
+    with pytest.raises(FitError, match="Use covariance"):
+        fit_damping(angles, MODEL, "energy", intervals="profile")
+
+
 def test_repeatable_bias_is_learned_and_taken_off_another_recording() -> None:
     def biased(seed: int) -> tuple[LinkAngles, np.ndarray]:
         angles = measured(released(seed, 16.0, 500.0), seed, 0.05)

@@ -50,6 +50,13 @@ def add_arguments(p: argparse.ArgumentParser) -> None:
     )
     p.add_argument("--pinned", action="store_true", help="the elbow is pinned: a single pendulum")
     p.add_argument(
+        "--intervals",
+        choices=("covariance", "profile"),
+        default="covariance",
+        help="standard errors (default), or 95 %% intervals by profile likelihood too: everything else fitted "
+        "again at a few values of each coefficient",
+    )
+    p.add_argument(
         "--no-prediction", action="store_true", help="do not fit again without each part to predict it"
     )
     p.add_argument(
@@ -154,6 +161,7 @@ def run(args: argparse.Namespace) -> int:
         model,
         predict=args.method == "trajectory" and not args.no_prediction,
         compare=args.method == "trajectory" and not args.no_comparison,
+        intervals=args.intervals,
         progress=report,
         **options,
     )
@@ -189,6 +197,7 @@ def describe(fit: DampingFit) -> list[str]:
         lines.append(f"{name:12s} {e.value: .4e} +- {e.sigma:.1e} {e.unit}")
     for name, e in fit.ratios.items():
         lines.append(f"{name + '/psi':12s} {e.value: .6g} +- {e.sigma:.1e} {e.unit}")
+    lines += [interval.sentence(name) for name, interval in fit.intervals.items()]
     swings = ", ".join(f"{f:.4f}" for f in fit.modes_hz)
     lines.append(f"small oscillations of the fitted pendulum: {swings} Hz")
     for given in fit.inputs:

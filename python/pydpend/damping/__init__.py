@@ -7,13 +7,22 @@ from pydpend.damping.compare import compare_terms
 from pydpend.damping.fit import fit_damping
 from pydpend.damping.maps import Maps
 from pydpend.damping.prediction import Prediction, Window, predict
-from pydpend.damping.result import DampingFit, EnergyCurve, Estimate, Identifiability, Residuals, Term
+from pydpend.damping.result import (
+    DampingFit,
+    EnergyCurve,
+    Estimate,
+    Identifiability,
+    Interval,
+    Residuals,
+    Term,
+)
 
 __all__ = [
     "DampingFit",
     "EnergyCurve",
     "Estimate",
     "Identifiability",
+    "Interval",
     "Maps",
     "Prediction",
     "Residuals",

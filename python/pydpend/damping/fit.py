@@ -42,6 +42,7 @@ def fit_damping(
     pinned: bool = False,
     predict: bool = False,
     compare: bool = False,
+    intervals: str = "covariance",
     progress: Progress | None = None,
 ) -> DampingFit:
     """Damping coefficients of a double pendulum from its free motion.
@@ -54,11 +55,21 @@ def fit_damping(
     ``pinned``: the elbow is pinned, and the pendulum a single one; angles of one link are a single pendulum's too,
     and ``model``'s upper link alone is theirs. ``angle_maps``: learn repeatable angle bias. ``predict``: also
     fit without each part in turn and predict it. ``compare``: also leave each term out in turn, and say which the data
-    ask for (`compare_terms`; trajectory only). The free decay is found unless ``start_s`` and ``stop_s`` state it.
+    ask for (`compare_terms`; trajectory only). ``intervals``: ``"profile"`` gives each coefficient's 95 % interval by
+    profile likelihood too (`DampingFit.intervals`; trajectory only), beside the covariance's standard errors. The
+    free decay is found unless ``start_s`` and ``stop_s`` state it.
 
     Raises FitError for recordings without a free decay and models the recordings refute.
     """
     names = coefficients(laws)
+    if intervals not in ("covariance", "profile") or (intervals == "profile" and method == "energy"):
+        raise FitError(
+            fault(
+                "fit",
+                f"intervals {intervals!r} of the {method} fit are not known",
+                "Use covariance, or profile with the trajectory fit",
+            )
+        )
     given = [angles] if isinstance(angles, LinkAngles) else list(angles)
     if not given:
         raise FitError(fault("fit", "there is no recording", "Give at least one"))
@@ -79,7 +90,7 @@ def fit_damping(
     if method != "trajectory":
         raise FitError(fault("fit", f"method {method!r} is not known", "Use trajectory or energy"))
 
-    def run(some: Sequence[Recording], quiet: bool = False) -> DampingFit:
+    def run(some: Sequence[Recording], quiet: bool = False, profile: bool = False) -> DampingFit:
         return fit_trajectory(
             some,
             model,
@@ -88,10 +99,11 @@ def fit_damping(
             free=free,
             clock=clock,
             angle_maps=angle_maps,
+            profile=profile,
             progress=None if quiet else progress,
         )
 
-    fit = run(recordings)
+    fit = run(recordings, profile=intervals == "profile")
     if predict:
         prediction, note = held_out(recordings, lambda some: run(some, quiet=True))
         fit = replace(fit, prediction=prediction, notes=(*fit.notes, note))

@@ -99,6 +99,33 @@ class Term:
 
 
 @dataclass(frozen=True)
+class Interval:
+    """A coefficient's 95 % interval by profile likelihood (`damping.intervals`)."""
+
+    low: float
+    """Lower end, 0 where the data do not exclude that; NaN where it was not found."""
+    high: float
+    """Upper end; NaN where it was not found."""
+    unit: str
+    values: tuple[float, ...]
+    """Values at which everything else was fitted again, rising; the estimate is one."""
+    rises: tuple[float, ...]
+    """How much twice the negative log-likelihood is above the estimate's, in units in which a standard error is 1."""
+    note: str
+    """What should be known of an end; empty if nothing."""
+
+    def to_json(self) -> dict[str, Any]:
+        """As in ``fit.json``; null for an end that was not found."""
+        return asdict(self)
+
+    def sentence(self, name: str) -> str:
+        """The interval in words."""
+        ends = " to ".join(f"{v:.4e}" if math.isfinite(v) else "?" for v in (self.low, self.high))
+        said = f"{name} is within {ends} {self.unit} (95 %, profile likelihood)"
+        return f"{said}: {self.note}" if self.note else said
+
+
+@dataclass(frozen=True)
 class DampingFit:
     """Damping coefficients with everything needed to judge them."""
 
@@ -132,6 +159,8 @@ class DampingFit:
     """Window in s: RMS per link in degrees of data the fit did not see."""
     terms: tuple[Term, ...] = ()
     """What the data say of each term, if the terms were compared."""
+    intervals: dict[str, Interval] = field(default_factory=dict)
+    """95 % intervals of the coefficients by profile likelihood, if asked for."""
     chi2_slack: float = math.nan
     """The same mean square with the slack of `slack`."""
     slack: dict[str, float] = field(default_factory=dict)
@@ -167,6 +196,7 @@ class DampingFit:
                 "sentences": list(self.identifiability.sentences),
             },
             "terms": {t.name: t.to_json() for t in self.terms},
+            "intervals": {name: i.to_json() for name, i in self.intervals.items()},
             "inputs": list(self.inputs),
             "version": package_version(),
             "chi2_slack": self.chi2_slack,

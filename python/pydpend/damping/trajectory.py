@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pydpend.angles import LinkAngles
 from pydpend.coefficients import FULL, RATIOS, parameters, ratios_of, unit
 from pydpend.damping import maps, plausible, shooting
+from pydpend.damping.intervals import profile_intervals
 from pydpend.damping.noise import Noise, noise
 from pydpend.damping.result import DampingFit, Estimate
 from pydpend.damping.shares import energy_curve, shares, unit_works
@@ -76,6 +77,7 @@ def fit_trajectory(
     free: Sequence[str] = (),
     clock: bool = False,
     angle_maps: bool = False,
+    profile: bool = False,
     segment_s: float = SEGMENT_S,
     max_iterations: int = 60,
     progress: Progress | None = None,
@@ -84,8 +86,8 @@ def fit_trajectory(
     common.
 
     ``free``: further parameters (``added_inertia``, ``tilt``, ``offset1``, ``offset2``). Where segments of
-    ``segment_s`` do not converge, shorter ones are taken, down to `shooting.PIECE_S`. Raises FitError for
-    constants the recordings refute, and where nothing is determined.
+    ``segment_s`` do not converge, shorter ones are taken, down to `shooting.PIECE_S`. ``profile``: also intervals by
+    profile likelihood. Raises FitError for constants the recordings refute, and where nothing is determined.
     """
     tracks = [r.track for r in recordings]
     length = length_of(recordings, segment_s)
@@ -125,6 +127,8 @@ def fit_trajectory(
                 "Give angles with fewer gaps",
             )
         )
+    # Where the angles' errors are not the noise between neighbours, all residuals would be outliers.
+    huber = HUBER * max(1.0, settled.chi2) ** 0.5
     for pass_ in range(3 if angle_maps else 1):
         solution = shooting.solve(
             tracks if bias is None else maps.corrected(tracks, bias),
@@ -135,8 +139,7 @@ def fit_trajectory(
             bounded=bounded,
             slack=FLOOR,
             clock=clock,
-            # Where the angles' errors are not the noise between neighbours, all residuals would be outliers.
-            huber=HUBER * max(1.0, settled.chi2) ** 0.5,
+            huber=huber,
             max_iterations=max_iterations,
             progress=progress,
         )
@@ -154,12 +157,17 @@ def fit_trajectory(
             free=free,
             clock=clock,
             angle_maps=angle_maps,
+            profile=profile,
             segment_s=max(shooting.PIECE_S, length / 2),
             max_iterations=max_iterations,
             progress=progress,
         )
     used = tracks if bias is None else maps.corrected(tracks, bias)
-    return _judge(recordings, used, model, names, wanted, solution, bias, progress)
+    fit = _judge(recordings, used, model, names, wanted, solution, bias, progress)
+    if not profile:
+        return fit
+    found = profile_intervals(used, solution, fit.coefficients, huber=huber, progress=progress)
+    return replace(fit, intervals=found)
 
 
 def plausible_or_raise(recording: Recording, model: Model) -> None:
