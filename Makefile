@@ -54,7 +54,7 @@ check: build
 # Long: the eight scenes by twenty seeds, real motion filmed, then the estimators' sweeps.
 validate: build
 	cargo build $(CARGO_FLAGS) --example validate
-	target/release/examples/validate --seeds 100..120 --write docs/validation.md
+	target/release/examples/validate --seeds 200..220 --write docs/validation.md
 	$(PY) -m tests.validate_kinematics
 	$(PY) -m tests.validate_resume
 	for sweep in angles default physics; do $(PY) -m tests.validate_$$sweep || exit 1; done
