@@ -5,11 +5,15 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from pydpend.angles import LinkAngles
+from pydpend.energy import Motion
+from pydpend.model import Damping, Model
+from pydpend.simulate import simulate
 
 from tests.free_decays import measured, released
 
@@ -27,7 +31,8 @@ def command(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
 def written(angles: LinkAngles, path: Path) -> Path:
     """A plain table of times and angles."""
     table = np.column_stack([angles.t_s, angles.phi_rad])
-    np.savetxt(path, table, delimiter=",", header="time_s,phi1_rad,phi2_rad", comments="", fmt="%.9g")
+    head = ",".join(["time_s", *(f"phi{j + 1}_rad" for j in range(angles.links))])
+    np.savetxt(path, table, delimiter=",", header=head, comments="", fmt="%.9g")
     return path
 
 
@@ -122,6 +127,81 @@ def test_bad_input_is_refused_in_words(folder: Path, tmp_path: Path) -> None:
     done = command("predict", folder / "21.csv", "--fit", tmp_path, "-o", tmp_path / "none")
     assert done.returncode == 2
     assert "pydpend fit" in done.stderr
+
+
+def test_a_single_pendulum_with_a_model_of_one_link(folder: Path, tmp_path: Path) -> None:
+    bar = tmp_path / "bar.toml"
+    bar.write_text('[[part]]\nname = "bar"\nbody = 1\nmass_kg = 0.4\ninertia_kg_m2 = 3e-3\nplace_m = 0.12\n')
+    constants = tmp_path / "constants.toml"
+    constants.write_text("[constants]\npsi_kg_m2 = 4.38e-3\nsigma_j = 0.47088\nm1_kg = 0.4\n")
+    model = Model.from_toml(bar)
+    # 2 psi = 3e-3 + 0.4 * 0.12^2 kg m2 and sigma = 0.4 * 9.81 * 0.12 J
+    assert model.links == 1
+    assert Model.from_toml(constants).constants() == pytest.approx(model.constants(), rel=1e-12)
+    truth = Damping(mu_v1=5e-5, mu_q1=4e-5, rmu1=6e-5)
+    # What stands for a lower link hangs at rest.
+    made = simulate(model, truth, [np.pi - 0.06, 0.0, 0.0, 0.0], np.arange(8001) / 500)
+    motion = Motion(made.t_s, made.phi_rad, made.w_rad_s, made.a_rad_s2)
+    both = measured(motion, 31, 0.02, stated=False)
+    one = written(
+        replace(both, phi_rad=both.phi_rad[:, :1], sigma_rad=both.sigma_rad[:, :1]), tmp_path / "one.csv"
+    )
+    options = ["--laws", "paper", "--no-figures", "--quiet"]
+    done = command("fit", one, "--model", bar, "-o", tmp_path / "out", *options)
+    assert done.returncode == 0, done.stderr
+    fit = json.loads((tmp_path / "out" / "fit.json").read_text())
+    assert fit["coefficients"].keys() == {"mu_v1", "mu_q1", "rmu1"}
+    for name, found in fit["coefficients"].items():
+        assert abs(found["value"] - getattr(truth, name)) < 3.5 * found["sigma"], name
+        # Stated uncertainties that say nothing would pass the line above.
+        assert found["sigma"] < 0.5 * getattr(truth, name), name
+    # 8000 angles: chi-square scatters by 0.016; four of these
+    assert abs(fit["chi2"] - 1) < 0.064
+    cases: dict[str, tuple[str | Path, ...]] = {
+        "angles of one link": ("fit", one, "--model", "derived"),
+        "angles of two links": ("fit", folder / "21.csv", "--model", bar),
+        "no elbow to pin": ("fit", one, "--model", bar, "--pinned"),
+        "links, but the model 'the stored fit' has one": ("predict", folder / "21.csv", "--fit", tmp_path / "out"),
+    }  # fmt: skip
+    for words, arguments in cases.items():
+        done = command(*arguments, "-o", tmp_path / "none", "--quiet")
+        assert done.returncode == 2, (words, done.stdout)
+        assert words in done.stderr, done.stderr
+        assert not (tmp_path / "none").exists()
+
+
+def test_the_papers_ten_coefficients_come_with_a_warning(tmp_path: Path) -> None:
+    angles = written(measured(released(11, 16.0, 500.0), 11, 0.05, stated=False), tmp_path / "a.csv")
+    options: list[str | Path] = [
+        "--method",
+        "energy",
+        "--ten-coefficients",
+        "--no-figures",
+        "--quiet",
+        "-o",
+        tmp_path / "out",
+    ]
+    done = command("fit", angles, "--laws", "paper", *options)
+    assert done.returncode == 0, done.stderr
+    assert "only these sums are physical" in done.stdout
+    assert "of ten: mu_c3_2" in done.stdout
+    fit = json.loads((tmp_path / "out" / "fit.json").read_text())
+    ten = fit["ten_coefficients"]
+    assert len(ten["values"]) == 10
+    assert min(v["value"] for v in ten["values"].values()) >= 0
+    assert 6 <= ten["rank"] <= 10
+    assert "arbitrary" in ten["warning"]
+    # The six are the ten with four conditions, so the sums differ by less than the errors of the ten; four of these.
+    for name, found in ten["rmu"].items():
+        six = fit["coefficients"][name]["value"]
+        assert abs(found["value"] - six) < 4 * found["sigma"], name
+        assert found["sigma"] < 0.5 * six
+        added = zip(ten["weights"][name], (1, 2, 3), strict=True)
+        total = sum(w * ten["values"][f"mu_c{i}_{name[-1]}"]["value"] for w, i in added)
+        assert total == pytest.approx(found["value"], rel=1e-9)
+    refused = command("fit", angles, *options)
+    assert refused.returncode == 2
+    assert "--laws paper" in refused.stderr
 
 
 def _thousandfold(folder: Path) -> Path:

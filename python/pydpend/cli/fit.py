@@ -48,6 +48,11 @@ def add_arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument(
         "--angle-maps", action="store_true", help="learn repeatable angle-dependent bias of the tracking"
     )
+    p.add_argument(
+        "--ten-coefficients",
+        action="store_true",
+        help="also the paper's ten (Table 6), with a warning; needs --method energy --laws paper",
+    )
     p.add_argument("--pinned", action="store_true", help="the elbow is pinned: a single pendulum")
     p.add_argument(
         "--intervals",
@@ -154,6 +159,7 @@ def run(args: argparse.Namespace) -> int:
         "free": [name for name in args.free.split(",") if name],
         "angle_maps": args.angle_maps,
         "pinned": args.pinned,
+        "ten_coefficients": args.ten_coefficients,
     }
     report = progress("fit", args.quiet)
     fit = fit_damping(
@@ -195,6 +201,8 @@ def describe(fit: DampingFit) -> list[str]:
     lines = [fit.message]
     for name, e in fit.coefficients.items():
         lines.append(f"{name:12s} {e.value: .4e} +- {e.sigma:.1e} {e.unit}")
+    for name, e in ({} if fit.ten is None else fit.ten.values).items():
+        lines.append(f"of ten: {name:8s} {e.value: .4e} +- {e.sigma:.1e} {e.unit}")
     for name, e in fit.ratios.items():
         lines.append(f"{name + '/psi':12s} {e.value: .6g} +- {e.sigma:.1e} {e.unit}")
     lines += [interval.sentence(name) for name, interval in fit.intervals.items()]

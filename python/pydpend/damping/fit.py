@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pydpend.angles import LinkAngles
-from pydpend.coefficients import JOINT_OF, coefficients, parameters, ratios_of, unit
+from pydpend.coefficients import JOINT_OF, PAPER, coefficients, parameters, ratios_of, unit
 from pydpend.damping import shooting
 from pydpend.damping.compare import compare_terms
 from pydpend.damping.plausible import modes_hz
@@ -19,6 +19,7 @@ from pydpend.damping.result import DampingFit, EnergyCurve, Estimate
 from pydpend.damping.shares import shares
 from pydpend.damping.shooting import Progress
 from pydpend.damping.single import reduced
+from pydpend.damping.ten import fit_ten
 from pydpend.damping.trajectory import Recording, fit_trajectory, plausible_or_raise, prepare
 from pydpend.damping.uncertainty import identifiability
 from pydpend.errors import FitError, fault
@@ -40,6 +41,7 @@ def fit_damping(
     clock: bool = False,
     angle_maps: bool = False,
     pinned: bool = False,
+    ten_coefficients: bool = False,
     predict: bool = False,
     compare: bool = False,
     intervals: str = "covariance",
@@ -53,7 +55,9 @@ def fit_damping(
     psi are free too (trajectory only; the energy method uses the model's). ``free``: further parameters
     (``added_inertia``, ``tilt``, ``offset1``, ``offset2``); ``clock``: the camera clock's scale.
     ``pinned``: the elbow is pinned, and the pendulum a single one; angles of one link are a single pendulum's too,
-    and ``model``'s upper link alone is theirs. ``angle_maps``: learn repeatable angle bias. ``predict``: also
+    and need a one-link ``model``.
+    ``ten_coefficients``: also the paper's ten, which the data do not determine (energy with the paper's laws only).
+    ``angle_maps``: learn repeatable angle bias. ``predict``: also
     fit without each part in turn and predict it. ``compare``: also leave each term out in turn, and say which the data
     ask for (`compare_terms`; trajectory only). ``intervals``: ``"profile"`` gives each coefficient's 95 % interval by
     profile likelihood too (`DampingFit.intervals`; trajectory only), beside the covariance's standard errors. The
@@ -73,7 +77,7 @@ def fit_damping(
     given = [angles] if isinstance(angles, LinkAngles) else list(angles)
     if not given:
         raise FitError(fault("fit", "there is no recording", "Give at least one"))
-    if pinned or any(a.links == 1 for a in given):
+    if pinned or model.links == 1 or any(a.links == 1 for a in given):
         given, model = reduced(given, model, pinned)
         names = tuple(name for name in names if JOINT_OF[name] == "upper")
         if not names or angle_maps:
@@ -84,9 +88,17 @@ def fit_damping(
                     "A single pendulum has mu_v1, mu_q1, rmu1 and tau_c1, and no maps",
                 )
             )
+    if ten_coefficients and not (method == "energy" and names == PAPER):
+        raise FitError(
+            fault(
+                "ten coefficients",
+                "they are of the energy method with the paper's six laws of two links",
+                "Add --method energy --laws paper",
+            )
+        )
     recordings = [prepare(a, model, start_s, stop_s) for a in given]
     if method == "energy":
-        return _energy(recordings, model, names, progress)
+        return _energy(recordings, model, names, ten_coefficients, progress)
     if method != "trajectory":
         raise FitError(fault("fit", f"method {method!r} is not known", "Use trajectory or energy"))
 
@@ -117,16 +129,18 @@ def fit_damping(
 
 
 def _energy(
-    recordings: Sequence[Recording], model: Model, names: Sequence[str], progress: Progress | None
+    recordings: Sequence[Recording], model: Model, names: Sequence[str], ten: bool, progress: Progress | None
 ) -> DampingFit:
     """The paper's fit, to all recordings at once: common coefficients, an E0 each."""
     for r in recordings:
         plausible_or_raise(r, model)
     tracks = [r.track for r in recordings]
-    fit, profiles, smoothed = fit_energy(tracks, [r.span for r in recordings], model, names, progress)
+    fit, few, profiles, smoothed = fit_energy(tracks, [r.span for r in recordings], model, names, progress)
     values = dict(zip(names, fit.values.tolist(), strict=True))
     sigma = np.sqrt(np.diag(fit.covariance))
     works = np.sum([p.unit_works[-1] for p in profiles], axis=0)
+    path = shooting.trace(tracks, smoothed.segments, parameters(model) | values)
+    freed = fit_ten(tracks, path, few, fit, model) if ten else None
     ratios = {
         "lambda": model.lambda_kg_m2,
         "sigma": model.sigma_j,
@@ -173,12 +187,12 @@ def _energy(
             for r, e0, zeros in zip(recordings, fit.e0_j, smoothed.zeros_rad, strict=True)
         ),
         energy=curves,
-        residuals=shooting.residuals_of(
-            tracks, shooting.trace(tracks, smoothed.segments, parameters(model) | values), smoothed.zeros_rad
-        ),
+        residuals=shooting.residuals_of(tracks, path, smoothed.zeros_rad),
+        ten=freed,
         notes=(
             *(f"{r.angles.name}: {r.decay.message}" for r in recordings),
             f"acceleration noise raises |N| by {100 * excess[0]:.1g} and {100 * excess[1]:.1g} % on average; "
             "taken off",
+            *(() if freed is None else (freed.warning,)),
         ),
     )

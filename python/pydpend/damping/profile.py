@@ -117,8 +117,9 @@ def fit_energy(
     model: Model,
     names: Sequence[str],
     progress: Progress | None = None,
-) -> tuple[EnergyFit, list[EnergyProfile], Smoothed]:
-    """Coefficients common to all recordings, their energy profiles at every sample, and the smoothed motion."""
+) -> tuple[EnergyFit, list[EnergyProfile], list[EnergyProfile], Smoothed]:
+    """Coefficients common to all recordings, the profiles they were fitted to, those at every sample, and the smoothed
+    motion."""
     constants = parameters(model)
     segments = shooting.cut(tracks, spans, shooting.PIECE_S)
     zeros = np.zeros((len(tracks), 2))
@@ -173,8 +174,9 @@ def fit_energy(
         if change < CLOSE:
             break
     few, whole, smoothed = along(values, corrected=True)
-    fit = fit_profiles(linear(few))
-    return fit if change < CLOSE else replace(fit, status="iteration_limit"), whole, smoothed
+    few = linear(few)
+    fit = fit_profiles(few)
+    return fit if change < CLOSE else replace(fit, status="iteration_limit"), few, whole, smoothed
 
 
 def _start(profile: EnergyProfile, values: Floats) -> Floats:

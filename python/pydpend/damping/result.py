@@ -126,6 +126,50 @@ class Interval:
 
 
 @dataclass(frozen=True)
+class TenCoefficients:
+    """The paper's ten, Table 6, and how little they mean."""
+
+    values: dict[str, Estimate]
+    """``mu_v1`` ... ``mu_q2`` and ``mu_c1_1`` (first of joint 1) ... ``mu_c3_2``; the standard errors are those of ten
+    free ones."""
+    rmu: dict[str, Estimate]
+    """``rmu1``, ``rmu2``: what the three of each joint dissipate together, as r mu."""
+    weights: dict[str, list[float]]
+    """With which the three mu_c of a joint add up to it."""
+    rank: int
+    """Of the ten, how many combinations the energies determine."""
+    condition: float
+    """Condition number of the ten works, scaled."""
+
+    def to_json(self) -> dict[str, Any]:
+        """As in ``fit.json``."""
+        return {
+            "values": {k: v.to_json() for k, v in self.values.items()},
+            "rmu": {k: v.to_json() for k, v in self.rmu.items()},
+            "weights": self.weights,
+            "rank": self.rank,
+            "condition": self.condition,
+            "warning": self.warning,
+        }
+
+    @property
+    def warning(self) -> str:
+        """What may not be believed, in words."""
+        sums = "; ".join(
+            f"{name} = {' '.join(f'{w:+.3g} mu_c{i}_{name[-1]}' for i, w in enumerate(self.weights[name], 1))} "
+            f"= {e.value:.3g} +- {e.sigma:.1g} m"
+            for name, e in self.rmu.items()
+        )
+        return (
+            f"warning: of the ten coefficients these energies determine {self.rank} combinations (condition number "
+            f"{self.condition:.2g}). The six mu_c are r mu of two joints times known masses and lengths, so only these "
+            f"sums are physical: {sums}. The split of a joint's sum among its three is arbitrary: it may depart from "
+            "the model's ratios by noise or where the model is wrong, and where the energies do not determine it, the "
+            "split nearest to these ratios is given. Do not compare single mu_c."
+        )
+
+
+@dataclass(frozen=True)
 class DampingFit:
     """Damping coefficients with everything needed to judge them."""
 
@@ -171,6 +215,8 @@ class DampingFit:
     `inputs`."""
     maps: dict[str, Any] | None = None
     """Angle-bias maps, if asked for."""
+    ten: TenCoefficients | None = None
+    """The paper's ten coefficients, if asked for."""
     notes: tuple[str, ...] = ()
     """What was left out or should be known."""
 
@@ -206,6 +252,7 @@ class DampingFit:
             "parameters": self.parameters,
             "covariance": {"names": list(self.names), "matrix": self.covariance.tolist()},
             "maps": self.maps,
+            "ten_coefficients": None if self.ten is None else self.ten.to_json(),
             "notes": list(self.notes),
         }
         cleaned: dict[str, Any] = clean(out)

@@ -5,6 +5,7 @@ It is fitted as a double pendulum whose lower link is not there: nothing couples
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -18,20 +19,8 @@ Floats = NDArray[np.float64]
 
 
 def alone(model: Model, name: str | None = None) -> Model:
-    """The upper link of ``model`` alone (inertia 2 psi, weight moment sigma, mass m1). What stands for the lower
-    one swings as the upper does and touches nothing."""
-    return replace(
-        model,
-        lambda_kg_m2=model.psi_kg_m2,
-        kappa_j=model.sigma_j,
-        zeta_kg_m2=0.0,
-        a3_kg_m2=0.0,
-        m2_kg=0.0,
-        lower_inner_m=0.0,
-        lower_outer_m=0.0,
-        covariance=None,
-        name=name or model.name,
-    )
+    """The upper link of ``model`` alone (inertia 2 psi, weight moment sigma, mass m1)."""
+    return Model.one_link(model.psi_kg_m2, model.sigma_j, model.m1_kg, model.g_m_s2, name=name or model.name)
 
 
 def one_body(angles: LinkAngles, elbow_rad: float = 0.0) -> tuple[LinkAngles, float]:
@@ -95,15 +84,39 @@ def pinned(model: Model, elbow_rad: float) -> tuple[Model, float]:
     )
 
 
+def same_links(recordings: Sequence[LinkAngles], model: Model) -> None:
+    """Raises FitError for a recording that has not as many links as the model."""
+    for a in recordings:
+        if a.links == 1 and model.links == 2:
+            raise FitError(
+                fault(
+                    a.name,
+                    f"angles of one link, but the model {model.name!r} has two",
+                    "Give a one-link model (docs/model.md), or --pinned if the elbow of the two is pinned straight",
+                )
+            )
+        if a.links == 2 and model.links == 1:
+            raise FitError(
+                fault(
+                    a.name,
+                    f"angles of two links, but the model {model.name!r} has one",
+                    "Give a two-link model (docs/model.md), or a table of one link",
+                )
+            )
+
+
 def reduced(recordings: list[LinkAngles], model: Model, elbow_pinned: bool) -> tuple[list[LinkAngles], Model]:
     """Recordings of one body, their angles zero where it hangs, and its model.
 
-    Raises FitError when recordings of one and of two links are mixed, or were pinned at different angles.
+    Raises FitError when the model has not as many links as the recordings, or these were pinned at different angles.
     """
+    if model.links == 1 and elbow_pinned:
+        raise FitError(
+            fault("fit", f"model {model.name!r} has one link and no elbow to pin", "Leave --pinned out")
+        )
     if not elbow_pinned:
-        if any(a.links != 1 for a in recordings):
-            raise FitError(fault("fit", "some recordings have one link and some two", "Fit them apart"))
-        return recordings, alone(model)
+        same_links(recordings, model)
+        return recordings, model
     bodies = [one_body(a) for a in recordings]
     elbows = np.array([elbow for _, elbow in bodies])
     if np.ptp(elbows) > np.radians(2.0):

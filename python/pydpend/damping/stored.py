@@ -14,6 +14,7 @@ from pydpend.angles import LinkAngles
 from pydpend.damping.maps import Maps, corrected
 from pydpend.damping.prediction import WINDOWS_S, Prediction, initial_state, predict
 from pydpend.damping.result import DampingFit
+from pydpend.damping.single import same_links
 from pydpend.damping.trajectory import prepare
 from pydpend.errors import FitError, fault
 from pydpend.model import Model
@@ -60,8 +61,10 @@ class StoredFit:
         start_s: float | None = None,
         stop_s: float | None = None,
     ) -> Prediction:
-        """Predicts a recording's free decay. Raises FitError when it has none."""
-        recording = prepare(angles, self.model(), start_s, stop_s)
+        """Predicts a recording's free decay. Raises FitError when it has none, or other links than the fit."""
+        model = self.model()
+        same_links([angles], model)
+        recording = prepare(angles, model, start_s, stop_s)
         return predict(recording, self.parameters, windows_s, self.maps)
 
     def state(self, angles: LinkAngles, start_s: float, length_s: float) -> NDArray[np.float64]:

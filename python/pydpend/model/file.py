@@ -13,7 +13,7 @@ import numpy as np
 from pydpend.components import Balls, Cage, Configuration, Part, Quantity, Races, Rigid
 from pydpend.errors import ModelError, fault
 from pydpend.model.pendulum import CONSTANTS, Model, uniform_bar
-from pydpend.model.reduce import from_parts
+from pydpend.model.reduce import constants_of, from_parts
 
 # Every number may be plain or [value, standard uncertainty]; its key ends in its unit.
 _UNITS = {
@@ -28,6 +28,8 @@ _BEARING = {"name", "at", "inner", "outer", "count", "balls", "d_inner", "d_ball
     "cage_mass",
     "cage_inertia",
 }
+ONE_LINK = ("psi_kg_m2", "sigma_j", "m1_kg")
+"""Constants of a single pendulum; a file with these alone is one's, m1 being optional."""
 _KIND = {
     "mass": "mass",
     "inertia": "inertia",
@@ -147,6 +149,13 @@ def _from_constants(data: Mapping[str, Any], path: Path) -> Model:
             raise ModelError(fault(where, f"unknown key {key!r}", f"Known: {', '.join(sorted(known))}"))
     pairs = {key: _pair(value, where, key) for key, value in table.items()}
     g = _gravity(data, path)
+    if pairs and not pairs.keys() - set(ONE_LINK):
+        for key in ONE_LINK[:2]:
+            if key not in pairs:
+                raise ModelError(fault(where, f"no {key}"))
+        pairs.setdefault("m1_kg", (0.0, 0.0))
+        (psi, sigma, m1), errors = zip(*(pairs[key] for key in ONE_LINK), strict=True)
+        return Model.one_link(psi, sigma, m1, g, np.diag(np.square(errors)), _name(data, path)).checked()
     pairs.setdefault("zeta_kg_m2", (0.0, 0.0))
     for key in ("m1_kg", "m2_kg"):
         pairs.setdefault(key, (0.0, 0.0))
@@ -181,7 +190,9 @@ def _from_parts(data: Mapping[str, Any], path: Path) -> Model:
         quantities[symbol] = Quantity(symbol, symbol, *pair, unit, "", "given", str(path))
         return symbol
 
-    keep("l1", top.need("l1"), "mm")
+    single = not top.values and not any(_on_elbow(t) for t in (*data["part"], *data.get("bearing", [])))
+    # Nothing of a single pendulum is at the elbow, wherever that is.
+    keep("l1", (1.0, 0.0) if single else top.need("l1"), "mm")
     parts: list[Part] = []
     imbalance = {1: 0.0, 2: 0.0}
     for i, table in enumerate(data["part"], 1):
@@ -220,7 +231,13 @@ def _from_parts(data: Mapping[str, Any], path: Path) -> Model:
         parts += _bearing(table, f"{path}, bearing {i}", i, keep)
     pendulum = Configuration(_name(data, path), tuple(parts), quantities, length="l1")
     g = _gravity(data, path)
-    model = from_parts(pendulum, gravity=g * 1e3, name=pendulum.name)
+    if single:
+        constants, covariance, _ = constants_of(pendulum, gravity=g * 1e3)
+        which = [CONSTANTS.index(key) for key in ONE_LINK]
+        psi, sigma, m1 = constants[which].tolist()
+        model = Model.one_link(psi, sigma, m1, g, covariance[np.ix_(which, which)], pendulum.name).checked()
+    else:
+        model = from_parts(pendulum, gravity=g * 1e3, name=pendulum.name)
     if g > 0:
         for body, moment in ((1, model.sigma_j / g * 1e6), (2, model.kappa_j / g * 1e6)):
             if abs(imbalance[body]) > 0.01 * abs(moment):
@@ -232,7 +249,12 @@ def _from_parts(data: Mapping[str, Any], path: Path) -> Model:
                         "Measure place along the line from the joint to the body's centre of mass",
                     )
                 )
-    return _with_extent(model, top)
+    return model if single else _with_extent(model, top)
+
+
+def _on_elbow(table: Mapping[str, Any]) -> bool:
+    """Whether a part or bearing is of the lower link or sits at the elbow: then there are two links."""
+    return table.get("at") == "elbow" or 2 in (table.get("body"), table.get("inner"), table.get("outer"))
 
 
 def _with_extent(model: Model, top: _Numbers) -> Model:

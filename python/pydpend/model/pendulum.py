@@ -107,6 +107,34 @@ class Model:
 
         return read_model(path)
 
+    @classmethod
+    def one_link(
+        cls,
+        psi_kg_m2: float,
+        sigma_j: float,
+        m1_kg: float = 0.0,
+        g_m_s2: float = 9.81,
+        covariance: Array | None = None,
+        name: str = "model",
+    ) -> Model:
+        """A single pendulum: ``2 psi w' = -sigma sin phi - losses``. ``covariance`` is (3, 3), of psi, sigma and m1.
+
+        What stands for the lower link must hang at rest (else it would load joint 1).
+        """
+        spread = np.zeros((len(CONSTANTS), 3))
+        for column, same in enumerate((("psi_kg_m2", "lambda_kg_m2"), ("sigma_j", "kappa_j"), ("m1_kg",))):
+            spread[[CONSTANTS.index(n) for n in same], column] = 1.0
+        cov = None if covariance is None else spread @ covariance @ spread.T
+        return cls(
+            psi_kg_m2, psi_kg_m2, 0.0, 0.0, sigma_j, sigma_j, m1_kg, 0.0, 1.0, g_m_s2,
+            covariance=cov, name=name,
+        )  # fmt: skip
+
+    @property
+    def links(self) -> int:
+        """2, or 1 where no mass hangs on an elbow and nothing couples the links (`one_link`)."""
+        return 1 if self.a3_kg_m2 == 0 and self.m2_kg == 0 else 2
+
     def constants(self) -> Array:
         """The constants in the order of `CONSTANTS`, shape (9,)."""
         return np.array([getattr(self, name) for name in CONSTANTS])

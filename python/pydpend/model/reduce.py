@@ -72,6 +72,27 @@ def from_parts(
     of the uniform bar equal to the lower arm). Raises ModelError for a negative mass or inertia, a quantity
     without a value, or constants that no pendulum can have.
     """
+    constants, cov, q = constants_of(pendulum, gravity=gravity, given=given)
+    if extent is None and pendulum.lower_arm is not None:
+        m, i, r = pendulum.lower_arm
+        extent = uniform_bar(q[m], q[i], q[r])
+    if extent is None:
+        extent = (0.0, 0.0)
+    return Model(
+        **dict(zip(CONSTANTS, constants.tolist(), strict=True)),
+        g_m_s2=gravity * 1e-3,
+        lower_inner_m=extent[0] * 1e-3,
+        lower_outer_m=extent[1] * 1e-3,
+        covariance=cov,
+        name=name or f"derived {pendulum.name}",
+    ).checked()
+
+
+def constants_of(
+    pendulum: Configuration, *, gravity: float = G_MM_S2, given: Mapping[str, float] | None = None
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], dict[str, float]]:
+    """The constants (9,) of a configuration, SI, in the order of `CONSTANTS`, their covariance (9, 9), and the values
+    of its quantities in g and mm. Raises ModelError as `from_parts`."""
     quantities = dict(pendulum.quantities)
     q = values({s: v for s, v in quantities.items() if s not in (given or {})})
     for symbol, value in (given or {}).items():
@@ -92,19 +113,7 @@ def from_parts(
     j = jacobian(pendulum.parts, q, gravity, pendulum.length) * _TO_SI[:, None]
     cov = j @ covariance(quantities, pendulum.identical) @ j.T
     constants = np.array(reduced_constants(pendulum.parts, q, gravity, pendulum.length), float) * _TO_SI
-    if extent is None and pendulum.lower_arm is not None:
-        m, i, r = pendulum.lower_arm
-        extent = uniform_bar(q[m], q[i], q[r])
-    if extent is None:
-        extent = (0.0, 0.0)
-    return Model(
-        **dict(zip(CONSTANTS, constants.tolist(), strict=True)),
-        g_m_s2=gravity * 1e-3,
-        lower_inner_m=extent[0] * 1e-3,
-        lower_outer_m=extent[1] * 1e-3,
-        covariance=cov,
-        name=name or f"derived {pendulum.name}",
-    ).checked()
+    return constants, cov, q
 
 
 def derived(config: str = "A", *, trackers: bool = False, given: Mapping[str, float] | None = None) -> Model:
