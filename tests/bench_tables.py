@@ -60,7 +60,11 @@ def door(folder: Path) -> None:
     out = folder / "door.parquet"
 
     def binary() -> None:
-        subprocess.run([TRACKER, "track", path, "-o", out, "--force", "--quiet"], check=True)
+        # Status 1: a marker is hidden at the end.
+        done = subprocess.run(
+            [TRACKER, "track", path, "-o", out, "--force", "--quiet"], stderr=subprocess.DEVNULL
+        )
+        assert done.returncode in (0, 1)
 
     python, other = in_turn(5, lambda: dp.track(path, output=out, force=True, progress=False), binary)
     print(
@@ -87,7 +91,7 @@ def door(folder: Path) -> None:
 
 def read(folder: Path) -> None:
     path = folder / "ten_million.parquet"
-    nodes = some_nodes(1_666_668)
+    nodes = some_nodes(3_333_336)
     nodes.write(path)
     # What Nodes holds; each node's body comes from the rig.
     columns = [name for name in pq.read_schema(path).names if name != "body"]
