@@ -11,9 +11,8 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.integrate import cumulative_simpson
-from scipy.optimize import lsq_linear, minimize
 
 from pydpend import _tracker
 from pydpend.coefficients import coefficients, parameters
@@ -106,7 +105,7 @@ def energy_profile(
     if sigma_a_rad_s2 is not None:
         excess = _rectified(powers, state, constants, sigma_a_rad_s2)
     chosen = powers[:, [TERMS.index(name) for name in names]]
-    works = cumulative_simpson(chosen, x=states.t_s, axis=0, initial=0.0)
+    works = scipy.integrate.cumulative_simpson(chosen, x=states.t_s, axis=0, initial=0.0)
     energy = model.energy(states.phi_rad, states.w_rad_s)
     return EnergyProfile(states.t_s, energy, works, names, excess)
 
@@ -151,7 +150,7 @@ def fit_profiles(profiles: Sequence[EnergyProfile], *, bounded: bool = True) -> 
     low = np.concatenate([np.zeros(laws), np.full(len(profiles), -np.inf)]) if bounded else -np.inf
     weighted = design / sigma[:, None]
     size = np.linalg.norm(weighted, axis=0)
-    result = lsq_linear(
+    result = scipy.optimize.lsq_linear(
         weighted / size, energy / sigma, bounds=(low, np.inf), method="bvls", tol=1e-14, max_iter=100
     )
     x = result.x / size / scale
@@ -193,7 +192,7 @@ def fit_lbfgsb(profiles: Sequence[EnergyProfile], *, tight: bool = True) -> tupl
     options: Any = {"maxiter": 100_000, "maxfun": 200_000}
     if tight:
         options |= {"ftol": 0.0, "gtol": 1e-15, "maxcor": 30}
-    result = minimize(cost, start, jac=True, method="L-BFGS-B", bounds=bounds, options=options)
+    result = scipy.optimize.minimize(cost, start, jac=True, method="L-BFGS-B", bounds=bounds, options=options)
     residual = design @ result.x - energy
     return (result.x / scale)[:laws], float(residual @ residual)
 

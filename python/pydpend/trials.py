@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import chdtrc
 
 from pydpend.angles import LinkAngles
 from pydpend.damping import DampingFit, fit_damping
@@ -89,7 +89,7 @@ def combine(values: Floats, sigmas: Floats, unit: str) -> Spread:
         float(1 / np.sqrt(np.sum(weight))),
         float(np.sqrt(between)),
         float(np.std(values, ddof=1)) if r > 1 else float("nan"),
-        float(chdtrc(r - 1, q)) if r > 1 else float("nan"),
+        float(scipy.special.chdtrc(r - 1, q)) if r > 1 else float("nan"),
         unit,
     )
 

@@ -14,8 +14,8 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import gammaincinv
 
 from pydpend.angles.markers import BodyMarkers
 from pydpend.angles.scale import (
@@ -91,35 +91,48 @@ def rotate(theta: Floats, vectors: Floats) -> Floats:
 
 def solve(xy: Floats, w: Floats, template: Floats) -> Fitted:
     """Closed-form poses. ``xy`` (T, K, 2), ``w`` (T, K) with 0 for "not there", ``template`` (K, 2)."""
-    count = np.count_nonzero(w > 0, axis=1)
-    total = np.where(count > 0, w.sum(axis=1), 1.0)
-    mean = np.einsum("tk,tkd->td", w, xy) / total[:, None]
-    origin = (w @ template) / total[:, None]
-    dx = xy - mean[:, None, :]
-    dp = template[None, :, :] - origin[:, None, :]
-    cosine = np.einsum("tk,tkd,tkd->t", w, dp, dx)
-    sine = np.einsum("tk,tk->t", w, dp[..., 0] * dx[..., 1] - dp[..., 1] * dx[..., 0])
-    arm2 = (dp**2).sum(axis=2)
-    information = (w * arm2).sum(axis=1)
-    theta = np.arctan2(sine, cosine)
-    turned = rotate(theta[:, None], dp)
-    residual = dx - turned
-    chi2 = (w * (residual**2).sum(axis=2)).sum(axis=1)
+    # Frames last, so that sums over the few markers run along whole rows.
+    x, y, w = (np.ascontiguousarray(part.T) for part in (xy[..., 0], xy[..., 1], w))
+    count = np.count_nonzero(w > 0, axis=0)
+    total = np.where(count > 0, w.sum(axis=0), 1.0)
+    mean = [(w * part).sum(axis=0) / total for part in (x, y)]
+    origin = [part @ w / total for part in template.T]
+    dx, dy = x - mean[0], y - mean[1]
+    px, py = (part[:, None] - o for part, o in zip(template.T, origin, strict=True))
+    theta = np.arctan2((w * (px * dy - py * dx)).sum(axis=0), (w * (px * dx + py * dy)).sum(axis=0))
+    arm2 = px**2 + py**2
+    turning = w * arm2
+    information = turning.sum(axis=0)
+    some = np.where(information > 0, information, 1.0)
+    c, s = np.cos(theta), np.sin(theta)
+    turned_x, turned_y = c * px - s * py, s * px + c * py
+    left_x, left_y = dx - turned_x, dy - turned_y
+    chi2 = (w * (left_x**2 + left_y**2)).sum(axis=0)
     # Along the direction in which the marker moves when the body turns, a residual has lost one more part of
     # its variance to the fit than across it: w/W + w arm^2/I against w/W.
     arm = np.sqrt(np.where(arm2 > 0, arm2, 1.0))
-    radial = (residual * turned).sum(axis=2) / arm
-    tangential = (residual[..., 1] * turned[..., 0] - residual[..., 0] * turned[..., 1]) / arm
-    left_radial = 1.0 - w / total[:, None]
-    left_tangential = left_radial - w * arm2 / np.where(information > 0, information, 1.0)[:, None]
-    d2 = _part(w, radial, left_radial) + _part(w, tangential, left_tangential)
-    share = w * arm2 * (count / np.where(information > 0, information, 1.0))[:, None]
-    scatter = np.stack([(share * w * r**2).sum(axis=1) for r in (tangential, radial)], axis=1)
-    freedom = np.stack([(share * f).sum(axis=1) for f in (left_tangential, left_radial)], axis=1)
+    radial = (left_x * turned_x + left_y * turned_y) / arm
+    tangential = (left_y * turned_x - left_x * turned_y) / arm
+    free_radial = 1.0 - w / total
+    free_tangential = free_radial - turning / some
+    d2 = _part(w, radial, free_radial) + _part(w, tangential, free_tangential)
+    share = turning * (count / some)
+    scatter = np.stack([(share * w * r**2).sum(axis=0) for r in (tangential, radial)], axis=1)
+    freedom = np.stack([(share * f).sum(axis=0) for f in (free_tangential, free_radial)], axis=1)
     good = (count >= 2) & (information > 0)
-    theta = np.where(good, theta, np.nan)
-    centre = np.where(good[:, None], mean - rotate(theta, origin), np.nan)
-    return Fitted(theta, centre, np.where(good, information, np.nan), chi2, count, d2, scatter, freedom)
+    centre = np.stack(
+        [mean[0] - (c * origin[0] - s * origin[1]), mean[1] - (s * origin[0] + c * origin[1])], axis=1
+    )
+    return Fitted(
+        np.where(good, theta, np.nan),
+        np.where(good[:, None], centre, np.nan),
+        np.where(good, information, np.nan),
+        chi2,
+        count,
+        d2.T,
+        scatter,
+        freedom,
+    )
 
 
 def _part(w: Floats, residual: Floats, left: Floats) -> Floats:
@@ -266,7 +279,7 @@ def _robust_scale2(fitted: Fitted) -> float:
     frames = dof > 0
     if np.count_nonzero(frames) < 30:
         return 1.0
-    middle = 2 * gammaincinv(np.arange(1, int(dof.max()) + 1) / 2, 0.5)
+    middle = 2 * scipy.special.gammaincinv(np.arange(1, int(dof.max()) + 1) / 2, 0.5)
     return max(float(np.median(fitted.chi2[frames] / middle[dof[frames] - 1])), 1e-12)
 
 

@@ -9,8 +9,8 @@ hidden marker, whose stated sigma is a bound rather than an estimate, has no say
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import chdtri
 
 from pydpend.angles.table import Floats
 
@@ -66,7 +66,7 @@ def suspects(weight: Floats, hidden: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 def reject_limit(hidden: NDArray[np.bool_]) -> Floats:
     """(T,): squared normalised residual (two degrees of freedom) above which a marker is left out."""
-    return np.where(hidden, chdtri(2, REJECT_HIDDEN_P), chdtri(2, REJECT_P))
+    return np.where(hidden, scipy.special.chdtri(2, REJECT_HIDDEN_P), scipy.special.chdtri(2, REJECT_P))
 
 
 def hidden_factor(scatter: Floats, freedom: Floats, hidden: NDArray[np.bool_], scale2: float) -> float:
@@ -80,6 +80,6 @@ def hidden_factor(scatter: Floats, freedom: Floats, hidden: NDArray[np.bool_], s
 
 def inflation(chi2: Floats, dof: NDArray[np.int64]) -> Floats:
     """Factor on a frame's standard error: 1, or sqrt(chi2 / dof) where chance cannot explain chi2."""
-    limit = np.asarray(chdtri(np.arange(1, max(int(dof.max(initial=1)), 1) + 1), INFLATE_P))
+    limit = np.asarray(scipy.special.chdtri(np.arange(1, max(int(dof.max(initial=1)), 1) + 1), INFLATE_P))
     some = np.maximum(dof, 1)
     return np.where((dof > 0) & (chi2 > limit[some - 1]), np.sqrt(chi2 / some), 1.0)

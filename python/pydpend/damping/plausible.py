@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import isotonic_regression, least_squares
 
 from pydpend.damping.shooting import Track
 from pydpend.errors import FitError, fault
@@ -54,7 +54,7 @@ def wobble(track: Track, span: tuple[float, float], model: Model) -> tuple[float
     if count < 2:
         return 0.0, 0.0
     energy = energy[: count * width].reshape(count, width).mean(axis=1)
-    falling = isotonic_regression(energy, increasing=False).x
+    falling = scipy.optimize.isotonic_regression(energy, increasing=False).x
     largest = max(float(energy.max()), 1e-300)
     rise = energy - np.minimum.accumulate(energy)
     return float(np.sqrt(np.mean((energy - falling) ** 2))) / largest, float(rise.max()) / largest
@@ -146,5 +146,7 @@ def tail_modes_hz(track: Track, span: tuple[float, float], model: Model) -> tupl
         left: Floats = phi - basis @ np.linalg.lstsq(basis, phi, rcond=None)[0]
         return left.ravel()
 
-    found = least_squares(misfit, np.concatenate([start, np.full(start.size, 0.1)]), x_scale=0.1)
+    found = scipy.optimize.least_squares(
+        misfit, np.concatenate([start, np.full(start.size, 0.1)]), x_scale=0.1
+    )
     return tuple(found.x[: start.size].tolist())

@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import lsq_linear
 
 from pydpend.coefficients import JOINT_OF, PAPER, unit
 from pydpend.damping.result import Estimate, TenCoefficients
@@ -113,7 +113,7 @@ def fit_ten(
     rows = np.vstack([design, strict])
     size = np.linalg.norm(rows, axis=0)
     low = np.where(np.arange(rows.shape[1]) < 10, 0.0, -np.inf)
-    found = lsq_linear(
+    found = scipy.optimize.lsq_linear(
         rows / size, np.append(energy, np.zeros(len(strict))), bounds=(low, np.inf), method="bvls", tol=1e-14
     )
     u = found.x / size

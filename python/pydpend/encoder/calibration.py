@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import chdtrc, chdtri, stdtrit
 
 from pydpend.encoder.holds import Hold
 from pydpend.errors import EncoderError, fault
@@ -68,7 +68,7 @@ class Calibration:
     @property
     def interval_95(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """95 % intervals of offset (V) and slope (V per rad)."""
-        factor = float(stdtrit(self.dof, 0.975)) if self.dof >= LEAST_DOF else 1.959964
+        factor = float(scipy.special.stdtrit(self.dof, 0.975)) if self.dof >= LEAST_DOF else 1.959964
         a, b = self.sigma
         return (
             (self.offset_v - factor * a, self.offset_v + factor * a),
@@ -226,7 +226,7 @@ def calibrate(
     chi2 = float((weight * residual**2).sum())
     if dof >= LEAST_DOF:
         covariance = covariance * (chi2 / dof)
-        if chdtrc(dof, chi2) < 1e-3:
+        if scipy.special.chdtrc(dof, chi2) < 1e-3:
             notes.append(
                 f"the holds scatter about the line {np.sqrt(chi2 / dof):.1f} times more than their noise: "
                 "the angles of the holds are not exact, or the encoder is not linear"
@@ -270,7 +270,7 @@ def _too_noisy(hold: Hold, spec_v: float) -> bool:
         return False
     # Readings that hang together count as fewer.
     free = max((hold.std_v / hold.sigma_v) ** 2 - 1, 1.0)
-    return bool((hold.std_v / spec_v) ** 2 > chdtri(free, 1e-3) / free)
+    return bool((hold.std_v / spec_v) ** 2 > scipy.special.chdtri(free, 1e-3) / free)
 
 
 def _unwrapped_holds(phi: Floats, volts: Floats, sigma: Floats, span: float) -> Floats:

@@ -11,8 +11,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from pydpend.angles.table import LinkAngles
 from pydpend.errors import EncoderError, fault
@@ -99,7 +99,7 @@ class Course:
     rests, the slope of the bare spline is the frames' noise, which would pass for information on the clocks.
     """
 
-    spline: CubicSpline
+    spline: scipy.interpolate.CubicSpline
     t: Floats
     step: float
     rate_t: Floats
@@ -117,7 +117,7 @@ class Course:
         if seen.sum() < 10:
             raise EncoderError(fault(angles.name, f"phi{link + 1} is seen in {int(seen.sum())} frames only"))
         t = angles.t_s[seen]
-        spline = CubicSpline(t, angles.phi_rad[seen, link])
+        spline = scipy.interpolate.CubicSpline(t, angles.phi_rad[seen, link])
         step = angles.step_s
         grid = np.arange(t[0], t[-1] + step / 2, step)
         window = min(max(5, 2 * round(RATE_S / step / 2) + 1), grid.size - 1 + grid.size % 2)
