@@ -41,7 +41,7 @@ screenshot: demo
 
 test: build
 	cargo test $(CARGO_FLAGS)
-	$(PY) -m pytest
+	$(PY) -m pytest -n 2 --dist loadgroup
 
 check: build
 	cargo fmt --all -- --check

@@ -17,6 +17,13 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 DEMO = Path(__file__).parent.parent / "fixtures" / "demo"
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """For two workers (`make test`): who looks at the demo's run goes to the one that makes it, others file by file."""
+    for item in items:
+        fixtures = getattr(item, "fixturenames", ())
+        item.add_marker(pytest.mark.xdist_group("demo" if "demo_run" in fixtures else item.path.name))
+
+
 @pytest.fixture(scope="session")
 def demo_options() -> Options:
     """Film, encoder, calibration and the film of the hanging pendulum."""

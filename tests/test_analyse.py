@@ -20,8 +20,10 @@ from pydpend.analyse.options import flag_of
 from pydpend.angles import read_angles
 from pydpend.cli import main, parser
 from pydpend.errors import PydpendError
+from pydpend.model import Damping, Model
 from pydpend.nodes import read_nodes
 from pydpend.report import report_page
+from pydpend.simulate import simulate
 
 DEMO = Path(__file__).parent.parent / "fixtures" / "demo"
 
@@ -169,7 +171,7 @@ def test_a_stage_that_cannot_be_done_says_why_and_the_rest_is_there(tmp_path: Pa
     assert main(["analyse", str(table), "-o", str(tmp_path / "run"), "--quiet"]) == 1
     record = json.loads((tmp_path / "run" / "run.json").read_text("utf-8"))
     assert "fit" in record["facts"]["not_done"]
-    assert any(w.startswith("fit: ") for w in report_page(tmp_path / "run").warnings)
+    assert any(w.startswith("Damping fit: ") for w in report_page(tmp_path / "run").warnings)
 
 
 def test_a_fit_that_did_not_converge_is_said(demo_run: Path, demo_options: Options, tmp_path: Path) -> None:
@@ -196,30 +198,88 @@ def test_config_there_and_back(tmp_path: Path, demo_options: Options) -> None:
 
 
 def test_a_config_says_whatever_a_flag_can(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    given: dict[str, object] = {
+    trajectory: dict[str, object] = {
         "inputs": ("a b.mp4", 'c"d.csv'), "rig": "r.toml", "fps": 1000.5, "encoder": "e.csv", "encoder_column": "V 1",
-        "calibration": "holds", "model": "m.toml", "method": "energy", "laws": "paper", "start_s": 1.5, "stop_s": 9.0,
+        "calibration": "holds", "model": "m.toml", "laws": "mu_v1,tau_c1", "ratios": "fixed", "free": "tilt,offset1",
+        "pinned": True, "intervals": "profile", "comparison": False, "prediction": False, "start_s": 1.5, "stop_s": 9.0,
         "angle_maps": True, "zero": "-178,-182", "link_length_m": 0.17, "estimator": "linkage",
         "columns": "time_s=t", "hanging_deg": -180.0, "overlay": False, "threads": 3,
     }  # fmt: skip
-    assert set(given) == {f.name for f in fields(Options)}
+    energy: dict[str, object] = {"method": "energy", "laws": "paper", "ten_coefficients": True}
     plain = Options()
-    assert all(value != getattr(plain, name) for name, value in given.items())
-    words = ["analyse", "--write-config"]
-    for name, value in given.items():
-        if name == "inputs":
-            words += list(value) if isinstance(value, tuple) else []
-        elif isinstance(value, bool):
-            words.append(flag_of(name) if value else flag_of(name).replace("--", "--no-", 1))
-        else:
-            words.append(f"{flag_of(name)}={value}")
-    assert main(words) == 0
-    (tmp_path / "run.toml").write_text(capsys.readouterr().out, encoding="utf-8")
-    assert read_config(tmp_path / "run.toml") == Options(**given)  # type: ignore[arg-type]
+    for given in (trajectory, energy):
+        assert all(value != getattr(plain, name) for name, value in given.items())
+        words = ["analyse", "--write-config"]
+        for name, value in given.items():
+            if name == "inputs":
+                words += list(value) if isinstance(value, tuple) else []
+            elif isinstance(value, bool):
+                words.append(flag_of(name) if value else flag_of(name).replace("--", "--no-", 1))
+            else:
+                words.append(f"{flag_of(name)}={value}")
+        assert main(words) == 0
+        (tmp_path / "run.toml").write_text(capsys.readouterr().out, encoding="utf-8")
+        assert read_config(tmp_path / "run.toml") == Options(**given)  # type: ignore[arg-type]
+    assert set(trajectory) | set(energy) == {f.name for f in fields(Options)}
     # Every other flag says how to run, not what.
     flags = set(vars(parser().parse_args(["analyse"]))) - {"command", "run"}
     how = {"output", "config", "write_config", "dry_run", "json", "quiet"}
-    assert flags == set(given) | how
+    assert flags == set(trajectory) | set(energy) | how
+
+
+def test_whatever_a_fit_can_be_told_an_analysis_can() -> None:
+    fit, analysis = (
+        set(vars(parser().parse_args(words))) for words in (["fit", "a", "-o", "b"], ["analyse"])
+    )
+    # Under another name, or of how to run; figures are always drawn.
+    other = {"angles", "start", "stop", "hanging_rad", "no_prediction", "no_comparison", "no_figures"}
+    assert fit - analysis == other
+    assert {"inputs", "start_s", "stop_s", "hanging_deg", "prediction", "comparison"} <= analysis
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"ratios": "loose"}, "--ratios: 'loose' is not known. Give free or fixed"),
+        ({"free": "tilt,wind"}, "--free: 'wind' is not known"),
+        ({"ten_coefficients": True}, "Add --method energy --laws paper"),
+        ({"method": "energy", "intervals": "profile"}, "--intervals: is of the trajectory fit"),
+        ({"method": "energy", "angle_maps": True}, "--angle-maps: is of the trajectory fit"),
+    ],
+)
+def test_options_that_make_no_sense_name_the_flag(wrong: dict[str, object], words: str) -> None:
+    with pytest.raises(PydpendError) as caught:
+        Options(**wrong)  # type: ignore[arg-type]
+    assert words in str(caught.value)
+
+
+def test_a_single_pendulum(tmp_path: Path) -> None:
+    """Of one link, with its model: its own laws, and nothing on the page of a lower one."""
+    bar = tmp_path / "bar.toml"
+    bar.write_text("[constants]\npsi_kg_m2 = 4.38e-3\nsigma_j = 0.47088\nm1_kg = 0.4\n", encoding="utf-8")
+    truth = Damping(mu_v1=5e-5, mu_q1=4e-5)
+    made = simulate(Model.from_toml(bar), truth, [np.pi - 0.06, 0.0, 0.0, 0.0], np.arange(6001) / 500)
+    phi = made.phi_rad[:, 0] + np.random.default_rng(3).normal(0.0, np.radians(0.02), made.t_s.size)
+    for name, rows in (("one", slice(0, 3500)), ("two", slice(2500, 6001))):
+        table = np.column_stack([made.t_s[rows], phi[rows]])
+        np.savetxt(tmp_path / f"{name}.csv", table, delimiter=",", header="time_s,phi1_rad", comments="")
+    inputs = tuple(str(tmp_path / f"{name}.csv") for name in ("one", "two"))
+    outcome = analyse(
+        Options(inputs=inputs, model=str(bar), laws="mu_v1,mu_q1", comparison=False, start_s=0.0),
+        tmp_path / "run",
+    )
+    assert outcome.status == "done", outcome.stages
+    fit = json.loads((tmp_path / "run" / "fit" / "fit.json").read_text("utf-8"))
+    for name, c in fit["coefficients"].items():
+        assert abs(c["value"] - getattr(truth, name)) < 4 * c["sigma"], name
+    html = (tmp_path / "run" / "report.html").read_text("utf-8")
+    assert "phi1" in html
+    assert "phi2" not in html
+    assert "lower" not in html.split("<script")[0]
+    # Without its masses there is a page all the same, and it says what is missing.
+    alone = analyse(Options(inputs=inputs[:1]), tmp_path / "alone")
+    assert alone.status == "partly"
+    assert any("Give a one-link model" in w for w in report_page(tmp_path / "alone").warnings)
 
 
 def test_angles_of_anyone_are_enough_and_json_and_dry_run_tell_what_is_done(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shutil
 import statistics
 import sys
@@ -40,13 +41,38 @@ def zoom_and_move(page: Page) -> list[float]:
     return gaps
 
 
+def drag(page: Page) -> list[float]:
+    """Zooms to a quarter and drags the plot to and fro by the mouse, all plots of its group with it; gaps in ms."""
+    over = page.locator(".chart .u-over").first
+    box = over.bounding_box()
+    assert box is not None
+    x, y = box["x"] + 0.5 * box["width"], box["y"] + box["height"] / 2
+    page.mouse.move(x, y)
+    page.keyboard.down("Control")
+    for _ in range(6):
+        page.mouse.wheel(0, -100)
+        page.wait_for_timeout(16)
+    page.keyboard.up("Control")
+    page.wait_for_timeout(300)
+    page.evaluate("window.gaps.length = 0")
+    page.keyboard.down("Shift")
+    page.mouse.down()
+    for k in range(120):
+        page.mouse.move(x + 0.4 * box["width"] * math.sin(k / 19), y)
+        page.wait_for_timeout(16)
+    page.mouse.up()
+    page.keyboard.up("Shift")
+    gaps: list[float] = page.evaluate("window.gaps")
+    return gaps
+
+
 def main(report: Path, runs: int = 5) -> int:
-    """Opens it ``runs`` times in fresh pages, scrolls to the end each time, then zooms and moves by the wheel."""
+    """Opens it ``runs`` times in fresh pages, each time scrolls to the end, zooms and moves by wheel and dragging."""
     chromium = shutil.which("chromium")
     if chromium is None:
         print("chromium is not installed", file=sys.stderr)
         return 1
-    opening, gaps, pans = [], [], []
+    opening, gaps, pans, drags = [], [], [], []
     with sync_playwright() as driver:
         browser = driver.chromium.launch(executable_path=chromium, args=["--no-sandbox", "--disable-gpu"])
         for _ in range(runs):
@@ -66,10 +92,15 @@ def main(report: Path, runs: int = 5) -> int:
                 page.wait_for_timeout(16)
             gaps += page.evaluate("window.gaps")
             pans += zoom_and_move(page)
+            drags += drag(page)
             page.close()
         browser.close()
     print(f"opens in {statistics.median(opening):.2f} s (median of {runs}, most {max(opening):.2f} s)")
-    for what, times in (("scrolling", gaps), ("zooming and moving by the wheel", pans)):
+    for what, times in (
+        ("scrolling", gaps),
+        ("zooming and moving by the wheel", pans),
+        ("moving by dragging", drags),
+    ):
         times.sort()
         print(
             f"{what}: a picture every {statistics.median(times):.1f} ms, 99 % within "

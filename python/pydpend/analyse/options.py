@@ -8,8 +8,19 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from pydpend.coefficients import coefficients
+from pydpend.coefficients import PAPER, coefficients
 from pydpend.errors import FitError, PydpendError, fault
+
+CHOICES = {
+    "method": ("trajectory", "energy"),
+    "ratios": ("free", "fixed"),
+    "intervals": ("covariance", "profile"),
+    "estimator": ("rigid", "linkage", "pairwise"),
+}
+"""Options that are one of a few words."""
+
+FREE = ("added_inertia", "tilt", "offset1", "offset2")
+"""What ``free`` may name."""
 
 
 class OptionsError(PydpendError):
@@ -38,6 +49,20 @@ class Options:
     """``trajectory`` or ``energy``."""
     laws: str = "full"
     """``full``, ``paper`` or a list of coefficients with commas."""
+    ratios: str = "free"
+    """``free``: the inertial ratios are fitted too; ``fixed``: the model's are believed (trajectory only)."""
+    free: str = ""
+    """Further parameters to fit, with commas: added_inertia, tilt, offset1, offset2."""
+    pinned: bool = False
+    """The elbow is pinned: a single pendulum. A recording of one link needs a one-link model instead."""
+    ten_coefficients: bool = False
+    """Also the paper's ten, with a warning; needs ``--method energy --laws paper``."""
+    intervals: str = "covariance"
+    """``covariance``: standard errors; ``profile``: 95 % intervals by profile likelihood too (takes much longer)."""
+    comparison: bool = True
+    """Leave each term out in turn, to say which the data ask for (trajectory only)."""
+    prediction: bool = True
+    """Predict each recording from the others, or the last part of a single one from the rest (trajectory only)."""
     start_s: float | None = None
     """Start of the free decay; found if not given."""
     stop_s: float | None = None
@@ -61,18 +86,34 @@ class Options:
     """Threads for tracking; all cores if not given. Changes no result."""
 
     def __post_init__(self) -> None:
-        if self.method not in ("trajectory", "energy"):
+        for field, known in CHOICES.items():
+            value = getattr(self, field)
+            if value not in known:
+                words = f"{', '.join(known[:-1])} or {known[-1]}"
+                raise OptionsError(fault(flag_of(field), f"{value!r} is not known", f"Give {words}"))
+        unknown = [name for name in self.free.split(",") if name and name not in FREE]
+        if unknown:
             raise OptionsError(
-                fault("--method", f"{self.method!r} is not known", "Give trajectory or energy")
-            )
-        if self.estimator not in ("rigid", "linkage", "pairwise"):
-            raise OptionsError(
-                fault("--estimator", f"{self.estimator!r} is not known", "Give rigid, linkage or pairwise")
+                fault("--free", f"{unknown[0]!r} is not known", f"Known are {', '.join(FREE)}")
             )
         try:
-            coefficients(self.laws)
+            laws = coefficients(self.laws)
         except FitError as error:
             raise OptionsError(f"--{error}") from None
+        if self.ten_coefficients and not (self.method == "energy" and laws == PAPER):
+            raise OptionsError(
+                fault(
+                    "--ten-coefficients",
+                    "they are of the energy method with the paper's laws",
+                    "Add --method energy --laws paper",
+                )
+            )
+        if self.method == "energy":
+            for field, plain in (("intervals", "covariance"), ("free", ""), ("angle_maps", False)):
+                if getattr(self, field) != plain:
+                    raise OptionsError(
+                        fault(flag_of(field), "is of the trajectory fit", "Leave it or --method energy out")
+                    )
         if self.columns is not None and any(
             not (ours.strip() and theirs.strip())
             for ours, _, theirs in (word.partition("=") for word in self.columns.split(","))

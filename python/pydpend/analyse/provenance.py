@@ -74,6 +74,7 @@ ABOUT = {
     "overlay.mp4": "the film with nodes, names and bodies drawn in",
     "overlay.json": "times of its frames in the recording",
     "fit.json": "damping coefficients, uncertainties, shares, identifiability",
+    "model.json": "constants of the model that the fit began from, with their standard uncertainties, SI",
     "coefficients.csv": "the coefficients as a table",
     "shares.png": "where the energy goes",
     "trials.json": "the coefficients of each recording and their mean",
@@ -91,10 +92,8 @@ def about(name: str) -> str:
         return "energy of the motion and what each law takes out" + (
             " (Fig. 19)" if last.endswith(".png") else ", J"
         )
-    if last.startswith("residuals"):
-        return "measured minus fitted angle of each link, and its standard deviation, rad"
     if last.startswith("residuals") and last.endswith(".csv"):
-        return "measured minus fitted angles and the standard deviation of each, rad"
+        return "measured minus fitted angle of each link, and its standard deviation, rad"
     return ABOUT.get(last, "")
 
 

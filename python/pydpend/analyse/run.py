@@ -95,29 +95,32 @@ def plan(options: Options, folder: Path, digests: Digests | None = None) -> list
     for r in found:
         _plan_recording(r, options, folder / r.name, known, add)
     ready = tuple(f"{r.name}/angles" for r in found)
-    decay = [
-        options.model,
-        known.option(options.model),
-        options.laws,
-        options.start_s,
-        options.stop_s,
-        options.angle_maps,
+    fits = [
+        known.option(options.model) if f == "model" else getattr(options, f)
+        for f in ("model", "method", "laws", "ratios", "free", "pinned", "angle_maps", "start_s", "stop_s")
+    ]
+    several = len(found) > 1
+    more = [
+        options.ten_coefficients,
+        options.intervals,
+        options.comparison,
+        options.prediction and not several,
     ]
     add(
         "fit",
         "Damping fit",
         ready,
         "fit",
-        [*decay, options.method],
+        [*fits, *more],
         lambda into, tell, resume: stages.fit(found, options, folder, into, tell),
     )
-    if len(found) > 1:
+    if several and options.prediction:
         add(
             "prediction",
             "Prediction of each recording from the others",
             ready,
             "",
-            decay,
+            fits,
             lambda into, tell, resume: stages.prediction(found, options, folder, into, tell),
         )
     for r in found:
@@ -208,6 +211,7 @@ def analyse(options: Options, folder: str | Path, progress: Progress | None = No
         "recordings": [r.facts() for r in recordings(options, digests)],
         "inputs": provenance.inputs(options, digests),
         "command": provenance.command(options, path),
+        "titles": {s.name: s.title for s in todo},
         "digests": digests.known,
     }
     run.save()
@@ -218,7 +222,7 @@ def analyse(options: Options, folder: str | Path, progress: Progress | None = No
         failed = [n for n in stage.needs if said[n].startswith(LEFT_OUT)]
         if failed and len(failed) == len(stage.needs):
             how = "does not apply" if all(said[n].startswith(LEFT_OUT[1]) for n in failed) else "not done"
-            said[stage.name] = f"{how}: it needs {' and '.join(failed)}"
+            said[stage.name] = f"{how}: it needs {' and '.join(run.facts['titles'][n] for n in failed)}"
             run.stages.pop(stage.name, None)
         elif run.holds(stage.name, stage.key):
             said[stage.name] = "kept"

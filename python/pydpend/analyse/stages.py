@@ -182,12 +182,17 @@ def _angles(folder: Path, found: tuple[Recording, ...]) -> list[LinkAngles]:
 
 
 def _model(options: Options) -> Model:
+    import warnings
+
     from pydpend.model import Model, derived, published
 
     if options.model == "derived":
         return derived("A")
     if options.model == "published":
-        return published()
+        with warnings.catch_warnings():
+            # What is wrong with published constants is said by the fit itself, with numbers.
+            warnings.simplefilter("ignore")
+            return published()
     return Model.from_toml(options.model)
 
 
@@ -218,40 +223,57 @@ def encoder(r: Recording, options: Options, here: Path, into: Path) -> str:
 
 def fit(found: tuple[Recording, ...], options: Options, folder: Path, into: Path, tell: Tell) -> str:
     """Damping of all recordings together, and of each if there are several."""
-    import warnings
-
     from pydpend.damping import fit_damping
     from pydpend.damping.stored import write_fit
+    from pydpend.model import CONSTANTS
     from pydpend.plots.damping import save_figures
     from pydpend.trials import summary
 
-    recordings = _angles(folder, found)
-    if any(a.links < 2 for a in recordings):
-        raise DoesNotApply("the fit is of a double pendulum, and a recording has one link")
-    with warnings.catch_warnings():
-        # What is wrong with published constants is said by the fit itself, with numbers.
-        warnings.simplefilter("ignore")
-        model = _model(options)
-    settings: dict[str, Any] = {
-        "method": options.method,
-        "laws": options.laws,
-        "start_s": options.start_s,
-        "stop_s": options.stop_s,
-        "angle_maps": options.angle_maps,
-    }
-    compare = options.method == "trajectory"
-    fitted = fit_damping(recordings, model, progress=_steps(tell), compare=compare, **settings)
+    recordings, model, settings = _angles(folder, found), _model(options), _settings(options)
+    trajectory = options.method == "trajectory"
+    fitted = fit_damping(
+        recordings,
+        model,
+        progress=_steps(tell),
+        compare=trajectory and options.comparison,
+        # Several recordings are predicted in a stage of their own.
+        predict=trajectory and options.prediction and len(recordings) == 1,
+        intervals=options.intervals,
+        pinned=options.pinned,
+        ten_coefficients=options.ten_coefficients,
+        **settings,
+    )
     trials = None
     if len(recordings) > 1:
         each = []
         for k, one in enumerate(recordings):
             tell(f"recording {k + 1} alone")
-            each.append(fit_damping(one, model, **settings))
+            each.append(fit_damping(one, model, pinned=options.pinned, **settings))
         trials = summary(each, fitted)
         _write_json(into / "trials.json", trials.to_json())
     write_fit(fitted, into)
+    if not options.pinned:
+        sigmas = model.sigmas()
+        constants = {
+            n: {"value": v, "sigma": sigmas[n]}
+            for n, v in zip(CONSTANTS, model.constants().tolist(), strict=True)
+        }
+        _write_json(into / "model.json", {"name": model.name, "constants": constants})
     save_figures(fitted, trials, into)
     return fitted.message
+
+
+def _settings(options: Options) -> dict[str, Any]:
+    """What every fit of a run has in common."""
+    return {
+        "method": options.method,
+        "laws": options.laws,
+        "start_s": options.start_s,
+        "stop_s": options.stop_s,
+        "ratios": options.ratios == "free",
+        "free": [name for name in options.free.split(",") if name],
+        "angle_maps": options.angle_maps,
+    }
 
 
 def converged(folder: Path) -> bool:
@@ -269,25 +291,18 @@ def prediction(found: tuple[Recording, ...], options: Options, folder: Path, int
     import numpy as np
 
     from pydpend.damping import fit_damping
+    from pydpend.damping.single import reduced
     from pydpend.damping.stored import StoredFit
     from pydpend.plots.damping import windows_columns
 
-    recordings = _angles(folder, found)
-    if any(a.links < 2 for a in recordings):
-        raise DoesNotApply("the fit is of a double pendulum, and a recording has one link")
-    model = _model(options)
+    recordings, model = _angles(folder, found), _model(options)
+    if options.pinned:
+        recordings, model = reduced(recordings, model, True)
     out = {}
     for i, one in enumerate(recordings):
         tell(f"{i + 1} of {len(recordings)}")
         others = recordings[:i] + recordings[i + 1 :]
-        fitted = fit_damping(
-            others,
-            model,
-            laws=options.laws,
-            start_s=options.start_s,
-            stop_s=options.stop_s,
-            angle_maps=options.angle_maps,
-        )
+        fitted = fit_damping(others, model, **_settings(options))
         stored = StoredFit.of(fitted)
         predicted = stored.predict(one, start_s=options.start_s, stop_s=options.stop_s)
         out[one.name] = predicted.to_json()

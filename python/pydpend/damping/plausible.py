@@ -88,13 +88,14 @@ def check_model(track: Track, span: tuple[float, float], model: Model, name: str
     Raises FitError in plain words.
     """
     low, high = modes_hz(model)
+    swings = " and ".join(f"{f:.3g}" for f in modes_hz(model)[: model.links])
     seen = typical_hz(track, span)
     if np.isfinite(seen) and (low > SCALE * seen or high < seen / SCALE):
         factor = (low / seen) ** 2 if low > seen else (high / seen) ** 2
         raise FitError(
             fault(
                 name,
-                f"the model {model.name!r} swings at {low:.3g} and {high:.3g} Hz, the recording at "
+                f"the model {model.name!r} swings at {swings} Hz, the recording at "
                 f"about {seen:.2g} Hz: "
                 f"sigma/psi is off by about {factor:.2g}",
                 "Check the units of the model (kg, m, s) and of the times",
@@ -111,9 +112,9 @@ def check_model(track: Track, span: tuple[float, float], model: Model, name: str
                 f"motion goes up and down by {100 * rms:.0f} % RMS of its largest value (the largest rise is "
                 f"{100 * rise:.0f} %) although nothing drives it"
                 f"{words} "
-                f"(its small oscillations would be at {low:.3g} and {high:.3g} Hz)",
-                "Use constants derived from the parts (--model derived) or your own; no damping fitted with "
-                "these would mean anything",
+                f"(its small oscillations would be at {swings} Hz)",
+                f"Use constants derived from the parts{' (--model derived)' if model.links == 2 else ''} or your own; "
+                "no damping fitted with these would mean anything",
             )
         )
 

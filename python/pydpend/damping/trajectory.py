@@ -332,7 +332,7 @@ def _notes(recordings: Sequence[Recording], solution: Solution, relative: Floats
     out = []
     for r in recordings:
         out.append(f"{r.angles.name}: {r.decay.message}")
-        for j, source in enumerate(r.noise.source):
+        for j, source in enumerate(r.noise.source[: r.angles.links]):
             if source == "measured":
                 level = np.degrees(r.noise.measured_rad[j])
                 out.append(

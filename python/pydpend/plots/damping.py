@@ -123,6 +123,7 @@ def coefficients_figure(coefficients: Mapping[str, Mapping[str, Any]]) -> Figure
             axes.set_xticks(list(index))
             axes.set_xlim(0.5, len(c["values"]) + 0.5)
             axes.tick_params(labelsize=7)
+            axes.ticklabel_format(axis="y", useOffset=False)
     return figure
 
 

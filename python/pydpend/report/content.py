@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import json
+import re
+import shlex
 from pathlib import Path
 from typing import Any
 
 from pydpend.report import damping, recording
 from pydpend.report.page import Block, Code, Heading, Listing, Page, Section, Table, Text
+from pydpend.report.words import sentence
 
 
 def read_json(path: Path) -> dict[str, Any] | None:
@@ -28,24 +31,30 @@ def report_page(folder: str | Path) -> Page:
     fit = read_json(path / "fit" / "fit.json") if "fit" in stages else None
     prediction = read_json(path / "prediction.json") if "prediction" in stages else None
 
-    warnings: list[str] = [f"{name}: {why}" for name, why in facts.get("not_done", {}).items()]
+    titles: dict[str, str] = facts.get("titles", {})
+    warnings = [f"{titles.get(name, name)}: {why}" for name, why in facts.get("not_done", {}).items()]
     answer: list[Block] = []
+    if fit is not None:
+        model = read_json(path / "fit" / "model.json")
+        answer = [Heading("Damping"), *damping.answer(fit, prediction, model)]
+    read: list[recording.Part] = []
     parts: list[Section] = []
     for i, r in enumerate(found):
         part = recording.read(path, r, stages)
+        read.append(part)
         warnings += part.warnings
-        answer += [Heading(r["label"]), part.answer] if part.answer is not None else []
         parts += part.sections(f"r{i}", r["label"] if len(found) > 1 else "")
+    if any(part.answer for part in read):
+        answer += [Heading("Recordings" if len(read) > 1 else "Recording"), beside_each_other(read)]
     if fit is not None:
         warnings += damping.warnings(fit)
-        answer += [Heading("Damping"), *damping.answer(fit, prediction)]
         parts += damping.sections(path, fit, prediction)
     if not answer:
         answer = [Text("No stage gave a result; the warnings say why.")]
     apart = facts.get("does_not_apply", {})
     if apart:
         answer.append(Heading("What does not apply"))
-        answer.append(Listing(tuple(f"{name}: {why}" for name, why in apart.items())))
+        answer.append(Listing(tuple(f"{titles.get(name, name)}: {why}" for name, why in apart.items())))
     names = ", ".join(r["label"] for r in found) or path.name
     return Page(
         title=f"Analysis of {names}",
@@ -59,16 +68,38 @@ def report_page(folder: str | Path) -> Page:
     )
 
 
+def beside_each_other(parts: list[recording.Part]) -> Table:
+    """What was found of each recording, a column each."""
+    columns = [dict(part.answer) for part in parts]
+    properties = dict.fromkeys(name for column in columns for name in column)
+    rows = tuple((name, *(column.get(name, "–") for column in columns)) for name in properties)
+    header = ("property", *(part.label for part in parts))
+    return Table(header, rows, numbers=frozenset(range(1, len(header))))
+
+
+def in_lines(command: str) -> str:
+    """A command line with each option on a line of its own, still to be copied as it is."""
+    lines: list[list[str]] = [[]]
+    for word in shlex.split(command):
+        if word.startswith("-") and not re.match(r"-\.?\d", word):
+            lines.append([])
+        lines[-1].append(word)
+    return " \\\n    ".join(shlex.join(line) for line in lines)
+
+
 def _reproduce(facts: dict[str, Any], stages: dict[str, dict[str, Any]]) -> list[Block]:
     rows = tuple((i["given_as"], i["path"], i["sha256"]) for i in facts.get("inputs", ()))
     return [
         Text("This page was made by"),
-        Code(facts.get("command", "")),
+        Code(in_lines(facts.get("command", ""))),
         Table(("given as", "file", "SHA-256"), rows),
         Table(("program", "version"), tuple(facts.get("versions", {}).items())),
         Table(
             ("stage", "what came of it", "took (s)"),
-            tuple((name, done["message"], f"{done['seconds']:.1f}") for name, done in stages.items()),
+            tuple(
+                (facts.get("titles", {}).get(name, name), sentence(done["message"]), f"{done['seconds']:.1f}")
+                for name, done in stages.items()
+            ),
             numbers=frozenset({2}),
         ),
         Text(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -26,44 +27,61 @@ from pydpend.report.page import (
     Text,
     band,
 )
-from pydpend.report.words import digits, sentence, with_sigma, with_squares
+from pydpend.report.words import between, digits, listed, quantity, sentence, signed, with_sigma, with_squares
 
 ZOOM_S = 2.0
 """The first seconds of the energy stand alone too (Fig. 19)."""
 
 MEANING = {
-    "mu_v1": "viscous, upper joint",
-    "mu_v2": "viscous, lower joint",
+    "mu_v1": "viscous friction, upper joint",
+    "mu_v2": "viscous friction, lower joint",
     "mu_q1": "air drag, upper link",
     "mu_q2": "air drag, lower link",
-    "rmu1": "friction with the load, upper joint",
-    "rmu2": "friction with the load, lower joint",
+    "rmu1": "dry friction with the load, upper joint",
+    "rmu2": "dry friction with the load, lower joint",
     "tau_c1": "constant dry torque, upper joint",
     "tau_c2": "constant dry torque, lower joint",
-    "strip_drag": "air drag of the lower link in its own wind",
+    "strip_drag": "air drag, lower link in its own wind",
     "lambda": "inertia of the lower link",
     "sigma": "gravity on the upper link",
     "kappa": "gravity on the lower link",
     "a3": "coupling of the links",
 }
 
+SHARE = {
+    "viscous": "viscous friction",
+    "drag": "air drag",
+    "dry": "dry friction",
+    "upper": "upper joint and link",
+    "lower": "lower joint and link",
+}
 
-SHARE = {"law": "share of the energy lost, by law", "joint": "share of the energy lost, by joint"}
 
-SCALE = (
-    "± is one standard uncertainty of the fit. All coefficients are in proportion to psi, half the moment of inertia "
-    "about the upper joint, which is the model's; its relative uncertainty is common to them and comes on top."
-)
+TOLD_WINDOW_S = "1"
+"""The window length of which the answer tells the prediction error, as the tables' keys have it."""
+
+
+def links_of(fit: dict[str, Any]) -> int:
+    """1 for a fit of a single pendulum."""
+    return len(fit["modes_hz"])
+
+
+def meaning(name: str, links: int) -> str:
+    """What a coefficient or ratio is, in words."""
+    words = MEANING.get(name, "")
+    return words if links > 1 else words.replace("upper ", "")
 
 
 def warnings(fit: dict[str, Any]) -> list[str]:
     """What a reader must know before the numbers."""
-    message = _message(fit)
     out = []
     if fit["status"] != "converged":
-        out.append(f"The damping fit did not converge, its numbers are where it stopped: {message}")
-    elif "beyond the noise" in message:
-        out.append(f"Damping: {message}")
+        out.append(f"The damping fit did not converge, its numbers are where it stopped: {_message(fit)}")
+    elif "beyond the noise" in fit["message"]:
+        out.append(
+            "The model or the angles have errors beyond the noise, and the standard errors of the damping carry them: "
+            f"{_left(fit)}"
+        )
     # The sentence on the whole recording; those on single coefficients stand with them.
     out += [s for s in fit["identifiability"]["sentences"] if "too short" in s]
     return out
@@ -73,34 +91,100 @@ def _message(fit: dict[str, Any]) -> str:
     return str(fit["message"]).replace(fit["status"], fit["status"].replace("_", " "), 1)
 
 
-def answer(fit: dict[str, Any], prediction: dict[str, Any] | None) -> list[Block]:
-    """Coefficients, shares and prediction errors with their uncertainties."""
+def _left(fit: dict[str, Any]) -> str:
+    """How much larger than their noise the residuals are, from the mean squares with and without slack."""
+    strict, slack = (math.sqrt(fit[k]) for k in ("chi2", "chi2_slack"))
+    return (
+        f"the residuals of the angles are {digits(slack)} times their noise where the motion may jump a little from "
+        f"each piece of it to the next, and {digits(strict)} times where it may not."
+    )
+
+
+def answer(
+    fit: dict[str, Any], prediction: dict[str, Any] | None, model: dict[str, Any] | None
+) -> list[Block]:
+    """Where the energy goes, how well the model does, and the coefficients with their uncertainties."""
+    intervals: dict[str, Any] = fit.get("intervals", {})
+    links = links_of(fit)
+    header = ["coefficient", "symbol", "value"]
+    if intervals:
+        header.append("95 % interval")
     rows = []
-
-    def add(name: str, value: float | None, sigma: float | None, unit: str, meaning: str) -> None:
-        rows.append((name, f"{with_sigma(value, sigma)} {with_squares(unit)}".strip(), meaning))
-
     for name, c in fit["coefficients"].items():
-        add(name, c["value"], c["sigma"], c["unit"], MEANING.get(name, ""))
-    for name, value in fit["ratios"].items():
-        sigma = fit.get("ratio_sigmas", {}).get(name)
-        add(f"{name}/psi", value, sigma, _ratio_unit(name), MEANING.get(name, ""))
-    for group in SHARE:
-        for name, c in fit["shares"].get(group, {}).items():
-            value, sigma = (None if c[k] is None else 100 * c[k] for k in ("value", "sigma"))
-            add(name, value, sigma, "%", SHARE[group])
+        unit = with_squares(c["unit"])
+        row = [meaning(name, links), name, quantity(c["value"], c["sigma"], unit)]
+        if intervals:
+            found = intervals.get(name)
+            row.append("–" if found is None else f"{between(found['low'], found['high'])} {unit}".strip())
+        rows.append(tuple(row))
+    numbers = frozenset({2, 3}) if intervals else frozenset({2})
+    blocks: list[Block] = [Text(s) for s in (_energy_sentence(fit), *_trust(fit, prediction)) if s]
+    blocks.append(Table(tuple(header), tuple(rows), numbers=numbers))
+    by = "± is one standard uncertainty of the fit." + (
+        " The 95 % intervals are by profile likelihood, everything else fitted again." if intervals else ""
+    )
+    blocks.append(Text(f"{by} {_scale(model, links)}", quiet=True))
+    return blocks
+
+
+def _energy_sentence(fit: dict[str, Any]) -> str:
+    """Of the energy lost, what went into which law and where; empty where nothing was lost."""
+
+    def parts(group: str) -> list[tuple[str, str]]:
+        found = fit["shares"].get(group, {})
+        if any(c["value"] is None for c in found.values()):
+            return []
+        return [(n, f"{with_sigma(100 * c['value'], 100 * (c['sigma'] or 0))} %") for n, c in found.items()]
+
+    laws, joints = parts("law"), parts("joint")
+    if not laws:
+        return ""
+    said = "Of the energy lost, " + listed([f"{much} went into {SHARE[n]}" for n, much in laws])
+    if len(joints) > 1:
+        said += "; " + listed([f"{much} was lost at the {SHARE[n]}" for n, much in joints])
+    return said + "."
+
+
+def _trust(fit: dict[str, Any], prediction: dict[str, Any] | None) -> list[str]:
+    """How well the model describes the angles, and how well it predicts angles that it has not seen."""
+    out = []
+    if "within their noise" in fit["message"]:
+        out.append(
+            f"The equations of motion describe the angles to within their noise (chi-square {fit['chi2']:.3f}; 1 is "
+            "what noise alone would give)."
+        )
     for name, p in (prediction or {}).items():
-        for window, w in p.get("in_window", {}).items():
-            rms = ", ".join(digits(v) for v in w["rms_deg"])
-            rows.append((f"{name} predicted", f"{rms} deg", f"RMS of phi1, phi2 in windows of {window} s"))
-    return [
-        Table(("quantity", "value", "meaning"), tuple(rows), numbers=frozenset({1})),
-        Text(SCALE, quiet=True),
-    ]
+        told = p.get("in_window", {}).get(TOLD_WINDOW_S)
+        if told is not None and told["n"]:
+            out.append(f"{name} predicted from the others, {_errors(told['rms_deg'])}.")
+    told = fit.get("prediction", {}).get(TOLD_WINDOW_S)
+    if told is not None and len(fit["inputs"]) == 1:
+        rms = [told[f"phi{j}_deg"] for j in range(1, links_of(fit) + 1)]
+        out.append(f"The last part predicted from a fit to the rest, {_errors(rms)}.")
+    return out
 
 
-def _ratio_unit(name: str) -> str:
-    return "" if RATIO_UNITS[name] == "1" else RATIO_UNITS[name]
+def _errors(rms_deg: list[float]) -> str:
+    each = listed([f"{digits(v)} deg for phi{j}" for j, v in enumerate(rms_deg, 1)])
+    return f"in windows of {TOLD_WINDOW_S} s with the state at the start fitted: RMS error {each}"
+
+
+def _scale(model: dict[str, Any] | None, links: int) -> str:
+    """What stands behind all coefficients together."""
+    where = "upper joint" if links > 1 else "pivot"
+    said = (
+        f"All coefficients are in proportion to psi, half the moment of inertia about the {where}, which free motion "
+        "does not tell"
+    )
+    if model is None:
+        return f"{said}; it is the model's, and its uncertainty comes on top."
+    psi, sigma = (model["constants"]["psi_kg_m2"][k] for k in ("value", "sigma"))
+    if not sigma:
+        return f"{said}: the model “{model['name']}” gives {psi:.4g} kg m² without an uncertainty."
+    return (
+        f"{said}: the model “{model['name']}” gives {with_sigma(psi, sigma)} kg m². This {digits(100 * sigma / psi)} % "
+        "is common to all coefficients and comes on top."
+    )
 
 
 def _residuals(path: Path, group: str, title: str) -> list[Block]:
@@ -146,7 +230,7 @@ def _energy(path: Path, group: str, title: str) -> list[Block]:
         ),
         Chart(
             f"{group}-zoom",
-            f"Its first {ZOOM_S:g} s",
+            f"Energy{title}, first {ZOOM_S:g} s",
             f"{group}-zoom",
             t[near],
             (
@@ -158,7 +242,7 @@ def _energy(path: Path, group: str, title: str) -> list[Block]:
         ),
         Chart(
             f"{group}-residual",
-            "Fitted motion minus losses",
+            f"Energy{title}, of the fitted motion minus start less losses",
             group,
             t,
             (Series("difference (mJ)", 1e3 * (energy - model), 2),),
@@ -167,7 +251,7 @@ def _energy(path: Path, group: str, title: str) -> list[Block]:
         ),
         Chart(
             f"{group}-works",
-            "Energy taken out by each law",
+            f"Energy{title}, taken out by each law",
             group,
             t,
             tuple(Series(n.removesuffix("_j"), c[n], i % 6, dashed=i >= 6) for i, n in enumerate(laws)),
@@ -179,7 +263,7 @@ def _energy(path: Path, group: str, title: str) -> list[Block]:
 def sections(folder: Path, fit: dict[str, Any], prediction: dict[str, Any] | None) -> list[Section]:
     """Energy, identifiability, trials and prediction."""
     blocks: list[Block] = [Text(sentence(_message(fit)))]
-    blocks += [Listing(tuple(fit["notes"]))] if fit.get("notes") else []
+    blocks += [Listing(tuple(sentence(n) for n in fit["notes"]))] if fit.get("notes") else []
     blocks.append(
         Figure(
             inline_svg(shares_figure(fit["shares"])), "Where the energy goes, with standard uncertainties."
@@ -195,20 +279,8 @@ def sections(folder: Path, fit: dict[str, Any], prediction: dict[str, Any] | Non
             blocks += _energy(path, f"e{k}", title)
         if left.exists() or path.exists():
             blocks.append(Reset(f"e{k}"))
-    out = [Section("damping", "Damping", tuple(blocks))]
-    told = fit["identifiability"]
-    out.append(
-        Section(
-            "identifiability",
-            "What the data can tell",
-            (
-                Listing(tuple(sentence(s) for s in (*_terms(fit), *told["sentences"]))),
-                Text(
-                    f"Condition number of the scaled information matrix: {told['condition']:.3g}.", quiet=True
-                ),
-            ),
-        )
-    )
+    out = [Section("damping", "Damping", (*blocks, *_constants(fit), *_ten(fit)))]
+    out.append(Section("identifiability", "What the data can tell", tuple(_told(fit))))
     trials = folder / "fit" / "trials.json"
     if len(names) > 1 and trials.exists():
         out.append(
@@ -223,9 +295,81 @@ def sections(folder: Path, fit: dict[str, Any], prediction: dict[str, Any] | Non
     return out
 
 
-def _terms(fit: dict[str, Any]) -> list[str]:
-    """What the data say of each term, where the terms were compared."""
-    return [f"{t['sentence']}." for t in fit.get("terms", {}).values()]
+def _constants(fit: dict[str, Any]) -> list[Block]:
+    """The ratios of the constants that were fitted too, and the small oscillations that follow."""
+    links, sigmas = links_of(fit), fit.get("ratio_sigmas", {})
+    rows = [
+        (meaning(n, links), f"{n}/psi", quantity(v, sigmas.get(n), ratio_unit(n)))
+        for n, v in fit["ratios"].items()
+    ]
+    rows.append(("small oscillations", "", f"{listed([f'{f:.4f}' for f in fit['modes_hz']])} Hz"))
+    return [
+        Heading("Constants of the motion"),
+        Table(("constant", "symbol", "value"), tuple(rows), numbers=frozenset({2})),
+    ]
+
+
+def ratio_unit(name: str) -> str:
+    """Unit of a ratio over psi, as a page has it."""
+    return {"1": "", "1/s2": "s⁻²"}[RATIO_UNITS[name]]
+
+
+def _ten(fit: dict[str, Any]) -> list[Block]:
+    """The paper's ten coefficients, where they were asked for, under their warning."""
+    ten = fit.get("ten_coefficients")
+    if ten is None:
+        return []
+    rows = tuple(
+        (name, quantity(c["value"], c["sigma"], with_squares(c["unit"]))) for name, c in ten["values"].items()
+    )
+    return [
+        Heading("The paper's ten coefficients"),
+        Text(sentence(ten["warning"])),
+        Table(("coefficient", "value"), rows, numbers=frozenset({1})),
+    ]
+
+
+def _told(fit: dict[str, Any]) -> list[Block]:
+    """Which terms the data ask for, which they do not tell apart, and where the intervals are open."""
+    told = fit["identifiability"]
+    blocks: list[Block] = []
+    terms = fit.get("terms", {})
+    if terms:
+        rows = []
+        for name, t in terms.items():
+            said = t["verdict"]
+            if said == "cannot be told apart":
+                said += f" from {t['partner']} (correlation {signed(t['correlation'], 2)})"
+            shown = t["gain"] > 0
+            rows.append(
+                (
+                    name,
+                    said,
+                    digits(t["gain"], 3) if shown else "–",
+                    signed(100 * t["prediction"], 3) if shown else "–",
+                    signed(t["prediction_z"], 2) if t["prediction_z"] else "–",
+                )
+            )
+        header = ["term", "verdict of the data", "fall of 2 log L without it", "prediction, mean square (%)"]
+        # One window of prediction has no scatter, and so no error.
+        header += ["in standard errors"] if any(t["prediction_z"] for t in terms.values()) else []
+        blocks += [
+            Text(
+                "Each term was left out in turn and all others fitted again. Without a term that is asked for, twice "
+                "the log-likelihood falls by more than 9 and data that were not fitted are predicted no better; "
+                "without one that is rejected, neither changes."
+            ),
+            Table(tuple(header), tuple(row[: len(header)] for row in rows), numbers=frozenset({2, 3, 4})),
+        ]
+    notes = [f"{n}: {i['note']}" for n, i in fit.get("intervals", {}).items() if i["note"]]
+    blocks.append(Listing(tuple(sentence(s) for s in (*told["sentences"], *notes))))
+    blocks.append(
+        Text(
+            f"Condition number of the scaled information matrix: {sentence(format(told['condition'], '.3g'))}.",
+            quiet=True,
+        )
+    )
+    return blocks
 
 
 def _trials(trials: dict[str, Any], names: list[str]) -> list[Block]:
@@ -235,7 +379,7 @@ def _trials(trials: dict[str, Any], names: list[str]) -> list[Block]:
             *(with_sigma(v, s) for v, s in zip(c["values"], c["sigmas"], strict=True)),
             with_sigma(c["mean"], c["sigma"]),
             sentence(f"{c['spread']:.2g}"),
-            "–" if c["p_value"] is None else f"{c['p_value']:.2g}",
+            "–" if c["p_value"] is None else sentence(f"{c['p_value']:.2g}"),
             "" if c["unit"] == "1" else with_squares(c["unit"]),
         )
         for name, c in trials["coefficients"].items()
@@ -255,11 +399,12 @@ def _prediction(folder: Path, prediction: dict[str, Any]) -> list[Block]:
     blocks: list[Block] = [
         Text(
             "Each recording predicted from a fit of the others. In a window only the state at its start is fitted to "
-            "it; a forecast knows the half second before it and no more, and where the lower link tumbles a forecast "
-            "is lost to chaos whatever the model: compare its median."
+            "it; a forecast knows the half second before it and no more, and where a link tumbles it is lost to chaos "
+            "whatever the model: compare its median."
         )
     ]
     for k, (name, p) in enumerate(prediction.items()):
+        links = max(len(w["rms_deg"]) for w in p["in_window"].values())
         rows = tuple(
             (
                 kind.replace("_", " "),
@@ -277,14 +422,11 @@ def _prediction(folder: Path, prediction: dict[str, Any]) -> list[Block]:
                 (
                     "kind",
                     "window",
-                    "RMS phi1 (deg)",
-                    "RMS phi2 (deg)",
-                    "median phi1 (deg)",
-                    "median phi2 (deg)",
+                    *(f"{what} phi{j} (deg)" for what in ("RMS", "median") for j in range(1, links + 1)),
                     "windows",
                 ),
                 rows,
-                numbers=frozenset({2, 3, 4, 5, 6}),
+                numbers=frozenset(range(2, 2 * links + 3)),
             ),
             *_windows(read_columns(folder / name / "windows.csv"), f"w{k}"),
         ]
@@ -297,7 +439,9 @@ def _windows(c: dict[str, NDArray[np.float64]], group: str) -> list[Block]:
     for n, length in enumerate(np.unique(c["window_s"])):
         here = c["window_s"] == length
         rms = tuple(
-            Series(f"phi{j + 1} (deg)", c[f"phi{j + 1}_rms_deg"][here], j, points=True) for j in range(2)
+            Series(f"phi{j} (deg)", c[f"phi{j}_rms_deg"][here], j - 1, points=True)
+            for j in (1, 2)
+            if f"phi{j}_rms_deg" in c
         )
         title = f"RMS error of each window of {length:g} s"
         out.append(

@@ -103,9 +103,10 @@ class Film(_Block):
 
 @dataclass(frozen=True)
 class Series:
-    """One curve. ``band`` (i, j): fill between the series i and j places before this one (0 is itself).
+    """One curve; one without a label is not in the legend.
 
-    ``edge``: a thin line, because it bounds a band.
+    ``band`` (i, j): fill between the series i and j places before this one (0 is itself). ``edge``: a thin line,
+    because it bounds a band.
     """
 
     label: str
@@ -119,7 +120,7 @@ class Series:
 
 def band(sigma: NDArray[np.float64]) -> tuple[Series, Series]:
     """A band of ± sigma around zero; it comes after the curves that it is to be seen through."""
-    return Series("+ sigma", sigma, None, edge=True), Series("- sigma", -sigma, None, band=(1, 0), edge=True)
+    return Series("± sigma", sigma, None, edge=True), Series("", -sigma, None, band=(1, 0), edge=True)
 
 
 @dataclass(frozen=True)

@@ -50,7 +50,8 @@ class Part:
     compared: dict[str, NDArray[np.float64]] | None = None
     calibration: str | None = None
     warnings: list[str] = field(default_factory=list)
-    answer: Table | None = None
+    answer: list[tuple[str, str]] = field(default_factory=list)
+    """What was found of it, as (property, value)."""
 
     def sections(self, id_: str, suffix: str) -> list[Section]:
         """The sections, titled with the recording's name where there are several."""
@@ -80,7 +81,7 @@ class Part:
                 mp4,
                 np.asarray(about["times_s"], dtype=np.float64),
                 float(about["rate_hz"]),
-                f"{self.label} with nodes and bodies drawn in; {shown}. The plots follow it.",
+                f"{self.label} with markers and bodies drawn in; {shown}. The plots follow it.",
             )
         ]
 
@@ -168,7 +169,7 @@ class Part:
         return [
             StatusMap(
                 f"{id_}-status",
-                "What was known of each node",
+                "What was known of each marker",
                 id_,
                 n.t_s,
                 names,
@@ -180,7 +181,7 @@ class Part:
             Text(told, quiet=True),
             Table(
                 (
-                    "node",
+                    "marker",
                     "body",
                     "seen",
                     "gaps",
@@ -285,8 +286,8 @@ def read(folder: Path, facts: dict[str, Any], stages: set[str]) -> Part:
         rows += [
             ("frames", str(nodes.frame.size)),
             *_times(nodes.t_s),
-            ("nodes, bodies", f"{len(nodes.rig.nodes)}, {len(nodes.rig.bodies)}"),
-            ("nodes seen, times", f"{100 * seen.mean():.1f} % of {seen.size}"),
+            ("markers, bodies", f"{len(nodes.rig.nodes)}, {len(nodes.rig.bodies)}"),
+            ("markers seen, of all frames", f"{100 * seen.mean():.1f} %"),
             ("median uncertainty of a centre", f"{digits(float(np.nanmedian(nodes.sigma_px)))} px"),
         ]
         source = nodes.meta.get("source")
@@ -303,7 +304,7 @@ def read(folder: Path, facts: dict[str, Any], stages: set[str]) -> Part:
         part.angles = read_angles(here / "angles.parquet", name=part.label)
         part.meta = json.loads((here / "angles.json").read_text("utf-8"))
         if part.nodes is None:
-            rows += [("instants", str(part.angles.t_s.size)), *_times(part.angles.t_s)]
+            rows += [("samples", str(part.angles.t_s.size)), *_times(part.angles.t_s)]
         part.warnings += [f"{part.label}: {note}" for note in part.meta.get("notes", [])]
         for k in range(part.angles.links):
             sigma = part.angles.sigma_rad[:, k]
@@ -329,18 +330,17 @@ def read(folder: Path, facts: dict[str, Any], stages: set[str]) -> Part:
         if neither is not None and neither < 1:
             rows.append(
                 (
-                    "the same, expected from the noise of both",
+                    "film minus encoder, expected from their noise",
                     f"{digits(rms * math.sqrt(1 - neither), 3)} deg",
                 )
             )
-    if rows:
-        part.answer = Table(("property", "value"), tuple(rows), numbers=frozenset({1}))
+    part.answer = rows
     return part
 
 
 def _times(t_s: NDArray[np.float64]) -> list[tuple[str, str]]:
     step = float(np.median(np.diff(t_s))) if t_s.size > 1 else math.nan
-    return [("duration", f"{t_s[-1] - t_s[0]:.3f} s"), ("rate", f"{1 / step:.6g} per second")]
+    return [("duration", f"{t_s[-1] - t_s[0]:.3f} s"), ("rate", f"{1 / step:.6g} per s")]
 
 
 PLAYERS_RATE_HZ = 60.0

@@ -18,12 +18,38 @@ def with_sigma(value: float | None, sigma: float | None) -> str:
         exponent = 0
     digits = max(0, exponent + 1 - int(np.floor(np.log10(sigma))))
     scale = 10.0**exponent
-    text = f"{value / scale:.{digits}f} ± {sigma / scale:.{digits}f}"
+    text = f"{value / scale:.{digits}f} ± {sigma / scale:.{digits}f}".replace("-", "−")
     return text if exponent == 0 else f"({text}) × 10{_raised(exponent)}"
+
+
+def quantity(value: float | None, sigma: float | None, unit: str) -> str:
+    """`with_sigma` and the unit, which alone may go to a second line."""
+    return f"{with_sigma(value, sigma).replace(' ', chr(0xA0))} {unit}".strip()
 
 
 def _raised(exponent: int) -> str:
     return str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+
+
+def between(low: float | None, high: float | None) -> str:
+    """An interval, its ends to four digits under one power of ten; an end that is not known is a question mark."""
+    known = [abs(v) for v in (low, high) if v]
+    exponent = int(np.floor(np.log10(max(known)))) if known else 0
+    if -3 <= exponent <= 4:
+        exponent = 0
+    ends = ("?" if v is None else f"{v / 10.0**exponent:.4g}".replace("-", "−") for v in (low, high))
+    text = " to ".join(ends)
+    return text if exponent == 0 else f"({text}) × 10{_raised(exponent)}"
+
+
+def signed(value: float, count: int) -> str:
+    """A number with its sign, to so many significant digits, or all before its point."""
+    return ("−" if value < 0 else "+") + digits(abs(value), count)
+
+
+def listed(parts: list[str]) -> str:
+    """``a, b and c``."""
+    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
 
 
 def digits(value: float, count: int = 2) -> str:
@@ -40,4 +66,5 @@ def sentence(text: str) -> str:
     """A stage's message as it stands on a page: ±, powers of ten and squares, and a capital where a word begins it."""
     text = re.sub(r"(\d)e([+-]\d+)\b", lambda m: f"{m[1]} × 10{_raised(int(m[2]))}", text)
     text = re.sub(r"(?<=m )s2\b", "s²", text.replace(" +- ", " ± "))
+    text = re.sub(r"(?<=[ (])-(?=\d)", "−", text)
     return text[0].upper() + text[1:] if re.match("[a-z]+ ", text) else text

@@ -32,16 +32,32 @@
   // Charts of one group share their time range and their cursor.
   const groups = new Map();
   function group(name) {
-    if (!groups.has(name)) groups.set(name, { charts: [], range: null, film: null, busy: false, time: null });
+    if (!groups.has(name)) groups.set(name, { charts: [], range: null, film: null, time: null, frame: 0, rest: 0 });
     return groups.get(name);
   }
 
+  // However many times a hand moves between two pictures, a chart is drawn once; one out of sight when the hand rests.
+  const inSight = new Set();
+  const sight = new IntersectionObserver((seen) => {
+    for (const s of seen) { if (s.isIntersecting) inSight.add(s.target); else inSight.delete(s.target); }
+  }, { rootMargin: "200px" });
+
   function setRange(g, min, max) {
-    if (g.busy) return;
-    g.busy = true;
     g.range = [min, max];
-    for (const c of g.charts) c.setScale("x", { min, max });
-    g.busy = false;
+    if (!g.frame) g.frame = requestAnimationFrame(() => {
+      g.frame = 0;
+      draw(g, (c) => inSight.has(c.root.parentNode));
+      clearTimeout(g.rest);
+      g.rest = setTimeout(() => draw(g, () => true), 150);
+    });
+  }
+
+  function draw(g, wanted) {
+    const [min, max] = g.range;
+    for (const c of g.charts) {
+      if (wanted(c) && (c.scales.x.min !== min || c.scales.x.max !== max)) c.setScale("x", { min, max });
+    }
+    if (g.time !== null) putCursor(g, g.time);
   }
 
   function full(g) {
@@ -113,15 +129,18 @@
     bar();
   }
 
+  // As in the tables, in every country.
+  const numeral = (v) => (v == null ? "" : String(+v.toPrecision(10)).replace("-", "−"));
+
   function options(spec, width, g) {
     const ink = css("--ink"), grid = { stroke: css("--grid"), width: 1 };
-    const axis = { stroke: ink, grid, ticks: grid, font: "12px system-ui, sans-serif", labelFont: "12px system-ui, sans-serif", labelSize: 18 };
+    const axis = { stroke: ink, values: (u, splits) => splits.map(numeral), grid, ticks: grid, font: "12px system-ui, sans-serif", labelFont: "12px system-ui, sans-serif", labelSize: 18 };
     const series = [{ label: spec.x_label, value: (u, v) => (v == null ? "–" : v.toFixed(4)) }];
     const bands = [];
     for (const s of spec.series) {
       const stroke = s.color === undefined ? "transparent" : css(`--s${s.color % 6}`);
       series.push({
-        label: s.label, stroke: s.edge ? ink : stroke, width: s.points ? 0 : s.edge ? 0.75 : 1.25,
+        label: s.label, class: s.label ? null : "unnamed", stroke: s.edge ? ink : stroke, width: s.points ? 0 : s.edge ? 0.75 : 1.25,
         points: s.points ? { show: true, size: 4, fill: stroke, stroke } : { show: false },
         value: (u, v) => (v == null ? "–" : v.toPrecision(6)), scale: "y", spanGaps: false, dash: s.dashed || s.edge ? [6, 4] : undefined,
       });
@@ -136,14 +155,21 @@
         { ...axis, label: spec.y_label, size: 64,
           ...(map ? { splits: () => spec.nodes.map((_, i) => spec.nodes.length - i - 0.5), values: () => spec.nodes } : {}) },
       ],
-      // Less than 5 px is a click, also where the cursor was set by the film in between.
-      cursor: { drag: { x: true, y: false, dist: 5 }, sync: { key: spec.group }, focus: { prox: -1 }, y: false },
+      // Less than 5 px is a click, also where the cursor was set by the film in between. With Shift a drag moves.
+      cursor: {
+        drag: { x: true, y: false, dist: 5, setScale: false }, sync: { key: spec.group }, focus: { prox: -1 }, y: false,
+        bind: {
+          mousedown: (u, over, handle) => (e) => { if (e.button === 0 && !e.shiftKey && e.target === over) handle(e); },
+          dblclick: () => () => { setRange(g, ...full(g)); },
+        },
+      },
       legend: { show: !map, live: true },
       hooks: {
-        setScale: [(u, key) => {
-          if (key !== "x") return;
-          const { min, max } = u.scales.x;
-          if (min != null) setRange(g, min, max);
+        setSelect: [(u) => {
+          const { left, width } = u.select;
+          if (!width) return;
+          u.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
+          setWithin(g, u.posToVal(left, "x"), u.posToVal(left + width, "x"));
         }],
         draw: map ? [statusMap(spec)] : [],
       },
@@ -154,7 +180,7 @@
     u.over.addEventListener("wheel", (e) => {
       if (!(e.ctrlKey || e.shiftKey || e.altKey)) return; // plain scrolling scrolls the page
       e.preventDefault();
-      const { min, max } = u.scales.x, at = u.posToVal(e.offsetX, "x");
+      const [min, max] = g.range, at = min + (max - min) * e.offsetX / u.over.clientWidth;
       let a, b;
       if (e.shiftKey) {
         const shift = ((e.deltaY || e.deltaX) > 0 ? 0.1 : -0.1) * (max - min);
@@ -167,11 +193,22 @@
     }, { passive: false });
   }
 
+  function drag(u, g) {
+    u.over.addEventListener("mousedown", (e) => {
+      if (e.button !== 0 || !e.shiftKey) return;
+      e.preventDefault();
+      const [min, max] = g.range, from = e.clientX, scale = (max - min) / u.over.clientWidth;
+      const move = (m) => setWithin(g, min - (m.clientX - from) * scale, max - (m.clientX - from) * scale);
+      addEventListener("mousemove", move);
+      addEventListener("mouseup", () => removeEventListener("mousemove", move), { once: true });
+    });
+  }
+
   // Two fingers zoom, one moves; up and down scrolls the page.
   function touch(u, g) {
     const fingers = new Map();
     let begun = null;
-    const begin = () => { begun = { min: u.scales.x.min, max: u.scales.x.max, at: [...fingers.values()] }; };
+    const begin = () => { begun = { min: g.range[0], max: g.range[1], at: [...fingers.values()] }; };
     u.over.addEventListener("pointerdown", (e) => {
       if (e.pointerType === "touch" && fingers.size < 2) { fingers.set(e.pointerId, e.clientX); begin(); }
     });
@@ -198,7 +235,9 @@
     const columns = [array(spec.x), ...spec.series.map((s) => array(s.y))];
     const u = new uPlot(options(spec, host.clientWidth, g), columns, host);
     g.charts.push(u);
+    sight.observe(host);
     wheel(u, g);
+    drag(u, g);
     touch(u, g);
     let down = null;
     u.over.addEventListener("mousedown", (e) => { down = e.clientX; });
@@ -211,11 +250,14 @@
     host.tabIndex = 0;
     host.setAttribute("role", "img");
     host.addEventListener("keydown", (e) => {
-      const { min, max } = u.scales.x, [lo, hi] = full(g), span = max - min;
+      const [min, max] = g.range, span = max - min;
       if (e.key === "+" || e.key === "=") setRange(g, min + span * 0.1, max - span * 0.1);
-      else if (e.key === "-") setRange(g, Math.max(lo, min - span * 0.125), Math.min(hi, max + span * 0.125));
-      else if (e.key === "0" || e.key === "Home") setRange(g, lo, hi);
-      else if ((e.key === "ArrowLeft" || e.key === "ArrowRight") && g.film) g.film.step(e.key === "ArrowLeft" ? -1 : 1);
+      else if (e.key === "-") setWithin(g, min - span * 0.125, max + span * 0.125);
+      else if (e.key === "0" || e.key === "Home") setRange(g, ...full(g));
+      else if (e.shiftKey && (e.key === "ArrowLeft" || e.key === "ArrowRight")) {
+        const by = (e.key === "ArrowLeft" ? -0.1 : 0.1) * span;
+        setWithin(g, min + by, max + by);
+      } else if ((e.key === "ArrowLeft" || e.key === "ArrowRight") && g.film) g.film.step(e.key === "ArrowLeft" ? -1 : 1);
       else return;
       e.preventDefault();
     });
@@ -224,11 +266,13 @@
 
   let built = [];
   function rebuild() {
-    const ranges = new Map([...groups].map(([k, g]) => [k, g.range]));
-    for (const b of built) b.u.destroy();
-    for (const g of groups.values()) { g.charts = []; g.busy = false; }
+    for (const b of built) { sight.unobserve(b.host); b.u.destroy(); }
+    for (const g of groups.values()) g.charts = [];
     built = data.charts.map(build);
-    for (const [k, r] of ranges) if (r) setRange(group(k), r[0], r[1]);
+    for (const g of groups.values()) {
+      if (g.range === null) g.range = full(g);
+      draw(g, () => true);
+    }
   }
 
   // The film: frame k of the embedded video shows the recording at times[k].
