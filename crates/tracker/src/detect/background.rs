@@ -3,6 +3,7 @@
 //! Owns: [`Background`]. Must not: know which side markers are on.
 
 use nalgebra::{SMatrix, SVector};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::levels::{quantile, sorted};
@@ -46,9 +47,10 @@ const TILE_PX: usize = 32;
 /// markers, links or hands do not pull it. Flat where tiles say no more than that.
 pub(crate) fn learn(images: &[Vec<u16>], width: usize, height: usize) -> Background {
     let image_px = [width as u32, height as u32];
-    let mut tiles: Vec<([f64; 6], f64)> = Vec::new();
-    let mut values: Vec<u16> = Vec::new();
-    for y0 in (0..height).step_by(TILE_PX) {
+    let rows: Vec<usize> = (0..height).step_by(TILE_PX).collect();
+    let row_of_tiles = |&y0: &usize| {
+        let mut tiles = Vec::new();
+        let mut values: Vec<u16> = Vec::new();
         for x0 in (0..width).step_by(TILE_PX) {
             values.clear();
             let (y1, x1) = ((y0 + TILE_PX).min(height), (x0 + TILE_PX).min(width));
@@ -67,7 +69,9 @@ pub(crate) fn learn(images: &[Vec<u16>], width: usize, height: usize) -> Backgro
             let v = (y0 + y1 - 1) as f64 / (height as f64 - 1.0).max(1.0) - 1.0;
             tiles.push((Background::terms(u, v), median));
         }
-    }
+        tiles
+    };
+    let tiles: Vec<([f64; 6], f64)> = rows.par_iter().flat_map_iter(row_of_tiles).collect();
     let medians = sorted(tiles.iter().map(|t| t.1));
     let middle = quantile(&medians, 0.5);
     let flat = Background { coefficients: [middle, 0.0, 0.0, 0.0, 0.0, 0.0], image_px };
@@ -108,27 +112,35 @@ pub(crate) fn learn(images: &[Vec<u16>], width: usize, height: usize) -> Backgro
 /// Variance of a background sample, raw units squared, from second differences along rows; never below that
 /// of rounding to whole numbers.
 pub(crate) fn noise_variance(images: &[Vec<u16>], width: usize) -> f64 {
-    let mut differences: Vec<i32> = Vec::new();
-    for image in images {
+    // How often each absolute difference comes, in each image.
+    let counts = images.par_iter().map(|image| {
+        let mut counts = vec![0u64; 4 * usize::from(u16::MAX) + 1];
         for (y, row) in image.chunks_exact(width).enumerate() {
-            differences.extend(
-                row.windows(3)
-                    .skip(y % 7)
-                    .step_by(7)
-                    .map(|w| (i32::from(w[0]) - 2 * i32::from(w[1]) + i32::from(w[2])).abs()),
-            );
+            for w in row.windows(3).skip(y % 7).step_by(7) {
+                counts[(i32::from(w[0]) - 2 * i32::from(w[1]) + i32::from(w[2])).unsigned_abs() as usize] +=
+                    1;
+            }
         }
-    }
-    if differences.is_empty() {
+        counts
+    });
+    let Some(counts) = counts.reduce_with(|mut all, one| {
+        all.iter_mut().zip(one).for_each(|(a, b)| *a += b);
+        all
+    }) else {
         return 1.0 / 12.0;
-    }
+    };
+    let n: u64 = counts.iter().sum();
+    let mut below = 0;
+    let Some(m) = counts.iter().position(|&c| {
+        below += c;
+        below > n / 2
+    }) else {
+        return 1.0 / 12.0;
+    };
     // Whole numbers tie: interpolate the median inside its tie.
-    let n = differences.len();
-    let m = *differences.select_nth_unstable(n / 2).1;
-    let below = differences.iter().filter(|&&d| d < m).count() as f64;
-    let tied = differences.iter().filter(|&&d| d == m).count() as f64;
+    let (tied, below) = (counts[m] as f64, (below - counts[m]) as f64);
     let inside = (n as f64 / 2.0 - below) / tied;
-    let median = if m == 0 { 0.5 * inside } else { f64::from(m) - 0.5 + inside };
+    let median = if m == 0 { 0.5 * inside } else { m as f64 - 0.5 + inside };
     // Median of |N(0, 1)| is 0.6745; a second difference has six times the variance.
     ((median / 0.6745).powi(2) / 6.0).max(1.0 / 12.0)
 }

@@ -2,6 +2,8 @@
 //!
 //! Owns: the choice. Must not: find centres.
 
+use rayon::prelude::*;
+
 use super::background::Background;
 use super::levels::Side;
 use super::pixels::Pixels;
@@ -54,14 +56,22 @@ const STEPS: usize = 20;
 
 /// Heights above the background as an image of their own, as bytes of 16-bit samples.
 fn heights(field: &Field<'_>, image: &[u16], side: Side) -> Vec<u8> {
-    let mut bytes = Vec::with_capacity(image.len() * 2);
     let flat = field.background.is_flat();
     let level = field.background.median();
+    // Rounded, and 0 below the background.
+    let height = |v: u16, b: f64| (side.sign() * (f64::from(v) - b) + 0.5) as u16;
+    let of_level: Vec<u16> =
+        if flat { (0..=u16::MAX).map(|v| height(v, level)).collect() } else { Vec::new() };
+    let mut bytes = Vec::with_capacity(image.len() * 2);
     for (y, row) in image.chunks_exact(field.width).enumerate() {
-        for (x, &v) in row.iter().enumerate() {
-            let b = if flat { level } else { field.background.at(x as f64, y as f64) };
-            let h = side.sign() * (f64::from(v) - b);
-            bytes.extend_from_slice(&(h.round().clamp(0.0, 65535.0) as u16).to_le_bytes());
+        if flat {
+            bytes.extend(row.iter().flat_map(|&v| of_level[usize::from(v)].to_le_bytes()));
+        } else {
+            bytes.extend(
+                row.iter()
+                    .enumerate()
+                    .flat_map(|(x, &v)| height(v, field.background.at(x as f64, y as f64)).to_le_bytes()),
+            );
         }
     }
     bytes
@@ -74,7 +84,7 @@ pub(crate) fn best(field: &Field<'_>, sides: &[Side], fixed: Option<f64>) -> Opt
         .iter()
         .map(|&side| {
             let maps: Vec<Vec<u8>> =
-                field.images.iter().step_by(field.step()).map(|i| heights(field, i, side)).collect();
+                field.images.par_iter().step_by(field.step()).map(|i| heights(field, i, side)).collect();
             let top = top_height(&maps);
             (side, maps, top)
         })
@@ -97,7 +107,7 @@ pub(crate) fn best(field: &Field<'_>, sides: &[Side], fixed: Option<f64>) -> Opt
             }
         };
         let mut trials: Vec<(f64, f64, Vec<Candidate>)> = tried
-            .iter()
+            .par_iter()
             .map(|&h| {
                 let blobs = markers(field, maps, h, sigma);
                 let score = blobs.iter().map(|b| b.weight * b.contrast / highest).sum();
@@ -142,12 +152,19 @@ pub(crate) fn weighted_quantile(blobs: &[Candidate], value: impl Fn(&Candidate) 
 
 /// The height that a few pixels of each frame exceed: above single hot pixels.
 fn top_height(maps: &[Vec<u8>]) -> f64 {
-    let mut counts = vec![0usize; 65536];
-    for b in maps.iter().flat_map(|m| m.chunks_exact(2)) {
-        counts[usize::from(u16::from_le_bytes([b[0], b[1]]))] += 1;
-    }
+    let counts = maps.par_iter().map(|map| {
+        let mut counts = vec![0usize; 65536];
+        for b in map.chunks_exact(2) {
+            counts[usize::from(u16::from_le_bytes([b[0], b[1]]))] += 1;
+        }
+        counts
+    });
+    let counts = counts.reduce_with(|mut all, one| {
+        all.iter_mut().zip(one).for_each(|(a, b)| *a += b);
+        all
+    });
     let mut seen = 0;
-    for (h, n) in counts.iter().enumerate().rev() {
+    for (h, n) in counts.as_deref().unwrap_or_default().iter().enumerate().rev() {
         seen += n;
         if seen >= 12 * maps.len() {
             return h as f64;

@@ -2,6 +2,7 @@
 //!
 //! Owns: [`Levels`], [`Side`], [`Noise`], [`Background`]. Must not: look at the frames that are detected later.
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::background;
@@ -98,7 +99,7 @@ impl Levels {
     /// nothing like a marker is found.
     pub fn learn(samples: &[Frame], settings: &DetectSettings) -> Result<Self> {
         // Step 1: unpack.
-        let mut images: Vec<Vec<u16>> = Vec::new();
+        let mut planes = Vec::new();
         let mut first: Option<&Frame> = None;
         let step = samples.len().div_ceil(MOST_FRAMES).max(1);
         for frame in samples.iter().step_by(step) {
@@ -117,11 +118,7 @@ impl Levels {
                     .advice("A recording must keep one size"),
                 ));
             }
-            let mut image = vec![0; pixels.width * pixels.height];
-            for (y, row) in image.chunks_exact_mut(pixels.width).enumerate() {
-                pixels.read(y, 0, row);
-            }
-            images.push(image);
+            planes.push(pixels);
         }
         let Some(known) = first else {
             return Err(Error::Detect(
@@ -130,6 +127,16 @@ impl Levels {
             ));
         };
         let (width, height) = (known.width as usize, known.height as usize);
+        let images: Vec<Vec<u16>> = planes
+            .par_iter()
+            .map(|pixels| {
+                let mut image = vec![0; width * height];
+                for (y, row) in image.chunks_exact_mut(width).enumerate() {
+                    pixels.read(y, 0, row);
+                }
+                image
+            })
+            .collect();
         let top = f64::from((1u32 << known.depth_bits.clamp(1, 16)) - 1);
         if let Threshold::Raw(t) = settings.threshold
             && !(t > 0.0 && t <= top)
@@ -177,7 +184,7 @@ impl Levels {
         }
         let noise = Noise { read, shot: 0.0, dark: background.median() };
         let bytes: Vec<Vec<u8>> =
-            images.iter().map(|i| i.iter().flat_map(|v| v.to_le_bytes()).collect()).collect();
+            images.par_iter().map(|i| i.iter().flat_map(|v| v.to_le_bytes()).collect()).collect();
         let samples: Vec<Sample<'_>> = best
             .blobs
             .iter()
@@ -223,11 +230,15 @@ impl Levels {
 
 /// The value that samples pile up at on the markers' side.
 fn saturation(images: &[Vec<u16>], side: Side, top: f64) -> Option<f64> {
+    let extremes = images.par_iter().filter_map(|image| match side {
+        Side::Bright => image.iter().max().copied(),
+        Side::Dark => image.iter().min().copied(),
+    });
     let extreme = match side {
-        Side::Bright => images.iter().flatten().max().copied()?,
-        Side::Dark => images.iter().flatten().min().copied()?,
+        Side::Bright => extremes.max()?,
+        Side::Dark => extremes.min()?,
     };
-    let at = images.iter().flatten().filter(|&&v| v == extreme).count();
+    let at: usize = images.par_iter().map(|image| image.iter().filter(|&&v| v == extreme).count()).sum();
     let piled = at >= 20 * images.len();
     let end = match side {
         Side::Bright => f64::from(extreme) >= 0.9 * top,

@@ -2,6 +2,7 @@
 //!
 //! Owns: [`Marker`]. Must not: choose a threshold.
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::centre::Window;
@@ -62,28 +63,29 @@ pub(crate) fn learn(
     if samples.is_empty() || radius < 1.2 {
         return None;
     }
-    let mut window = Window::default();
     let read = noise.read;
-    let fits = |table: &EdgeTable, noise: Noise, window: &mut Window| -> Vec<(usize, Fitted)> {
+    let fits = |table: &EdgeTable, noise: Noise| -> Vec<(usize, Fitted)> {
         let fit = DiscFit { table, noise, side, saturation, band_px: BAND_PX, usual_chi2: 1.0 };
         (0..samples.len())
-            .filter_map(|i| {
+            .into_par_iter()
+            .map_init(Window::default, |window, i| {
                 window.fit(&samples[i].pixels, &samples[i].blob, &fit, [[0.0; 3]; 2]).map(|f| (i, f))
             })
+            .flatten()
             .filter(|(_, f)| f.rms < LARGEST_MISFIT * f.height.abs() + 2.0 * read.sqrt())
             .collect()
     };
     // Step 1: the blur whose discs fit best, first on the list, then between its neighbours.
-    let mut misfit = |blur: f64, radius: f64| -> f64 {
+    let misfit = |blur: f64, radius: f64| -> f64 {
         let table = EdgeTable::new(radius, blur);
-        let found = fits(&table, noise, &mut window);
+        let found = fits(&table, noise);
         if found.len() * 3 < samples.len() * 2 {
             return f64::INFINITY;
         }
         let squares = sorted(found.iter().map(|(_, f)| f.chi2));
         quantile(&squares, 0.5)
     };
-    let tried: Vec<f64> = BLURS_PX.iter().map(|&b| misfit(b, radius)).collect();
+    let tried: Vec<f64> = BLURS_PX.par_iter().map(|&b| misfit(b, radius)).collect();
     let best = (0..tried.len()).min_by(|&a, &b| tried[a].total_cmp(&tried[b]))?;
     if !tried[best].is_finite() {
         return None;
@@ -103,9 +105,10 @@ pub(crate) fn learn(
 
     // Step 2: with that blur, the noise inside and outside of the discs.
     let table = EdgeTable::new(radius, blur);
-    let found = fits(&table, noise, &mut window);
+    let found = fits(&table, noise);
     let mut flat = [Vec::new(), Vec::new()];
     let fit = DiscFit { table: &table, noise, side, saturation, band_px: BAND_PX, usual_chi2: 1.0 };
+    let mut window = Window::default();
     for (i, f) in &found {
         window.flat_variances(&samples[*i].pixels, &samples[*i].blob, f, &fit, &mut flat);
     }
@@ -134,7 +137,7 @@ pub(crate) fn learn(
     }
 
     // Step 3: once more with that noise, for what is typical.
-    let found = fits(&table, noise, &mut window);
+    let found = fits(&table, noise);
     let radii = sorted(found.iter().map(|(_, f)| f.radius_px));
     let squares = sorted(found.iter().map(|(_, f)| f.chi2));
     let radius = quantile(&radii, 0.5);

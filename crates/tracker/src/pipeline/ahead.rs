@@ -1,65 +1,56 @@
-//! The source on a thread of its own, some batches of frames ahead and no more.
+//! The source on a thread of its own, some frames ahead and no more.
 //!
-//! Owns: [`Ahead`], the size of a batch. Must not: look at pixels.
+//! Owns: [`Ahead`], [`Batch`], its size. Must not: look at pixels.
 
 use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
-use std::time::Duration;
 
-use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
+use crossbeam_channel::{Receiver, Sender, bounded};
 
 use crate::error::{Error, Fault, Result};
 use crate::frame::{Ending, Frame, FrameSource};
 
-/// Bytes of frames in a batch. Three batches exist at once: one filled, one waiting, one in detection.
-const BATCH_BYTES: usize = 6 << 20;
+/// Bytes of frames in a batch: a large frame is handed on as soon as it is there, while caches hold it.
+const BATCH_BYTES: usize = 1 << 20;
 /// Frames in a batch, where they are small.
-const MOST_FRAMES: usize = 256;
-/// How long to wait for frames before looking whether the user wants to stop.
-const PATIENCE: Duration = Duration::from_millis(50);
+const MOST_FRAMES: usize = 64;
+/// Batches that wait for detection at most.
+const WAITING: usize = 8;
 
-/// What came of waiting for frames.
-pub enum Next {
-    /// Frames, in order.
-    Batch(Vec<Frame>),
-    /// None yet.
-    Waiting,
-    /// There are no more.
-    End,
+/// Frames in order, of which the first is the `first`-th of all that are read, from 0.
+pub struct Batch {
+    pub first: usize,
+    pub frames: Vec<Frame>,
 }
 
 /// Frames of a source, read ahead.
 pub struct Ahead {
-    frames: Receiver<Vec<Frame>>,
+    batches: Receiver<Batch>,
     stop: Arc<AtomicBool>,
     reader: JoinHandle<Result<Ending>>,
 }
 
 impl Ahead {
     /// Begins to read. Frames before `frames` are read and dropped, since no source is sought by frame number.
-    pub fn start(source: Box<dyn FrameSource>, frames: Range<u64>, threads: usize) -> Result<Self> {
-        let (sender, receiver) = bounded(1);
+    pub fn start(source: Box<dyn FrameSource>, frames: Range<u64>) -> Result<Self> {
+        let (sender, batches) = bounded(WAITING);
         let stop = Arc::new(AtomicBool::new(false));
         let stopped = Arc::clone(&stop);
         let reader = std::thread::Builder::new()
             .name("source".into())
-            .spawn(move || read(source, &frames, threads, &sender, &stopped))
+            .spawn(move || read(source, &frames, &sender, &stopped))
             .map_err(|e| Error::Source(Fault::new("source", format!("no thread could be started ({e})"))))?;
-        Ok(Self { frames: receiver, stop, reader })
+        Ok(Self { batches, stop, reader })
     }
 
-    /// The next frames, or the news that there are none yet.
-    pub fn next(&self) -> Next {
-        match self.frames.recv_timeout(PATIENCE) {
-            Ok(batch) => Next::Batch(batch),
-            Err(RecvTimeoutError::Timeout) => Next::Waiting,
-            Err(RecvTimeoutError::Disconnected) => Next::End,
-        }
+    /// Where batches come out, for any number of threads; closed after the last.
+    pub fn batches(&self) -> &Receiver<Batch> {
+        &self.batches
     }
 
-    /// How the recording ended, once [`Ahead::next`] said that it did.
+    /// How the recording ended, once the last batch is out.
     pub fn ending(self) -> Result<Ending> {
         self.reader.join().unwrap_or_else(|_| {
             Err(Error::Source(Fault::new("source", "the decoder failed; please report this")))
@@ -75,17 +66,16 @@ impl Ahead {
 fn read(
     mut source: Box<dyn FrameSource>,
     frames: &Range<u64>,
-    threads: usize,
-    sender: &Sender<Vec<Frame>>,
+    sender: &Sender<Batch>,
     stop: &AtomicBool,
 ) -> Result<Ending> {
-    let mut batch = Vec::new();
+    let mut batch = Batch { first: 0, frames: Vec::new() };
     let mut size = 1;
+    let mut ending = Ending::Complete;
     while !stop.load(Ordering::Relaxed) {
         let Some(frame) = source.next_frame()? else {
-            // The receiver may be gone; then nobody asks for the ending either.
-            let _ = sender.send(batch);
-            return Ok(source.ending());
+            ending = source.ending();
+            break;
         };
         if frame.index < frames.start {
             continue;
@@ -93,21 +83,27 @@ fn read(
         if frame.index >= frames.end {
             break;
         }
-        if batch.is_empty() {
-            size = batch_size(&frame, threads);
-            batch.reserve_exact(size);
+        if batch.frames.is_empty() {
+            size = batch_size(&frame);
+            batch.frames.reserve_exact(size);
         }
-        batch.push(frame);
-        if batch.len() == size && sender.send(std::mem::take(&mut batch)).is_err() {
-            return Ok(Ending::Complete);
+        batch.frames.push(frame);
+        if batch.frames.len() == size {
+            let next = Batch { first: batch.first + size, frames: Vec::new() };
+            if sender.send(std::mem::replace(&mut batch, next)).is_err() {
+                return Ok(ending);
+            }
         }
     }
-    let _ = sender.send(batch);
-    Ok(Ending::Complete)
+    if !batch.frames.is_empty() {
+        // The receivers may be gone; then nobody asks for the ending either.
+        let _ = sender.send(batch);
+    }
+    Ok(ending)
 }
 
-/// Frames in a batch: enough for every thread, not more memory than it takes.
-fn batch_size(frame: &Frame, threads: usize) -> usize {
+/// Frames in a batch: so many that handing them on costs nothing beside detecting in them.
+fn batch_size(frame: &Frame) -> usize {
     let bytes = frame.width as usize * frame.height as usize * frame.format.bits_per_pixel() as usize / 8;
-    (BATCH_BYTES / bytes.max(1)).clamp(threads.max(1), MOST_FRAMES.max(threads))
+    (BATCH_BYTES / bytes.max(1)).clamp(1, MOST_FRAMES)
 }

@@ -1,25 +1,30 @@
-//! Detection over batches of frames, in parallel, its results in the order of the recording.
+//! Detection in the frames of a recording on several threads, its results in the order of the recording.
 //!
 //! Owns: [`Detectors`], [`detect_all`]. Must not: know how a marker is detected.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
-use rayon::prelude::*;
-use rayon::{ThreadPool, ThreadPoolBuilder};
+use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
 
 use super::Observer;
-use super::ahead::{Ahead, Next};
+use super::ahead::{Ahead, Batch};
 use crate::detect::{DetectSettings, Detection, Detector, Levels};
 use crate::error::{Error, Fault, Place, Result};
-use crate::frame::{Ending, Frame, FrameSource};
+use crate::frame::{Ending, FrameSource};
+use crate::source::cores;
 use crate::store::{DetectionStore, FrameStamp};
 use crate::table::SourceFacts;
 
+/// How long to wait for frames before looking whether the user wants to stop.
+const PATIENCE: Duration = Duration::from_millis(50);
+
 /// A detector for each thread. Each keeps its scratch memory; none remembers a frame.
 pub struct Detectors {
-    pool: ThreadPool,
-    each: Vec<Mutex<Detector>>,
+    each: Vec<Detector>,
     recording: String,
 }
 
@@ -31,38 +36,74 @@ impl Detectors {
         settings: &DetectSettings,
         facts: &SourceFacts,
     ) -> Result<Self> {
-        let pool = ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .thread_name(|i| format!("detect-{i}"))
-            .build()
-            .map_err(|e| Error::Argument(Fault::new("threads", e.to_string()).advice("Ask for fewer")))?;
-        let each = (0..pool.current_num_threads())
-            .map(|_| Detector::new(Arc::clone(levels), settings).map(Mutex::new))
+        let each = (0..cores(threads))
+            .map(|_| Detector::new(Arc::clone(levels), settings))
             .collect::<Result<_>>()?;
-        Ok(Self { pool, each, recording: facts.name.clone() })
-    }
-
-    /// Detects in each frame of a batch.
-    fn run(&self, batch: &[Frame], found: &mut [Found]) {
-        self.pool.install(|| {
-            batch.par_iter().with_max_len(1).zip(found.par_iter_mut()).for_each(|(frame, found)| {
-                let i = rayon::current_thread_index().unwrap_or(0);
-                let mut detector = self.each[i].lock().unwrap_or_else(PoisonError::into_inner);
-                found.outcome = match frame.plane {
-                    Some(_) => detector.detect(frame, &mut found.detections),
-                    None => {
-                        found.detections.clear();
-                        Ok(())
-                    }
-                };
-            });
-        });
+        Ok(Self { each, recording: facts.name.clone() })
     }
 }
 
+/// What was found in a batch.
+#[derive(Default)]
 struct Found {
-    detections: Vec<Detection>,
-    outcome: Result<()>,
+    first: usize,
+    stamps: Vec<FrameStamp>,
+    /// For each frame; there may be more from an earlier use.
+    detections: Vec<Vec<Detection>>,
+    /// The frames before it are good.
+    error: Option<Error>,
+}
+
+/// Detects in batches until there are no more, or nobody wants them. Frames before `known` are only looked at.
+struct Worker<'a> {
+    detector: &'a mut Detector,
+    known: usize,
+    batches: Receiver<Batch>,
+    found: Sender<Found>,
+    /// Buffers that are free again.
+    spare: Receiver<Found>,
+    stop: &'a AtomicBool,
+}
+
+impl Worker<'_> {
+    fn run(self) {
+        while !self.stop.load(Ordering::Relaxed) {
+            let batch = match self.batches.recv_timeout(PATIENCE) {
+                Ok(batch) => batch,
+                Err(RecvTimeoutError::Timeout) => continue,
+                Err(RecvTimeoutError::Disconnected) => return,
+            };
+            let mut found = self.spare.try_recv().unwrap_or_default();
+            Self::detect(self.detector, self.known, batch, &mut found);
+            if self.found.send(found).is_err() {
+                return;
+            }
+        }
+    }
+
+    fn detect(detector: &mut Detector, known: usize, batch: Batch, found: &mut Found) {
+        found.first = batch.first;
+        found.error = None;
+        found.stamps.clear();
+        found.detections.resize_with(batch.frames.len().max(found.detections.len()), Vec::new);
+        // Each frame is given back to the source as soon as it has been looked at.
+        for (i, frame) in batch.frames.into_iter().enumerate() {
+            found.stamps.push(FrameStamp {
+                index: frame.index,
+                ticks: frame.ticks,
+                decoded: frame.plane.is_some(),
+            });
+            found.detections[i].clear();
+            if frame.plane.is_some()
+                && batch.first + i >= known
+                && let Err(error) = detector.detect(&frame, &mut found.detections[i])
+            {
+                found.error = Some(error);
+                found.stamps.pop();
+                return;
+            }
+        }
+    }
 }
 
 /// Reads a recording through and stores what is detected. Frames that the store holds already are compared with
@@ -74,80 +115,119 @@ struct Found {
 pub fn detect_all(
     source: Box<dyn FrameSource>,
     frames: Range<u64>,
-    detectors: &Detectors,
+    detectors: &mut Detectors,
     store: &mut DetectionStore,
     observer: &mut dyn Observer,
 ) -> Result<Option<Ending>> {
-    let ahead = Ahead::start(source, frames, detectors.each.len())?;
-    let mut found: Vec<Found> = Vec::new();
-    let (mut done, mut newest) = (0usize, None);
-    loop {
-        if observer.interrupted() {
-            ahead.leave();
-            return Ok(None);
+    let ahead = Ahead::start(source, frames)?;
+    let known = store.len();
+    let stop = AtomicBool::new(false);
+    let (sender, receiver) = bounded(4 * detectors.each.len());
+    let (give_back, spare) = bounded(4 * detectors.each.len());
+    let mut inbox = Inbox { known, done: 0, newest: None, recording: &detectors.recording, store };
+    let complete = std::thread::scope(|scope| {
+        for (i, detector) in detectors.each.iter_mut().enumerate() {
+            let worker = Worker {
+                detector,
+                known,
+                batches: ahead.batches().clone(),
+                found: sender.clone(),
+                spare: spare.clone(),
+                stop: &stop,
+            };
+            let started =
+                std::thread::Builder::new().name(format!("detect-{i}")).spawn_scoped(scope, || worker.run());
+            if let Err(e) = started {
+                stop.store(true, Ordering::Relaxed);
+                return Err(Error::Argument(
+                    Fault::new("threads", format!("thread {i} could not be started ({e})"))
+                        .advice("Ask for fewer"),
+                ));
+            }
         }
-        let batch = match ahead.next() {
-            Next::Batch(batch) => batch,
-            Next::Waiting => continue,
-            Next::End => return ahead.ending().map(Some),
-        };
-        if let Err(error) = take(&batch, &mut done, &mut newest, &mut found, detectors, store) {
+        drop(sender);
+        let complete = inbox.fill(receiver, &give_back, observer);
+        stop.store(true, Ordering::Relaxed);
+        complete
+    });
+    match complete {
+        Ok(true) => ahead.ending().map(Some),
+        Ok(false) => {
             ahead.leave();
-            return Err(error);
+            Ok(None)
         }
-        observer.progress(done as u64);
+        Err(error) => {
+            ahead.leave();
+            Err(error)
+        }
     }
 }
 
-fn take(
-    batch: &[Frame],
-    done: &mut usize,
-    newest: &mut Option<(u64, i64)>,
-    found: &mut Vec<Found>,
-    detectors: &Detectors,
-    store: &mut DetectionStore,
-) -> Result<()> {
-    let known = store.len().saturating_sub(*done).min(batch.len());
-    for frame in batch {
-        forward(frame, newest, &detectors.recording)?;
-    }
-    for frame in &batch[..known] {
-        if store.stamp(*done) != stamp(frame) {
-            return Err(Error::Source(
-                Fault::new(&detectors.recording, "the recording is not the one that the earlier run read")
-                    .at(Place::Frame(frame.index))
-                    .advice("Begin anew with --force"),
-            ));
-        }
-        *done += 1;
-    }
-    store.check()?;
-    let batch = &batch[known..];
-    found.resize_with(batch.len().max(found.len()), || Found { detections: Vec::new(), outcome: Ok(()) });
-    detectors.run(batch, &mut found[..batch.len()]);
-    for (frame, found) in batch.iter().zip(found) {
-        std::mem::replace(&mut found.outcome, Ok(()))?;
-        store.push(stamp(frame), &found.detections)?;
-        *done += 1;
-    }
-    Ok(())
+/// Puts what the threads found into the store, in order.
+struct Inbox<'a> {
+    known: usize,
+    done: usize,
+    newest: Option<(u64, i64)>,
+    recording: &'a str,
+    store: &'a mut DetectionStore,
 }
 
-fn stamp(frame: &Frame) -> FrameStamp {
-    FrameStamp { index: frame.index, ticks: frame.ticks, decoded: frame.plane.is_some() }
+impl Inbox<'_> {
+    /// Takes all there is. Whether the recording was read through; else the observer asked to stop.
+    fn fill(
+        &mut self,
+        receiver: Receiver<Found>,
+        give_back: &Sender<Found>,
+        observer: &mut dyn Observer,
+    ) -> Result<bool> {
+        let mut early: BTreeMap<usize, Found> = BTreeMap::new();
+        loop {
+            if observer.interrupted() {
+                return Ok(false);
+            }
+            match receiver.recv_timeout(PATIENCE) {
+                Ok(found) => drop(early.insert(found.first, found)),
+                Err(RecvTimeoutError::Timeout) => continue,
+                Err(RecvTimeoutError::Disconnected) => return Ok(true),
+            }
+            early.extend(receiver.try_iter().map(|found| (found.first, found)));
+            while let Some(found) = early.remove(&self.done) {
+                self.take(found).map(|found| drop(give_back.try_send(found)))?;
+            }
+            observer.progress(self.done as u64);
+        }
+    }
+
+    fn take(&mut self, mut found: Found) -> Result<Found> {
+        for (stamp, detections) in found.stamps.iter().zip(&found.detections) {
+            forward(stamp, &mut self.newest, self.recording)?;
+            if self.done >= self.known {
+                self.store.push(*stamp, detections)?;
+            } else if self.store.stamp(self.done) != *stamp {
+                return Err(Error::Source(
+                    Fault::new(self.recording, "the recording is not the one that the earlier run read")
+                        .at(Place::Frame(stamp.index))
+                        .advice("Begin anew with --force"),
+                ));
+            }
+            self.done += 1;
+        }
+        self.store.check()?;
+        found.error.take().map_or(Ok(found), Err)
+    }
 }
 
 /// Index and time must grow: a table whose time stands still is worth nothing.
-fn forward(frame: &Frame, newest: &mut Option<(u64, i64)>, recording: &str) -> Result<()> {
+fn forward(stamp: &FrameStamp, newest: &mut Option<(u64, i64)>, recording: &str) -> Result<()> {
     if let Some((index, ticks)) = *newest
-        && (frame.index <= index || frame.ticks <= ticks)
+        && (stamp.index <= index || stamp.ticks <= ticks)
     {
         return Err(Error::Source(
-            Fault::new(recording, format!("tick {} comes after tick {ticks} of frame {index}", frame.ticks))
-                .at(Place::Frame(frame.index))
+            Fault::new(recording, format!("tick {} comes after tick {ticks} of frame {index}", stamp.ticks))
+                .at(Place::Frame(stamp.index))
                 .advice("Give the rate with --fps, which replaces the time stamps"),
         ));
     }
-    *newest = Some((frame.index, frame.ticks));
+    *newest = Some((stamp.index, stamp.ticks));
     Ok(())
 }

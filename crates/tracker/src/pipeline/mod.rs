@@ -256,7 +256,7 @@ impl<'a> Run<'a> {
         }
         observer.stage(Stage::Learn, None);
         let (source, samples) = opening::sample(source, SAMPLES, observer)?;
-        let levels = Levels::learn(&samples, &detect)?;
+        let levels = opening::learn(&samples, &detect, settings.threads)?;
         drop(samples);
         if observer.interrupted() {
             return Err(Error::Interrupted);
@@ -282,9 +282,9 @@ impl<'a> Run<'a> {
         let frames = self.settings.frames.clone().unwrap_or(0..u64::MAX);
         let total = self.facts.declared_frames.map(|n| n.min(frames.end).saturating_sub(frames.start));
         observer.stage(Stage::Detect, total);
-        let detectors =
+        let mut detectors =
             detecting::Detectors::new(self.settings.threads, &self.levels, &self.detect, &self.facts)?;
-        let outcome = detecting::detect_all(source, frames, &detectors, &mut self.store, observer);
+        let outcome = detecting::detect_all(source, frames, &mut detectors, &mut self.store, observer);
         let ending = match outcome {
             Ok(ending) => ending,
             Err(error) => {

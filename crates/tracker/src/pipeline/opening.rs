@@ -5,11 +5,13 @@
 use std::time::Duration;
 
 use crossbeam_channel::{RecvTimeoutError, bounded};
+use rayon::ThreadPoolBuilder;
 
 use super::Observer;
+use crate::detect::{DetectSettings, Levels};
 use crate::error::{Error, Fault, Result};
 use crate::frame::{Frame, FrameSource};
-use crate::source::{self, OpenOptions};
+use crate::source::{self, OpenOptions, cores};
 
 /// How long to wait before looking whether the user wants to stop.
 const PATIENCE: Duration = Duration::from_millis(50);
@@ -30,6 +32,15 @@ pub(super) fn sample(
     observer: &mut dyn Observer,
 ) -> Result<(Box<dyn FrameSource>, Vec<Frame>)> {
     watched(observer, move || source.sample(count).map(|frames| (source, frames)))
+}
+
+/// What detection needs to know, learned on `threads` threads; 0 is one for each core.
+pub(super) fn learn(samples: &[Frame], settings: &DetectSettings, threads: usize) -> Result<Levels> {
+    let pool = ThreadPoolBuilder::new()
+        .num_threads(cores(threads))
+        .build()
+        .map_err(|e| Error::Argument(Fault::new("threads", e.to_string()).advice("Ask for fewer")))?;
+    pool.install(|| Levels::learn(samples, settings))
 }
 
 /// Does what may wait for bytes that never come on a thread of its own, which is then left to the end of the program.

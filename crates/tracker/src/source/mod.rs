@@ -16,6 +16,7 @@ use std::io::Read;
 use std::path::Path;
 
 use crate::error::{Error, Fault, Result};
+pub(crate) use options::cores;
 pub use options::{Decoder, OpenOptions};
 
 pub use crate::frame::{Ending, FrameSource, SourceInfo};

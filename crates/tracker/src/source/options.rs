@@ -25,3 +25,11 @@ pub struct OpenOptions {
     /// Decoding threads; 0 is one for each core.
     pub threads: usize,
 }
+
+/// How many threads `threads` stands for: 0 is one for each core.
+pub(crate) fn cores(threads: usize) -> usize {
+    match threads {
+        0 => std::thread::available_parallelism().map_or(1, usize::from),
+        n => n,
+    }
+}

@@ -9,6 +9,7 @@ use ffmpeg_next::ffi;
 use super::demux::{Demuxer, Packet};
 use super::{codec_name, message};
 use crate::error::{Error, Fault, Result};
+use crate::source::cores;
 
 /// Codecs whose decoders keep silent about damage.
 const STRICT: [ffi::AVCodecID; 3] =
@@ -56,7 +57,8 @@ impl Decoder {
         let code = unsafe {
             let code = ffi::avcodec_parameters_to_context(context, parameters);
             (*context).pkt_timebase = demuxer.stream().time_base;
-            (*context).thread_count = i32::try_from(threads).unwrap_or(0);
+            // Left to itself, FFmpeg takes a thread more than there are cores, which is slower on two of them.
+            (*context).thread_count = i32::try_from(cores(threads)).unwrap_or(1);
             (*context).thread_type = ffi::FF_THREAD_FRAME | ffi::FF_THREAD_SLICE;
             // Some decoders pass over damage in silence unless they are told to stop at it; others say of a
             // picture that it is damaged, and stop at trifles if they are told so.

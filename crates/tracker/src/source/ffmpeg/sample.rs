@@ -4,61 +4,68 @@ use std::sync::Arc;
 
 use ffmpeg_next::ffi;
 
-use super::decode::{Decoder, Received};
+use super::decode::{Decoder, Picture, Received};
 use super::demux::{Demuxer, Packet, Read};
+use super::layout::{Layout, Orientation};
 use super::{FfmpegSource, Shared};
 use crate::error::{Error, Fault, Result};
-use crate::frame::Frame;
+use crate::frame::{Frame, SourceInfo};
+use crate::source::cores;
 
 /// Most bytes of a pipe's first frames that are kept to be handed out again.
 const PIPE_BYTES: usize = 64 << 20;
+/// Of the frames after a key frame, every how manieth is taken.
+const STRIDE: usize = 4;
 
 impl FfmpegSource {
-    /// Opens the file a second time and decodes at places spread by time. Key frames are taken; where there are
-    /// fewer than `count`, frames that follow them too.
+    /// Opens the file again, once for each thread, and decodes at places spread by time. Key frames are taken;
+    /// where there are fewer than `count`, frames that follow them too.
     pub(super) fn sample_file(&mut self, count: usize) -> Result<Vec<Frame>> {
-        let mut sampler = Sampler {
-            source: self,
-            demuxer: Demuxer::open(&self.url, &self.info.name, self.protocols)?,
-            decoder: Decoder::open(&self.demuxer, &self.info.name, self.threads)?,
-            packet: Packet::new(&self.info.name)?,
-            keys: Vec::new(),
-            frames: Vec::new(),
+        let mut demuxer = Demuxer::open(&self.url, &self.info.name, self.protocols)?;
+        let places = places(&mut demuxer, &self.info.name, count)?;
+        let keys = places.iter().filter(|p| p.key).count();
+        let each = (count - keys.min(count)).div_ceil(places.len());
+        let threads = cores(self.threads);
+        let part = places.len().div_ceil(threads);
+        let from = From {
+            url: &self.url,
+            protocols: self.protocols,
+            info: &self.info,
+            layout: &self.layout,
+            orientation: self.orientation,
+            threads: threads.div_ceil(places.len().div_ceil(part)),
         };
-        let duration = sampler.demuxer.duration();
-        let start = match sampler.demuxer.stream().start_time {
-            ffi::AV_NOPTS_VALUE => 0,
-            t => t,
-        };
-        if let Some(duration) = duration {
-            for i in 0..count as i64 {
-                let at = start.saturating_add((i128::from(duration) * i128::from(i) / count as i128) as i64);
-                if !sampler.demuxer.seek(at) {
-                    break;
+        let found: Vec<Result<Vec<Taken>>> = std::thread::scope(|scope| {
+            let mut demuxer = Some(demuxer);
+            let samplers: Vec<_> = places
+                .chunks(part)
+                .map(|places| {
+                    let (from, demuxer) = (&from, demuxer.take());
+                    scope.spawn(move || Sampler::open(from, demuxer)?.take(places, each))
+                })
+                .collect();
+            let failed =
+                || Error::Source(Fault::new(&self.info.name, "the decoder failed; please report this"));
+            samplers.into_iter().map(|s| s.join().unwrap_or_else(|_| Err(failed()))).collect()
+        });
+        let (mut frames, mut later) = (Vec::new(), Vec::new());
+        let mut seen = Vec::new();
+        for taken in found {
+            for taken in taken? {
+                if let Some(key) = taken.key
+                    && !seen.contains(&key.ticks)
+                {
+                    seen.push(key.ticks);
+                    frames.push(key);
                 }
-                sampler.decoder.flush();
-                sampler.take(1, 1)?;
+                later.extend(taken.later);
             }
         }
-        if sampler.frames.len() < count {
-            // Few key frames: from each of them some way on, taking every few.
-            let keys = if sampler.keys.is_empty() { vec![start] } else { sampler.keys.clone() };
-            let wanted = (count - sampler.frames.len()).div_ceil(keys.len());
-            for key in &keys {
-                if sampler.frames.len() >= count {
-                    break;
-                }
-                if sampler.demuxer.seek(*key) {
-                    sampler.decoder.flush();
-                } else {
-                    sampler.demuxer = Demuxer::open(&self.url, &self.info.name, self.protocols)?;
-                    sampler.decoder = Decoder::open(&self.demuxer, &self.info.name, self.threads)?;
-                }
-                let left = count - sampler.frames.len();
-                sampler.take(wanted.min(left), 4)?;
-            }
+        frames.extend(later);
+        frames.truncate(count);
+        for (i, frame) in frames.iter_mut().enumerate() {
+            frame.index = i as u64;
         }
-        let frames = sampler.frames;
         if frames.is_empty() {
             return Err(Error::Source(
                 Fault::new(&self.info.name, "no frame can be decoded")
@@ -86,61 +93,115 @@ impl FfmpegSource {
     }
 }
 
+/// Somewhere to decode from.
+struct Place {
+    ticks: i64,
+    /// Whether seeking there gave a packet; else it is the file's beginning.
+    key: bool,
+}
+
+/// Where to decode: the key frames before `count` moments spread evenly, each once.
+fn places(demuxer: &mut Demuxer, name: &str, count: usize) -> Result<Vec<Place>> {
+    let start = match demuxer.stream().start_time {
+        ffi::AV_NOPTS_VALUE => 0,
+        t => t,
+    };
+    let mut packet = Packet::new(name)?;
+    let (mut places, mut packets) = (Vec::new(), Vec::new());
+    if let Some(duration) = demuxer.duration() {
+        for i in 0..count as i64 {
+            let ticks = start.saturating_add((i128::from(duration) * i128::from(i) / count as i128) as i64);
+            if !demuxer.seek(ticks) {
+                break;
+            }
+            if let Read::Packet = demuxer.read(&mut packet) {
+                let fields = packet.get();
+                let identity = (fields.pts, fields.dts, fields.pos);
+                if !packets.contains(&identity) {
+                    packets.push(identity);
+                    places.push(Place { ticks, key: true });
+                }
+            }
+        }
+    }
+    if places.is_empty() {
+        places.push(Place { ticks: start, key: false });
+    }
+    Ok(places)
+}
+
+/// What samplers share.
+struct From<'a> {
+    url: &'a str,
+    protocols: Option<&'static str>,
+    info: &'a SourceInfo,
+    layout: &'a Layout,
+    orientation: Orientation,
+    threads: usize,
+}
+
+/// What was decoded at a place.
+#[derive(Default)]
+struct Taken {
+    /// The first frame there, if the place is a key frame.
+    key: Option<Frame>,
+    /// Every few of those that follow.
+    later: Vec<Frame>,
+}
+
 struct Sampler<'a> {
-    source: &'a FfmpegSource,
+    from: &'a From<'a>,
     demuxer: Demuxer,
     decoder: Decoder,
     packet: Packet,
-    /// Display times of the first frames after each seek, to see when a key frame comes again.
-    keys: Vec<i64>,
-    frames: Vec<Frame>,
 }
 
-impl Sampler<'_> {
-    /// Decodes from here and keeps every `stride`-th frame until `wanted` are kept or the stream ends. With a
-    /// stride of 1 the first frame is a key frame, kept if it is new.
-    fn take(&mut self, wanted: usize, stride: usize) -> Result<()> {
-        let (mut seen, mut kept, mut draining, mut failures) = (0usize, 0usize, false, 0usize);
-        while kept < wanted && failures < 64 {
+impl<'a> Sampler<'a> {
+    fn open(from: &'a From<'a>, demuxer: Option<Demuxer>) -> Result<Self> {
+        let name = &from.info.name;
+        let demuxer = match demuxer {
+            Some(demuxer) => demuxer,
+            None => Demuxer::open(from.url, name, from.protocols)?,
+        };
+        let decoder = Decoder::open(&demuxer, name, from.threads)?;
+        Ok(Self { from, demuxer, decoder, packet: Packet::new(name)? })
+    }
+
+    /// Decodes at each place the frame there and `each` that follow.
+    fn take(mut self, places: &[Place], each: usize) -> Result<Vec<Taken>> {
+        let mut all = Vec::new();
+        for place in places {
+            if self.demuxer.seek(place.ticks) {
+                self.decoder.flush();
+            } else {
+                self = Self::open(self.from, None)?;
+            }
+            all.push(self.take_here(place.key, each)?);
+        }
+        Ok(all)
+    }
+
+    /// Decodes from here and keeps the first frame, if it is wanted, and every [`STRIDE`]-th until `each` of them
+    /// are kept or the stream ends.
+    fn take_here(&mut self, key: bool, each: usize) -> Result<Taken> {
+        let mut taken = Taken::default();
+        let (mut seen, mut draining, mut failures) = (0usize, false, 0usize);
+        while (key && taken.key.is_none() || taken.later.len() < each) && failures < 64 {
             match self.decoder.receive()? {
                 Received::Picture(picture) => {
-                    let time = picture.get().best_effort_timestamp;
                     seen += 1;
-                    if stride == 1 {
-                        if self.keys.contains(&time) {
-                            return Ok(());
-                        }
-                        self.keys.push(time);
-                    } else if seen % stride != 0 {
+                    let first = key && taken.key.is_none();
+                    if !first && !seen.is_multiple_of(STRIDE) {
                         continue;
                     }
-                    let info = &self.source.info;
-                    if picture.is_damaged() || !self.source.layout.is_of(&picture) {
-                        failures += 1;
-                        continue;
-                    }
-                    let (w, h) = (picture.get().width.unsigned_abs(), picture.get().height.unsigned_abs());
-                    let orientation = self.source.orientation;
-                    if orientation.size(w, h) != (info.width, info.height) {
-                        failures += 1;
-                        continue;
-                    }
-                    if let Some((plane, row)) = self.source.layout.plane(picture, orientation) {
-                        self.frames.push(Frame {
-                            index: self.frames.len() as u64,
-                            ticks: time,
-                            width: info.width,
-                            height: info.height,
-                            stride: row,
-                            format: info.format,
-                            depth_bits: info.depth_bits,
-                            plane: Some(plane),
-                        });
-                        kept += 1;
+                    match self.frame(picture) {
+                        Some(frame) if first => taken.key = Some(frame),
+                        Some(frame) => taken.later.push(frame),
+                        None => failures += 1,
                     }
                 }
-                Received::Hungry if draining => return Ok(()),
-                Received::End => return Ok(()),
+                Received::Hungry if draining => break,
+                Received::End => break,
                 Received::Damaged => failures += 1,
                 Received::Hungry => match self.demuxer.read(&mut self.packet) {
                     Read::Packet => {
@@ -155,6 +216,30 @@ impl Sampler<'_> {
                 },
             }
         }
-        Ok(())
+        Ok(taken)
+    }
+
+    /// The picture as a frame; `None` if it is damaged or not like the others.
+    fn frame(&self, picture: Picture) -> Option<Frame> {
+        let From { info, layout, orientation, .. } = self.from;
+        let (w, h) = (picture.get().width.unsigned_abs(), picture.get().height.unsigned_abs());
+        if picture.is_damaged()
+            || !layout.is_of(&picture)
+            || orientation.size(w, h) != (info.width, info.height)
+        {
+            return None;
+        }
+        let ticks = picture.get().best_effort_timestamp;
+        let (plane, stride) = layout.plane(picture, *orientation)?;
+        Some(Frame {
+            index: 0,
+            ticks,
+            width: info.width,
+            height: info.height,
+            stride,
+            format: info.format,
+            depth_bits: info.depth_bits,
+            plane: Some(plane),
+        })
     }
 }
