@@ -11,7 +11,7 @@ import pytest
 from pydpend import energy
 from pydpend.angles import LinkAngles
 from pydpend.damping import DampingFit, Maps, compare_terms, fit_damping, single
-from pydpend.damping.trajectory import prepare
+from pydpend.damping.recording import prepare
 from pydpend.energy import Motion
 from pydpend.errors import FitError
 from pydpend.model import Damping, derived

@@ -1,4 +1,5 @@
-"""The issue's table of accuracies over seeds held back (0-19): ``python -m tests.validate_damping CASE [SEEDS]``.
+"""The issue's table of accuracies over seeds held back (0-19):
+``python -m tests.validate_damping CASE [SEEDS [FIRST]]``.
 
 Cases: exact, energy, inertias (true inertias), ratios (inertias up to 2 % off), slow (500 fps, 0.1 deg), all (every
 law), added (the paper's laws alone, fitted with every law), none (mu_q2 is zero); speed (wall and processor time,
@@ -55,7 +56,7 @@ def shares_off(result: DampingFit, motion: energy.Motion, truth: Damping) -> flo
     return 100 * float(np.abs(off).max())
 
 
-def main(case: str, seeds: int) -> None:
+def main(case: str, seeds: int, first: int) -> None:
     """Runs one case and prints."""
     if case == "speed":
         speed()
@@ -64,7 +65,7 @@ def main(case: str, seeds: int) -> None:
     truth = {"all": ALL_TERMS, "none": replace(TRUTH, mu_q2=0.0)}.get(case, TRUTH)
     inside, z, worst, ratio_ppm, chi2, points, converged = [], [], [], [], [], [], []
     z_zero: list[float] = []
-    for seed in range(seeds):
+    for seed in range(first, first + seeds):
         motion = released(seed, 60.0, 500.0 if case == "slow" else 1000.0, truth)
         if case == "exact":
             fit = energy.fit_profiles([energy.energy_profile(motion, true, "paper")])
@@ -113,10 +114,13 @@ def main(case: str, seeds: int) -> None:
         print(
             f"{case}: {sum(converged)} of {seeds} converged, chi-square {min(chi2):.3f}-{max(chi2):.3f}, worst "
             f"{max(np.abs(worst)):.2f} %, ratios {max(ratio_ppm):.1f} ppm, largest |z| "
-            f"{np.abs(z).max():.2f}, 95 % intervals hold {100 * np.mean(inside):.1f} % of {len(z)}"
+            f"{np.abs(z).max():.2f}, RMS {np.sqrt(np.mean(np.square(z))):.2f}, "
+            f"95 % intervals hold {100 * np.mean(inside):.1f} % of {len(z)}"
         )
     if case == "energy":
-        print(f"energy: shares within {max(points):.2f} points")
+        print(
+            f"energy: shares within {max(points):.3f} points, RMS {np.sqrt(np.mean(np.square(points))):.3f}"
+        )
     if z_zero:
         print(
             f"{case}: what is zero comes back within {max(z_zero):.2f} standard errors, {len(z_zero)} times"
@@ -124,4 +128,5 @@ def main(case: str, seeds: int) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], int(sys.argv[2]) if len(sys.argv) > 2 else 20)
+    counts = [int(a) for a in sys.argv[2:]]
+    main(sys.argv[1], *counts, *(20, 0)[len(counts) :])

@@ -166,7 +166,7 @@ pub fn dissipation<S: Real>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fixture::all_terms as pendulum;
+    use crate::fixture::all_terms;
 
     const SLIPS: [[Contact; 2]; 4] = [
         [Contact::Slip(1.0), Contact::Slip(-1.0)],
@@ -174,6 +174,14 @@ mod tests {
         [Contact::Slip(-1.0), Contact::Stuck],
         [Contact::Stuck, Contact::Slip(1.0)],
     ];
+
+    /// Every term, and friction large enough that its implicitness matters in the first digit.
+    fn heavy_friction() -> Parameters<f64> {
+        let mut p = all_terms();
+        p.set(Field::Rmu1, 4e-3);
+        p.set(Field::Rmu2, 2e-3);
+        p
+    }
 
     /// A state that the contact allows: a stuck joint does not move.
     fn state(contact: [Contact; 2]) -> State<f64> {
@@ -189,7 +197,7 @@ mod tests {
 
     #[test]
     fn power_balances_in_every_contact() {
-        let p = pendulum();
+        let p = all_terms();
         for contact in SLIPS {
             let x = state(contact);
             let motion = accelerations(&p, &x, contact);
@@ -207,10 +215,7 @@ mod tests {
 
     #[test]
     fn derivatives_pass_through_the_implicit_normal_forces() {
-        let mut p = pendulum();
-        // friction large enough that its implicitness matters in the first digit
-        p.set(Field::Rmu1, 4e-3);
-        p.set(Field::Rmu2, 2e-3);
+        let p = heavy_friction();
         for contact in SLIPS {
             let x = state(contact);
             let loads =
@@ -251,9 +256,7 @@ mod tests {
     /// The two ways to the derivatives are written apart; they must agree to rounding.
     #[test]
     fn the_chain_rule_gives_the_same_derivatives() {
-        let mut p = pendulum();
-        p.set(Field::Rmu1, 4e-3);
-        p.set(Field::Rmu2, 2e-3);
+        let p = heavy_friction();
         const N: usize = 4 + Field::COUNT;
         let mut dual: Parameters<Dual<N>> = p.lift();
         for (i, field) in Field::ALL.into_iter().enumerate() {
@@ -276,7 +279,7 @@ mod tests {
 
     #[test]
     fn a_stuck_joint_stays_and_its_torque_is_the_missing_one() {
-        let p = pendulum();
+        let p = all_terms();
         for contact in
             [[Contact::Stuck, Contact::Slip(1.0)], [Contact::Slip(1.0), Contact::Stuck], [Contact::Stuck; 2]]
         {
@@ -302,7 +305,7 @@ mod tests {
 
     #[test]
     fn strip_drag_with_the_elbow_at_rest_is_its_coefficient() {
-        let mut p = Parameters::zero(pendulum().fixed);
+        let mut p = Parameters::zero(all_terms().fixed);
         p.set(Field::StripDrag, 2.5e-6);
         let row = TERMS.iter().find(|t| t.field == Field::StripDrag).copied();
         let row = row.ok_or("no row").unwrap_or(TERMS[0]);

@@ -175,12 +175,8 @@ pub fn simulate(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fixture::{self, damped};
+    use crate::fixture::{damped, pendulum};
     use crate::parameters::Field;
-
-    fn pendulum(with_damping: bool) -> Parameters<f64> {
-        if with_damping { damped() } else { fixture::pendulum() }
-    }
 
     fn drop() -> State<f64> {
         [181f64.to_radians(), 181f64.to_radians(), 0.0, 0.0]
@@ -200,7 +196,7 @@ mod tests {
 
     #[test]
     fn energy_balances_over_a_minute_of_stick_and_slip() {
-        let p = pendulum(true);
+        let p = damped();
         let run = simulate(&p, drop(), &times(60), &Settings::default()).unwrap();
         assert!(balance(&run) < 1e-9, "{}", balance(&run));
         assert!(run.events.iter().any(|e| e.to == Contact::Stuck));
@@ -214,13 +210,13 @@ mod tests {
 
     #[test]
     fn energy_is_kept_without_damping() {
-        let run = simulate(&pendulum(false), drop(), &times(60), &Settings::default()).unwrap();
+        let run = simulate(&pendulum(), drop(), &times(60), &Settings::default()).unwrap();
         assert!(balance(&run) < 1e-10, "{}", balance(&run));
     }
 
     #[test]
     fn a_mirrored_start_gives_exactly_the_mirrored_motion() {
-        let p = pendulum(true);
+        let p = damped();
         let x = [2.9, -1.3, 0.4, 5.0];
         let one = simulate(&p, x, &times(5), &Settings::default()).unwrap();
         let other = simulate(&p, x.map(|v: f64| -v), &times(5), &Settings::default()).unwrap();
@@ -232,7 +228,7 @@ mod tests {
 
     #[test]
     fn without_gravity_and_damping_angular_momentum_is_kept() {
-        let mut p = pendulum(false);
+        let mut p = pendulum();
         p.set(Field::Sigma, 0.0);
         p.set(Field::Kappa, 0.0);
         p.fixed.g_m_s2 = 0.0;
@@ -250,7 +246,7 @@ mod tests {
 
     #[test]
     fn a_pinned_joint_makes_a_single_pendulum() {
-        let mut p = pendulum(true);
+        let mut p = damped();
         for field in [Field::MuV1, Field::MuQ1, Field::Rmu1, Field::TauC1, Field::StripDrag] {
             p.set(field, 0.0);
         }
@@ -266,7 +262,7 @@ mod tests {
 
     #[test]
     fn bad_input_is_named() {
-        let p = pendulum(true);
+        let p = damped();
         let ask = |x: State<f64>, t: &[f64], settings: &Settings| {
             simulate(&p, x, t, settings).unwrap_err().to_string()
         };

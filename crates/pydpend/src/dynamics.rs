@@ -213,6 +213,9 @@ pub fn shooting_fit<'py>(
     out.set_item("states", rows(py, &fit.point.states)?)?;
     let n = fit.gradient.len();
     out.set_item("information", matrix(py, fit.information.as_slice(), n)?)?;
+    out.set_item("angle_information", matrix(py, fit.angle_information.as_slice(), n)?)?;
+    out.set_item("jump_information", matrix(py, fit.jump_information.as_slice(), n)?)?;
+    out.set_item("jumps_shown", fit.jumps_shown)?;
     out.set_item("gradient", fit.gradient.as_slice().to_pyarray(py))?;
     let (k, g) = fit.scores.shape();
     // nalgebra stores columns; the transpose's storage is the rows of the matrix.

@@ -9,18 +9,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pydpend.angles import LinkAngles
-from pydpend.coefficients import JOINT_OF, PAPER, coefficients, parameters, ratios_of, unit
+from pydpend.coefficients import JOINT_OF, PAPER, RATIOS, coefficients, parameters, ratios_of
 from pydpend.damping import shooting
 from pydpend.damping.compare import compare_terms
 from pydpend.damping.plausible import modes_hz
 from pydpend.damping.prediction import held_out
 from pydpend.damping.profile import fit_energy
-from pydpend.damping.result import DampingFit, EnergyCurve, Estimate
+from pydpend.damping.recording import Recording, prepare
+from pydpend.damping.result import DampingFit, EnergyCurve, estimates
 from pydpend.damping.shares import shares
 from pydpend.damping.shooting import Progress
 from pydpend.damping.single import reduced
 from pydpend.damping.ten import fit_ten
-from pydpend.damping.trajectory import Recording, fit_trajectory, plausible_or_raise, prepare
+from pydpend.damping.trajectory import fit_trajectory, plausible_or_raise
 from pydpend.damping.uncertainty import identifiability
 from pydpend.errors import FitError, fault
 from pydpend.model import Model
@@ -137,16 +138,11 @@ def _energy(
     tracks = [r.track for r in recordings]
     fit, few, profiles, smoothed = fit_energy(tracks, [r.span for r in recordings], model, names, progress)
     values = dict(zip(names, fit.values.tolist(), strict=True))
-    sigma = np.sqrt(np.diag(fit.covariance))
+    sigma = dict(zip(names, np.sqrt(np.diag(fit.covariance)).tolist(), strict=True))
+    constants = parameters(model) | values
     works = np.sum([p.unit_works[-1] for p in profiles], axis=0)
-    path = shooting.trace(tracks, smoothed.segments, parameters(model) | values)
+    path = shooting.trace(tracks, smoothed.segments, constants)
     freed = fit_ten(tracks, path, few, fit, model) if ten else None
-    ratios = {
-        "lambda": model.lambda_kg_m2,
-        "sigma": model.sigma_j,
-        "kappa": model.kappa_j,
-        "a3": model.a3_kg_m2,
-    }
     curves = tuple(
         EnergyCurve(p.t_s, p.energy_j, e0 - p.unit_works @ fit.values, p.unit_works * fit.values)
         for p, e0 in zip(profiles, fit.e0_j, strict=True)
@@ -160,37 +156,27 @@ def _energy(
         f"{fit.chi2:.3f}; RMS misfit {1e6 * np.sqrt(np.mean(fit.residual_j**2)):.3g} uJ",
         chi2=fit.chi2,
         n=int(fit.residual_j.size),
-        coefficients={n: Estimate(values[n], float(s), unit(n)) for n, s in zip(names, sigma, strict=True)},
-        ratios={
-            n: Estimate(ratios[n] / model.psi_kg_m2, 0.0, unit(n))
-            for n in ratios_of(recordings[0].angles.links)
-        },
+        coefficients=estimates(names, values, sigma),
+        ratios=estimates(
+            ratios_of(recordings[0].angles.links), {n: constants[n] / model.psi_kg_m2 for n in RATIOS}, {}
+        ),
         shares=shares(names, values, fit.covariance, works),
         identifiability=identifiability(
             names, fit.covariance, values, [n for n in names if values[n] <= 0], duration
         ),
         modes_hz=modes_hz(model)[: recordings[0].angles.links],
-        parameters=parameters(model) | values,
+        parameters=constants,
         names=tuple(names),
         covariance=fit.covariance,
         inputs=tuple(
-            {
-                "name": r.angles.name,
-                "source": r.angles.meta.get("source"),
-                "start_s": r.span[0],
-                "stop_s": r.span[1],
-                "samples": int(r.angles.t_s.size),
-                "noise_deg": [float(v) for v in np.degrees(r.noise.measured_rad)],
-                "zeros_deg": [float(v) for v in np.degrees(zeros)],
-                "e0_j": float(e0),
-            }
+            r.described(zeros) | {"e0_j": float(e0)}
             for r, e0, zeros in zip(recordings, fit.e0_j, smoothed.zeros_rad, strict=True)
         ),
         energy=curves,
         residuals=shooting.residuals_of(tracks, path, smoothed.zeros_rad),
         ten=freed,
         notes=(
-            *(f"{r.angles.name}: {r.decay.message}" for r in recordings),
+            *(note for r in recordings for note in r.notes()),
             f"acceleration noise raises |N| by {100 * excess[0]:.1g} and {100 * excess[1]:.1g} % on average; "
             "taken off",
             *(() if freed is None else (freed.warning,)),

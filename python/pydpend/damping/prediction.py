@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from pydpend.damping import shooting
 from pydpend.damping.maps import Maps, corrected
+from pydpend.damping.recording import Recording
 from pydpend.damping.result import DampingFit, clean
 from pydpend.damping.shooting import Segments, Track
-from pydpend.damping.trajectory import Recording
 from pydpend.errors import FitError, fault
 
 Floats = NDArray[np.float64]

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from pydpend.coefficients import unit
 
 Floats = NDArray[np.float64]
 
@@ -24,6 +27,13 @@ class Estimate:
     def to_json(self) -> dict[str, Any]:
         """Value, sigma and unit; null where not finite."""
         return {"value": number(self.value), "sigma": number(self.sigma), "unit": self.unit}
+
+
+def estimates(
+    names: Iterable[str], values: Mapping[str, float], sigma: Mapping[str, float]
+) -> dict[str, Estimate]:
+    """Coefficients or ratios with their units; without a standard error in ``sigma`` one was held fixed: 0."""
+    return {n: Estimate(float(values[n]), float(sigma.get(n, 0.0)), unit(n)) for n in names}
 
 
 @dataclass(frozen=True)

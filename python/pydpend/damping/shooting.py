@@ -97,6 +97,12 @@ class Solution:
     names: tuple[str, ...]
     """Rows of `information`: free parameters, then two zeros per recording."""
     information: Floats
+    angle_information: Floats
+    """What of it the angles give: the part whose errors are their noise."""
+    jump_information: Floats
+    """What of it the jumps give, times their variance over the slack's square: the part with the model's errors."""
+    jumps_shown: Floats
+    """That variance over the slack's square, per component: 1 where the slack was learned, down to 0 at its floor."""
     gradient: Floats
     scores: Floats
     """Each segment's part of the gradient with the states eliminated, (K, G)."""
@@ -217,6 +223,9 @@ def solve(
         replace(segments, states=out["states"]),
         tuple(n for n, k in zip(names, known, strict=True) if k),
         out["information"][np.ix_(known, known)],
+        out["angle_information"][np.ix_(known, known)],
+        out["jump_information"][np.ix_(known, known)],
+        np.array(out["jumps_shown"]),
         out["gradient"][known],
         out["scores"][:, known],
         np.array(out["slack"]),

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from pydpend.angles import LinkAngles
 from pydpend.damping.maps import Maps, corrected
 from pydpend.damping.prediction import WINDOWS_S, Prediction, initial_state, predict
+from pydpend.damping.recording import prepare
 from pydpend.damping.result import DampingFit
 from pydpend.damping.single import same_links
-from pydpend.damping.trajectory import prepare
 from pydpend.errors import FitError, fault
 from pydpend.model import Model
 

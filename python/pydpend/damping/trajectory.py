@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pydpend.angles import LinkAngles
-from pydpend.coefficients import FULL, RATIOS, parameters, ratios_of, unit
+from pydpend.coefficients import FULL, RATIOS, parameters, ratios_of
 from pydpend.damping import maps, plausible, shooting
 from pydpend.damping.intervals import profile_intervals
-from pydpend.damping.noise import Noise, noise
-from pydpend.damping.result import DampingFit, Estimate
+from pydpend.damping.recording import Recording
+from pydpend.damping.result import DampingFit, estimates
 from pydpend.damping.shares import energy_curve, shares, unit_works
 from pydpend.damping.shooting import Progress, Solution, Track
 from pydpend.damping.uncertainty import covariance, identifiability
-from pydpend.decay import Decay, find_decay
 from pydpend.errors import FitError, fault
 from pydpend.model import Model
 
@@ -33,39 +30,6 @@ shared over 1/0.05 = 20 segments. Tighter, a segment near the upright answers to
 HUBER = 3.5
 LOST = 1000.0
 """Chi-square of loosely tied pieces beyond which nothing was found: wrong constants that are let through give tens."""
-
-
-@dataclass(frozen=True)
-class Recording:
-    """A recording made ready for a fit."""
-
-    angles: LinkAngles
-    decay: Decay
-    noise: Noise
-    track: Track
-
-    @property
-    def span(self) -> tuple[float, float]:
-        """Start and stop of what is fitted, s."""
-        return self.decay.start_s, self.decay.stop_s
-
-
-def prepare(
-    angles: LinkAngles, model: Model, start_s: float | None = None, stop_s: float | None = None
-) -> Recording:
-    """Finds the free decay and the noise. Raises FitError where there is no decay to fit."""
-    decay = find_decay(angles, model, start_s, stop_s)
-    level = noise(angles.t_s, angles.phi_rad, angles.sigma_rad, (decay.start_s, decay.stop_s))
-    if not all(
-        np.isfinite(s) or source == "stated"
-        for s, source in zip(level.measured_rad, level.source, strict=True)
-    ):
-        raise FitError(
-            fault(
-                angles.name, "the angles have no 20 stretches of nine samples", "Give angles with fewer gaps"
-            )
-        )
-    return Recording(angles, decay, level, (angles.t_s, angles.phi_rad, level.sigma_rad))
 
 
 def fit_trajectory(
@@ -258,30 +222,30 @@ def _judge(
     values = {n: solution.parameters.get(n, 0.0) for n in FULL} | {
         n: solution.parameters[n] / psi for n in RATIOS
     }
-    coefficients = {n: Estimate(values[n], float(sigma[n]), unit(n)) for n in names}
     links = recordings[0].angles.links
-    ratios = {n: Estimate(values[n], float(sigma.get(n, 0.0)), unit(n)) for n in ratios_of(links)}
     path = shooting.trace(tracks, solution.segments, solution.parameters, solution.stretch)
     c_rows = [kept.index(n) for n in names]
     c_cov = cov[np.ix_(c_rows, c_rows)]
     fitted = fitted_model(model, solution.parameters)
     held = [n for n in names if values[n] <= 0.0]
     duration = float(np.sum(np.diff(solution.segments.times_s, axis=1)))
-    notes = _notes(recordings, solution, relative)
     return DampingFit(
         method="trajectory",
         status=solution.status,
         message=_message(solution, strict, relative),
         chi2=strict.chi2,
         n=int(solution.counts.sum()),
-        coefficients=coefficients,
-        ratios=ratios,
+        coefficients=estimates(names, values, sigma),
+        ratios=estimates(ratios_of(links), values, sigma),
         shares=shares(names, values, c_cov, unit_works(tracks, path, names)),
         identifiability=identifiability(kept, cov, values, held, duration),
         parameters=solution.parameters,
         names=kept,
         covariance=cov,
-        inputs=tuple(_input(r, fitted, solution.zeros_rad[k]) for k, r in enumerate(recordings)),
+        inputs=tuple(
+            r.described(zeros) | {"tail_modes_hz": list(plausible.tail_modes_hz(r.track, r.span, fitted))}
+            for r, zeros in zip(recordings, solution.zeros_rad, strict=True)
+        ),
         energy=tuple(energy_curve(tracks, path, names, values, fitted, k) for k in range(len(recordings))),
         residuals=shooting.residuals_of(tracks, path, solution.zeros_rad),
         chi2_slack=solution.chi2,
@@ -298,7 +262,7 @@ def _judge(
         iterations=solution.iterations,
         modes_hz=plausible.modes_hz(fitted)[:links],
         maps=None if bias is None else bias.to_json(),
-        notes=notes,
+        notes=_notes(recordings, solution),
     )
 
 
@@ -328,33 +292,10 @@ def _message(solution: Solution, strict: Solution, relative: Floats) -> str:
     )
 
 
-def _notes(recordings: Sequence[Recording], solution: Solution, relative: Floats) -> tuple[str, ...]:
-    out = []
-    for r in recordings:
-        out.append(f"{r.angles.name}: {r.decay.message}")
-        for j, source in enumerate(r.noise.source[: r.angles.links]):
-            if source == "measured":
-                level = np.degrees(r.noise.measured_rad[j])
-                out.append(
-                    f"{r.angles.name}: phi{j + 1} weighted by its measured high-pass noise {level:.3g} deg "
-                    "(no stated uncertainty agrees with it)"
-                )
+def _notes(recordings: Sequence[Recording], solution: Solution) -> tuple[str, ...]:
+    out = [note for r in recordings for note in r.notes()]
     if solution.stuck:
         out.append(
             f"a joint stuck in {solution.stuck} of {len(solution.segments)} segments; followed by events"
         )
     return tuple(out)
-
-
-def _input(recording: Recording, fitted: Model, zeros: Floats) -> dict[str, Any]:
-    return {
-        "name": recording.angles.name,
-        "source": recording.angles.meta.get("source"),
-        "start_s": recording.decay.start_s,
-        "stop_s": recording.decay.stop_s,
-        "samples": int(recording.angles.t_s.size),
-        "noise_deg": [float(v) for v in np.degrees(recording.noise.measured_rad)],
-        "noise_source": list(recording.noise.source),
-        "zeros_deg": [float(v) for v in np.degrees(zeros)],
-        "tail_modes_hz": list(plausible.tail_modes_hz(recording.track, recording.span, fitted)),
-    }

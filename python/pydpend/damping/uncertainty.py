@@ -20,37 +20,53 @@ STRONG = 0.95
 """Correlation beyond which two coefficients are named as not told apart."""
 
 
-def invert(information: Floats) -> Floats:
-    """Inverse of a symmetric information matrix, scaled first; directions it lacks get a huge variance."""
+LEAST = 1e-14
+"""Part of the largest information, each unknown in its own scale, below which a direction is not determined at all."""
+
+
+def _axes(information: Floats) -> tuple[Floats, Floats]:
+    """Principal values (G,) of a symmetric information matrix scaled to a unit diagonal, and what each is of, as
+    columns (G, G) in the unknowns' own units."""
     scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
     scaled = information / np.outer(scale, scale)
     values, vectors = np.linalg.eigh((scaled + scaled.T) / 2)
-    inverse = (vectors / np.maximum(values, 1e-14)) @ vectors.T
-    out: Floats = inverse / np.outer(scale, scale)
+    return values, vectors / scale[:, None]
+
+
+def invert(information: Floats) -> Floats:
+    """Inverse of a symmetric information matrix, scaled first; directions it lacks get a huge variance."""
+    values, axes = _axes(information)
+    out: Floats = (axes / np.maximum(values, LEAST)) @ axes.T
     return out
 
 
 def covariance(solution: Solution, *, model_error: bool) -> Floats:
     """Covariance (G, G) of the common unknowns.
 
-    From the information at the solution; with model error also the sandwich from the scores of blocks of
-    about a second, and of each standard error the larger one is taken.
+    Each source of error counts with the variance it has, not with the one the fit allowed it: the angles' noise with
+    chi-square, the jumps with what they show of the slack (`Solution.jumps_shown`; docs/damping.md has the derivation).
+    With model error also the sandwich from the scores of blocks of about a second, and of each standard error the
+    larger one is taken.
     """
-    naive = invert(solution.information) * max(1.0, solution.chi2)
+    bread = invert(solution.information)
+    meat = solution.angle_information * max(1.0, solution.chi2) + solution.jump_information
+    # What is not determined has no errors to add up: it keeps its huge variance.
+    values, axes = _axes(solution.information)
+    lost = axes[:, values < LEAST]
+    plain: Floats = bread @ meat @ bread + lost @ lost.T / LEAST
     if not model_error:
-        return naive
+        return plain
     segments = solution.segments
     block = np.floor(segments.times_s[:, 0] / BLOCK_S).astype(np.int64) + 1_000_000 * segments.rows[:, 0]
     _, label = np.unique(block, return_inverse=True)
     count = int(label.max()) + 1
     if count < 2 * len(solution.names):
-        return naive
+        return plain
     sums = np.zeros((count, len(solution.names)))
     np.add.at(sums, label, solution.scores)
-    bread = invert(solution.information)
     sandwich = bread @ (sums.T @ sums) @ bread * count / (count - len(solution.names))
-    growth = np.sqrt(np.maximum(1.0, np.diag(sandwich) / np.diag(naive)))
-    out: Floats = naive * np.outer(growth, growth)
+    growth = np.sqrt(np.maximum(1.0, np.diag(sandwich) / np.diag(plain)))
+    out: Floats = plain * np.outer(growth, growth)
     return out
 
 

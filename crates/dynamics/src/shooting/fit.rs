@@ -2,10 +2,11 @@
 
 use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
 
+use super::error::{angle_information, jump_information, scores};
 use super::linearise::{Local, Point};
 use super::problem::{Progress, Recording, Segment, Settings, ShootingError, Slack, Status};
-use super::slack::{KNOWN, apart, learned, own_sigma};
-use super::system::{MOST, Problem, pseudo_inverse, scores};
+use super::slack::{KNOWN, apart, learned, own_sigma, shown};
+use super::system::{MOST, Problem, pseudo_inverse};
 use crate::parameters::Field;
 
 /// A finished fit.
@@ -16,6 +17,13 @@ pub struct Fit {
     pub free: Vec<Field>,
     /// Marginal second derivatives of half chi-square with respect to the border, (G, G).
     pub information: DMatrix<f64>,
+    /// What of it the angles give, the states following the border: the part whose errors are the angles' noise.
+    pub angle_information: DMatrix<f64>,
+    /// What of it the jumps give, each component times `jumps_shown`: the part whose errors are the model's.
+    pub jump_information: DMatrix<f64>,
+    /// Variance that the jumps show over the slack's square, per component: 1 where the slack was learned. Where it
+    /// stands at its floor or was given, the data may ask for less, down to none.
+    pub jumps_shown: [f64; 4],
     /// Gradient there; not zero only for parameters held at a bound.
     pub gradient: DVector<f64>,
     /// Each segment's part of the border's gradient with the states eliminated, (K, G): what a sandwich estimate of
@@ -169,6 +177,15 @@ pub fn fit(
     };
     let chained_count = segments.iter().filter(|s| s.chained).count() as f64;
     let cost = problem.local_cost(&point, &locals, weight(slack));
+    // Components whose slack is not what their jumps ask for, but given or the least allowed.
+    let given = match settings.slack {
+        Slack::Learned(_) => {
+            let lowest = floor(own);
+            std::array::from_fn(|i| slack[i] < lowest[i] * (1.0 + KNOWN))
+        }
+        _ => [true; 4],
+    };
+    let jumps_shown = if chained { shown(&problem, &point, &locals, slack, given) } else { [1.0; 4] };
     let log_evidence =
         -cost - chained_count * slack.iter().map(|s| s.ln()).sum::<f64>() - 0.5 * done.log_determinant();
     let sum = |f: &dyn Fn(&Local) -> [f64; 2]| {
@@ -180,6 +197,9 @@ pub fn fit(
         stuck: locals.iter().filter(|l| l.stuck).count(),
         free: settings.free.clone(),
         scores: scores(&problem, &point, &locals, &spreads, weight(slack)),
+        angle_information: angle_information(&problem, &locals, &spreads),
+        jump_information: jump_information(&problem, &locals, &spreads, weight(slack), jumps_shown),
+        jumps_shown,
         information: done.corner,
         gradient: done.corner_gradient,
         slack,

@@ -11,6 +11,7 @@
 //! freedom properly: `q^2 = sum d^2 / sum(1 - var(d)/q^2)` (MacKay's fixed point of the marginal likelihood).
 
 mod arrow;
+mod error;
 mod fit;
 mod linearise;
 mod path;

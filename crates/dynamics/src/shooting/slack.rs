@@ -112,6 +112,42 @@ pub(super) fn learned(
     Some(now)
 }
 
+/// Change of the logarithm of a weight from which a derivative is taken: far above rounding, far below curvature.
+const STEP: f64 = 0.02;
+
+/// Variance that the jumps show over the slack's square: one common to the components `given`, 1 for the others, whose
+/// slack was learned. Not below zero.
+///
+/// With `H` the part of the hat matrix between jumps (each over its slack), `f = tr(1 - H)` over the given components
+/// and `K = sum (1 - H)^2` over pairs of them, the expected sum of squares of their jumps is `f - K + shown K`. `H`
+/// depends on the weights as `dH = (H - H^2) d ln w`, so `K = f + df/d ln w`.
+pub(super) fn shown(
+    problem: &Problem<'_>,
+    point: &Point,
+    locals: &[Local],
+    slack: [f64; 4],
+    given: [bool; 4],
+) -> [f64; 4] {
+    let sums = |shift: f64| {
+        let slack = std::array::from_fn(|i| slack[i] * if given[i] { (-0.5 * shift).exp() } else { 1.0 });
+        let weight = Vector4::from(slack.map(|s| 1.0 / (s * s)));
+        let done = problem.assemble(point, locals, Some(weight)).eliminate(0.0)?;
+        let border = problem.border_step(point, &done)?;
+        let (squares, freedom) = joints(problem, point, locals, &done, &border, slack);
+        let over = |v: &dyn Fn(usize) -> f64| (0..4).filter(|&i| given[i]).map(v).sum::<f64>();
+        Some((over(&|i| squares[i] / (slack[i] * slack[i])), over(&|i| freedom[i])))
+    };
+    let found = || {
+        let (squares, freedom) = sums(0.0)?;
+        let slope = (sums(STEP)?.1 - sums(-STEP)?.1) / (2.0 * STEP);
+        let pairs = freedom + slope;
+        // Nothing is known of jumps that no data contradict: they are taken to be as large as allowed.
+        (pairs > 0.0).then(|| (1.0 + (squares - freedom) / pairs).max(0.0))
+    };
+    let common = if given.contains(&true) { found().unwrap_or(1.0) } else { 1.0 };
+    given.map(|g| if g { common } else { 1.0 })
+}
+
 /// A slack known to 2 % changes no standard error that is quoted to two digits.
 pub(super) const KNOWN: f64 = 0.02;
 /// Most guesses at the slack; ten are enough where it is determined.

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector, Matrix4, Matrix4xX, Vector4};
 use rayon::prelude::*;
 
-use super::arrow::{Arrow, Block, Eliminated, Spread};
+use super::arrow::{Arrow, Block, Eliminated};
 use super::linearise::{Local, Point, linearise, trial};
 use super::problem::{Recording, Segment, Settings};
 
@@ -96,7 +96,7 @@ impl Problem<'_> {
     }
 
     /// Column in the border of each of a segment's local unknowns after its state.
-    fn columns(&self, segment: &Segment) -> impl Fn(usize) -> usize + use<> {
+    pub(super) fn columns(&self, segment: &Segment) -> impl Fn(usize) -> usize + use<> {
         let (common, recording) = (self.common, segment.recording);
         move |c| if c < common { c } else { common + 2 * recording + (c - common) }
     }
@@ -270,35 +270,4 @@ pub(super) fn pseudo_inverse(m: &DMatrix<f64>) -> DMatrix<f64> {
     let inverse = eigen.eigenvalues.map(|v| if v > 1e-12 { 1.0 / v } else { 0.0 });
     let core = &eigen.eigenvectors * DMatrix::from_diagonal(&inverse) * eigen.eigenvectors.transpose();
     DMatrix::from_fn(n, n, |r, c| core[(r, c)] * scale[r] * scale[c])
-}
-
-/// See [`super::Fit::scores`]; a jump counts with the segment before it.
-pub(super) fn scores(
-    problem: &Problem<'_>,
-    point: &Point,
-    locals: &[Local],
-    spreads: &[Spread],
-    weight: Option<Vector4<f64>>,
-) -> DMatrix<f64> {
-    let mut out = DMatrix::zeros(locals.len(), problem.border);
-    for (k, (segment, local)) in problem.segments.iter().zip(locals).enumerate() {
-        let column = problem.columns(segment);
-        for c in 4..local.gradient.len() {
-            out[(k, column(c - 4))] += local.gradient[c];
-        }
-        let through = spreads[k].with_border.transpose() * local.gradient.fixed_rows::<4>(0);
-        let mut row = out.row_mut(k);
-        row += through.transpose();
-    }
-    if let Some(weight) = weight {
-        for (k, d) in problem.jumps(point, locals) {
-            let mut pull = &spreads[k + 1].with_border - locals[k].end_state * &spreads[k].with_border;
-            let mut common = pull.columns_mut(0, problem.common);
-            common -= &locals[k].end_common;
-            let part = pull.transpose() * weight.component_mul(&d);
-            let mut row = out.row_mut(k);
-            row += part.transpose();
-        }
-    }
-    out
 }
