@@ -2,8 +2,9 @@
 
 Twice the negative log-likelihood, minimised over everything else at each value of one coefficient, rises by
 chi-square's 95 % quantile of one degree of freedom at the ends of that coefficient's interval (Venzon and
-Moolgavkar 1988). The likelihood counts the slack as if the motion used it all, and knows nothing of model error beyond: the
-rise is divided by the ratio of the stated variance to the likelihood's own (Chandler and Bate 2007), so that for a quadratic likelihood the interval is the estimate +- 1.96 standard errors.
+Moolgavkar 1988). The likelihood takes all the slack for jumps that are there, and knows no model error beyond: its rise
+is divided by the stated variance over its own (Chandler and Bate 2007), so that for a quadratic likelihood the
+interval is the estimate +- 1.96 standard errors.
 """
 
 from __future__ import annotations
