@@ -7,6 +7,7 @@
 //! several bodies that happen to stand alike. Over many frames only bodies stay together.
 
 use nalgebra::{Isometry2, Vector2};
+use rayon::prelude::*;
 
 use super::sample::Sample;
 use crate::detect::{Detection, Flags};
@@ -180,8 +181,8 @@ pub fn find_bodies(sample: &Sample) -> Vec<Link> {
         .filter(|d| d.len() >= 3)
         .collect();
     let mut best: Vec<Vec<Vector2<f64>>> = Vec::new();
-    for &f in &bases {
-        let found = groups(&sample.moving[f], &compared);
+    let all: Vec<_> = bases.par_iter().map(|&f| groups(&sample.moving[f], &compared)).collect();
+    for found in all {
         let size = |g: &[Vec<Vector2<f64>>]| g.iter().map(Vec::len).sum::<usize>();
         // More nodes; for as many the more bodies: two that stood alike are not one.
         if (size(&found), found.len()) > (size(&best), best.len()) {
@@ -212,8 +213,8 @@ fn complete(links: &mut Vec<Link>, sample: &Sample) {
             links.iter().map(|l| vec![Vec::new(); l.nodes.len()]).collect();
         let mut spare: Vec<Vec<(usize, Vector2<f64>)>> = vec![Vec::new(); links.len()];
         let mut known = vec![0_usize; links.len()];
-        for (f, frame) in sample.moving.iter().enumerate() {
-            let found = poses(links, frame);
+        let posed: Vec<_> = sample.moving.par_iter().map(|frame| poses(links, frame)).collect();
+        for (f, (frame, found)) in sample.moving.iter().zip(posed).enumerate() {
             let mut used = vec![false; frame.len()];
             for s in found.iter().flatten() {
                 for d in s.picks.iter().flatten() {

@@ -3,6 +3,7 @@
 //! Owns: [`find_lone`]. Here frames are linked by nearness, since there are no distances to go by.
 
 use nalgebra::{Isometry2, Vector2};
+use rayon::prelude::*;
 
 use super::arrange::Found;
 use super::bodies::{self, FLOOR_PX, link_of, looks_whole};
@@ -82,7 +83,7 @@ fn left_over(links: &[Link], frame: &[Detection]) -> Option<Vec<Detection>> {
 /// Whether something moves that is no node of the bodies, in most of the sample's frames that show them all.
 pub fn others_move(sample: &Sample, links: &[Link]) -> bool {
     let rest: Vec<usize> =
-        sample.moving.iter().filter_map(|f| left_over(links, f)).map(|rest| rest.len()).collect();
+        sample.moving.par_iter().filter_map(|f| left_over(links, f)).map(|rest| rest.len()).collect();
     2 * rest.iter().filter(|&&n| n > 0).count() > rest.len()
 }
 

@@ -10,6 +10,7 @@ mod lone;
 mod sample;
 
 use nalgebra::Vector2;
+use rayon::prelude::*;
 
 use crate::error::{Error, Fault, Result};
 use crate::rig::Rig;
@@ -102,8 +103,9 @@ fn moving_bodies(sample: &mut Sample) -> Vec<Found> {
             .iter()
             .map(|link| Found { link: link.clone(), poses: Vec::with_capacity(sample.frames.len()) })
             .collect();
-        for frame in &sample.moving {
-            for (f, s) in found.iter_mut().zip(bodies::poses(&links, frame)) {
+        let posed: Vec<_> = sample.moving.par_iter().map(|frame| bodies::poses(&links, frame)).collect();
+        for frame in posed {
+            for (f, s) in found.iter_mut().zip(frame) {
                 f.poses.push(s.map(|s| s.fit.pose));
             }
         }

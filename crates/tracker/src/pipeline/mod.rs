@@ -256,7 +256,7 @@ impl<'a> Run<'a> {
         }
         observer.stage(Stage::Learn, None);
         let (source, samples) = opening::sample(source, SAMPLES, observer)?;
-        let levels = opening::learn(&samples, &detect, settings.threads)?;
+        let levels = opening::on_threads(settings.threads, || Levels::learn(&samples, &detect))?;
         drop(samples);
         if observer.interrupted() {
             return Err(Error::Interrupted);
@@ -315,7 +315,8 @@ impl<'a> Run<'a> {
     /// Finds the rig in what was detected.
     fn find(&self, observer: &mut dyn Observer) -> Result<Discovery> {
         observer.stage(Stage::Rig, None);
-        let mut found = discover(&self.store, [self.facts.width, self.facts.height])?;
+        let image_px = [self.facts.width, self.facts.height];
+        let mut found = opening::on_threads(self.settings.threads, || discover(&self.store, image_px))?;
         self.store.check()?;
         found.rig.region = found.rig.region.or_else(|| self.detect.region.clone());
         found.rig.lens = found.rig.lens.or_else(|| self.detect.lens.clone());

@@ -8,7 +8,6 @@ use crossbeam_channel::{RecvTimeoutError, bounded};
 use rayon::ThreadPoolBuilder;
 
 use super::Observer;
-use crate::detect::{DetectSettings, Levels};
 use crate::error::{Error, Fault, Result};
 use crate::frame::{Frame, FrameSource};
 use crate::source::{self, OpenOptions, cores};
@@ -34,13 +33,13 @@ pub(super) fn sample(
     watched(observer, move || source.sample(count).map(|frames| (source, frames)))
 }
 
-/// What detection needs to know, learned on `threads` threads; 0 is one for each core.
-pub(super) fn learn(samples: &[Frame], settings: &DetectSettings, threads: usize) -> Result<Levels> {
+/// Does what is shared out by rayon on `threads` threads; 0 is one for each core.
+pub(super) fn on_threads<T: Send>(threads: usize, work: impl FnOnce() -> Result<T> + Send) -> Result<T> {
     let pool = ThreadPoolBuilder::new()
         .num_threads(cores(threads))
         .build()
         .map_err(|e| Error::Argument(Fault::new("threads", e.to_string()).advice("Ask for fewer")))?;
-    pool.install(|| Levels::learn(samples, settings))
+    pool.install(work)
 }
 
 /// Does what may wait for bytes that never come on a thread of its own, which is then left to the end of the program.
