@@ -80,7 +80,7 @@ def markers(r: Recording, here: Path, into: Path) -> str:
     off = misfits(nodes)
     # Columns are numbered, because a node may be called anything; their names are in markers.json.
     columns = {"time_s": nodes.t_s} | {f"node{i}_px": off[:, i] for i in range(off.shape[1])}
-    pq.write_table(pa.table(columns), into / "residuals.parquet")
+    pq.write_table(pa.table(columns), into / "residuals.parquet", use_dictionary=False)
     known = np.isfinite(off)
     rows = [
         {
@@ -216,7 +216,7 @@ def encoder(r: Recording, options: Options, here: Path, into: Path) -> str:
         save(calibration_figure(line), into / "calibration.svg")
     found = compare(film, encoder_angles(signal, line))
     write_whole(into / "comparison.json", found.to_json())
-    pq.write_table(pa.table(found.to_columns()), into / "comparison.parquet")
+    pq.write_table(pa.table(found.to_columns()), into / "comparison.parquet", use_dictionary=False)
     save(comparison_figure(found), into / "comparison.png")
     return f"RMS difference {math.degrees(found.rms_rad):.4f} deg"
 

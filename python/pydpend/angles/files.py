@@ -234,7 +234,7 @@ def write_angles(angles: LinkAngles, path: str | Path) -> None:
     try:
         if path.suffix == ".parquet":
             table = pa.table({k: pa.array(v, from_pandas=True) for k, v in columns.items()})
-            pq.write_table(table.replace_schema_metadata({META_KEY: meta}), temporary)
+            pq.write_table(table.replace_schema_metadata({META_KEY: meta}), temporary, use_dictionary=False)
         elif path.suffix == ".csv":
             with temporary.open("w", encoding="utf-8", newline="") as file:
                 file.write(",".join(columns) + "\n")

@@ -82,6 +82,12 @@ def warnings(fit: dict[str, Any]) -> list[str]:
             "The model or the angles have errors beyond the noise, and the standard errors of the damping carry them: "
             f"{_left(fit)}"
         )
+    if fit["method"] == "energy" and fit["chi2"] > 1 + 4 * math.sqrt(2 / fit["n"]):
+        out.append(
+            f"These laws do not take out the energy that was lost: chi-square of its {fit['n']} values is "
+            f"{digits(fit['chi2'], 3)}, where noise alone would give 1. The standard errors carry that; --laws full or "
+            "the trajectory fit may tell what is missing."
+        )
     # The sentence on the whole recording; those on single coefficients stand with them.
     out += [s for s in fit["identifiability"]["sentences"] if "too short" in s]
     return out
@@ -324,7 +330,7 @@ def _ten(fit: dict[str, Any]) -> list[Block]:
     )
     return [
         Heading("The paper's ten coefficients"),
-        Text(sentence(ten["warning"])),
+        Text(sentence(ten["warning"].removeprefix("warning: "))),
         Table(("coefficient", "value"), rows, numbers=frozenset({1})),
     ]
 
@@ -361,7 +367,7 @@ def _told(fit: dict[str, Any]) -> list[Block]:
             ),
             Table(tuple(header), tuple(row[: len(header)] for row in rows), numbers=frozenset({2, 3, 4})),
         ]
-    notes = [f"{n}: {i['note']}" for n, i in fit.get("intervals", {}).items() if i["note"]]
+    notes = [f"95 % interval of {n}: {i['note']}." for n, i in fit.get("intervals", {}).items() if i["note"]]
     blocks.append(Listing(tuple(sentence(s) for s in (*told["sentences"], *notes))))
     blocks.append(
         Text(

@@ -32,13 +32,20 @@ def _raised(exponent: int) -> str:
 
 
 def between(low: float | None, high: float | None) -> str:
-    """An interval, its ends to four digits under one power of ten; an end that is not known is a question mark."""
-    known = [abs(v) for v in (low, high) if v]
-    exponent = int(np.floor(np.log10(max(known)))) if known else 0
+    """An interval, to what stands for its uncertainty's second digit; an end that is not known is a question mark."""
+    known = [v for v in (low, high) if v is not None]
+    largest = max(map(abs, known), default=0.0)
+    if largest == 0:
+        return "?"
+    # Four standard errors wide.
+    sigma = (high - low) / 4 if low is not None and high is not None and high > low else 0.01 * largest
+    exponent = int(np.floor(np.log10(largest)))
     if -3 <= exponent <= 4:
         exponent = 0
-    ends = ("?" if v is None else f"{v / 10.0**exponent:.4g}".replace("-", "−") for v in (low, high))
-    text = " to ".join(ends)
+    count = max(0, exponent + 1 - int(np.floor(np.log10(sigma))))
+    text = " to ".join("?" if v is None else f"{v / 10.0**exponent:.{count}f}" for v in (low, high)).replace(
+        "-", "−"
+    )
     return text if exponent == 0 else f"({text}) × 10{_raised(exponent)}"
 
 
@@ -59,7 +66,7 @@ def digits(value: float, count: int = 2) -> str:
 
 def with_squares(unit: str) -> str:
     """``N m s2`` as ``N m s²``, on one line."""
-    return unit.replace("s2", "s²").replace(" ", "\u00a0")
+    return re.sub(r"\b([ms])2\b", r"\1²", unit).replace(" ", "\u00a0")
 
 
 def sentence(text: str) -> str:
