@@ -112,7 +112,7 @@ def cursor_time(page: Page) -> float:
         (words.with_sigma(2.5e-6, 1.2e-9), "(2.5000 ± 0.0012) × 10⁻⁶"),
         (words.with_sigma(None, 1.0), "–"),
         (words.with_sigma(-38.2, 43.1), "−38 ± 43"),
-        (words.quantity(2.5e-6, 1.2e-9, words.with_squares("kg m2")), "(2.5000\u00a0±\u00a00.0012)\u00a0×\u00a010⁻⁶ kg\u00a0m²"),
+        (words.quantity(2.5, 0.12, words.with_squares("kg m2")), "2.50\u00a0±\u00a00.12 kg\u00a0m²"),
         (words.between(1.944e-10, 1.0803e-8), "(0.02 to 1.08) × 10⁻⁸"),
         (words.between(0.0, 0.0123), "0.0000 to 0.0123"),
         (words.between(1.9e-5, None), "(1.900 to ?) × 10⁻⁵"),

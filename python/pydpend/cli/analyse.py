@@ -22,7 +22,7 @@ HELP = "film, nodes or angles in, a run folder with a report out"
 
 def add_arguments(p: argparse.ArgumentParser) -> None:
     """One flag for each field of `Options`, and how to run."""
-    from pydpend.analyse.options import Options, flag_of, option_docs
+    from pydpend.analyse.options import CHOICES, Options, flag_of, option_docs
 
     docs = option_docs()
     p.add_argument("inputs", nargs="*", metavar="RECORDING|NODES|ANGLES", help=docs["inputs"])
@@ -42,7 +42,8 @@ def add_arguments(p: argparse.ArgumentParser) -> None:
             p.add_argument(flag, dest=f.name, action=argparse.BooleanOptionalAction, default=None, help=text)
         else:
             number = float if kind.startswith("float") else int if kind.startswith("int") else str
-            p.add_argument(flag, dest=f.name, type=number, default=None, help=text)
+            choices = CHOICES.get(f.name)
+            p.add_argument(flag, dest=f.name, type=number, choices=choices, default=None, help=text)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -10,6 +10,7 @@ Where each shell looks for them:
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
 HELP = "completions for a shell, on standard output"
 
@@ -27,5 +28,19 @@ def run(args: argparse.Namespace) -> int:
 
     from pydpend.cli import parser
 
-    print(shtab.complete(parser(), args.shell))
+    whole = parser()
+    _name_files(whole)
+    print(shtab.complete(whole, args.shell))
     return 0
+
+
+def _name_files(p: argparse.ArgumentParser) -> None:
+    """Whatever takes words that are not of a list completes to file names. argparse shows its arguments only here."""
+    import shtab
+
+    for action in p._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for sub in action.choices.values():
+                _name_files(sub)
+        elif action.nargs != 0 and action.choices is None and action.type in (None, str, Path):
+            action.complete = shtab.FILE  # type: ignore[attr-defined]

@@ -1,5 +1,6 @@
 //! `tracker completions`: what a shell needs to complete the command line.
 
+use std::io::Write;
 use std::process::ExitCode;
 
 use clap::CommandFactory;
@@ -15,6 +16,9 @@ pub struct Args {
 
 /// Prints them.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    clap_complete::generate(args.shell, &mut Cli::command(), "tracker", &mut std::io::stdout());
+    // Into memory first: written straight to a pipe whose reader has gone, clap_complete would panic.
+    let mut text = Vec::new();
+    clap_complete::generate(args.shell, &mut Cli::command(), "tracker", &mut text);
+    std::io::stdout().write_all(&text)?;
     Ok(ExitCode::SUCCESS)
 }
