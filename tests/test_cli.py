@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -77,6 +79,20 @@ def test_bash_completes_commands_flags_and_choices(capsys: pytest.CaptureFixture
     assert {"analyse", "animate"} <= completed("pydpend", "an")
     assert "--calibration" in completed("pydpend", "analyse", "--cal")
     assert {"calibration", "comparison", "coefficients"} <= completed("pydpend", "plot", "c")
+    assert completed("pydpend", "analyse", "--method", "e") == {"energy"}
+    assert str(DEMO) in completed("pydpend", "analyse", "--encoder", str(DEMO)[:-1])
+    assert str(DEMO) in completed("pydpend", "fit", str(DEMO)[:-1])
+
+
+def test_completions_end_quietly_when_nobody_reads_them() -> None:
+    for program in ([TRACKER], [Path(sys.executable).with_name("pydpend")]):
+        reading, writing = os.pipe()
+        os.close(reading)
+        done = subprocess.run(
+            [*program, "completions", "zsh"], stdout=writing, stderr=subprocess.PIPE, check=False
+        )
+        os.close(writing)
+        assert (done.returncode, done.stderr) == (0, b"")
 
 
 @pytest.mark.parametrize(
