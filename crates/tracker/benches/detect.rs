@@ -1,5 +1,6 @@
 //! Detection's speed against what the machine can do, in one run: `cargo bench --workspace --locked --bench detect`,
-//! with `-- frame`, `-- mraw` or `-- h264` behind it for one part.
+//! with `-- frame`, `-- criterion`, `-- mraw` or `-- h264` behind it for one part, and numbers
+//! of markers or bits for some of them.
 //!
 //! Frame: sixteen frames of 1280 x 1024 8-bit pixels in turn with 9, 100 and 1000 markers, against a plain maximum
 //! over the same bytes and OpenCV's threshold, `findContours` and `moments`, one thread each. MRAW: a recording in
@@ -38,16 +39,26 @@ const H264_FRAMES: u64 = 1500;
 fn main() {
     opencv::core::set_num_threads(1).unwrap();
     let arguments: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
-    let wanted = |part: &str| arguments.is_empty() || arguments.iter().any(|a| a == part);
+    let (numbers, parts): (Vec<String>, Vec<String>) =
+        arguments.into_iter().partition(|a| a.parse::<u32>().is_ok());
+    let wanted = |part: &str| parts.is_empty() || parts.iter().any(|a| a == part);
+    let listed = |n: &usize| numbers.is_empty() || numbers.contains(&n.to_string());
     if wanted("frame") {
-        frames();
+        println!(
+            "| markers | in | plain maximum us | ours us | OpenCV us | ours / maximum | OpenCV / ours |"
+        );
+        println!("|---|---|---|---|---|---|---|");
+        [9, 100, 1000].into_iter().filter(listed).for_each(frames);
+    }
+    if wanted("criterion") {
+        [9, 100, 1000].into_iter().filter(listed).for_each(by_criterion);
     }
     let folder = tempfile::tempdir().unwrap();
     if wanted("mraw") {
         println!(
             "\n| MRAW | ours GB/s | plain maximum GB/s | ratio of rates | learning s |\n|---|---|---|---|---|"
         );
-        [8, 10, 12, 16].into_iter().for_each(|bits| mraw(folder.path(), bits));
+        [8, 10, 12, 16].into_iter().filter(listed).for_each(|bits| mraw(folder.path(), bits as u32));
     }
     if wanted("h264") {
         println!("\n| H.264, {H264_FRAMES} frames | tracker s | ffmpeg s | ratio |\n|---|---|---|---|");
@@ -55,50 +66,85 @@ fn main() {
     }
 }
 
-/// One thread on single frames.
-fn frames() {
+/// What a thread does with a frame.
+const WAYS: usize = 3;
+
+/// Frames, and the three ways.
+struct Frames {
+    frames: Vec<Frame>,
+    ours: Ours,
+    threshold: f64,
+    mask: Mat,
+    count: usize,
+}
+
+impl Frames {
+    fn new(count: usize) -> Self {
+        let film = Film::new(&scene(count)).unwrap();
+        let frames: Vec<Frame> = (0..FRAMES).map(|i| film.frame(i)).collect();
+        let ours = Ours::new(&frames);
+        let threshold = ours.detector.levels().threshold(640.0, 512.0);
+        Self { frames, ours, threshold, mask: Mat::default(), count }
+    }
+
+    /// Every frame in one of the ways: plain maximum, ours, OpenCV's.
+    fn all(&mut self, way: usize) {
+        for frame in &self.frames {
+            match way {
+                0 => {
+                    black_box(maximum(frame));
+                }
+                1 => assert_eq!(self.ours.count(frame), self.count),
+                _ => assert_eq!(contours(frame, self.threshold, &mut self.mask), self.count),
+            }
+        }
+    }
+
+    /// Median over turns of the time for a frame in each way, us. Each way `again` times before the next.
+    fn times(&mut self, again: usize) -> [f64; WAYS] {
+        let mut times: [Vec<f64>; WAYS] = Default::default();
+        for _ in 0..TURNS {
+            for (way, times) in times.iter_mut().enumerate() {
+                let mut last = 0.0;
+                for _ in 0..again {
+                    let start = Instant::now();
+                    self.all(way);
+                    last = start.elapsed().as_secs_f64() * 1e6 / FRAMES as f64;
+                }
+                times.push(last);
+            }
+        }
+        times.map(median)
+    }
+}
+
+/// One thread on single frames: the three ways in turn, so that each finds in the caches what another has left there,
+/// and each of them three times, so that it finds what it left itself.
+fn frames(count: usize) {
+    let mut frames = Frames::new(count);
+    for (name, again) in [("turn", 1), ("a row", 3)] {
+        let [plain, we, theirs] = frames.times(again);
+        println!(
+            "| {count} | {name} | {plain:.1} | {we:.1} | {theirs:.1} | {:.2} | {:.1} |",
+            we / plain,
+            theirs / we
+        );
+    }
+}
+
+/// The same by criterion.
+fn by_criterion(count: usize) {
     let mut criterion = Criterion::default()
         .sample_size(10)
         .warm_up_time(Duration::from_millis(300))
         .measurement_time(Duration::from_secs(1));
-    println!("| markers | plain maximum us | ours us | OpenCV us | ours / maximum | OpenCV / ours |");
-    println!("|---|---|---|---|---|---|");
-    for count in [9, 100, 1000] {
-        let film = Film::new(&scene(count)).unwrap();
-        let frames: Vec<Frame> = (0..FRAMES).map(|i| film.frame(i)).collect();
-        let mut ours = Ours::new(&frames);
-        let threshold = ours.detector.levels().threshold(640.0, 512.0);
-        let mut mask = Mat::default();
-        // All three see a frame before the next, so that each meets the same memory.
-        let mut times = [Vec::new(), Vec::new(), Vec::new()];
-        for _ in 0..TURNS {
-            let mut turn = [0.0; 3];
-            for (which, total) in turn.iter_mut().enumerate() {
-                let start = Instant::now();
-                for frame in &frames {
-                    match which {
-                        0 => {
-                            black_box(maximum(frame));
-                        }
-                        1 => assert_eq!(ours.count(frame), count),
-                        _ => assert_eq!(contours(frame, threshold, &mut mask), count),
-                    }
-                }
-                *total = start.elapsed().as_secs_f64() * 1e6 / FRAMES as f64;
-            }
-            times.iter_mut().zip(turn).for_each(|(all, t)| all.push(t));
-        }
-        let [plain, we, theirs] = times.map(median);
-        println!("| {count} | {plain:.1} | {we:.1} | {theirs:.1} | {:.2} | {:.1} |", we / plain, theirs / we);
-        let mut group = criterion.benchmark_group(format!("16 frames of {count} markers"));
-        group.throughput(Throughput::Bytes(FRAMES * u64::from(SIZE[0] * SIZE[1])));
-        group.bench_function("plain maximum", |b| b.iter(|| frames.iter().map(maximum).max()));
-        group.bench_function("ours", |b| b.iter(|| frames.iter().map(|f| ours.count(f)).sum::<usize>()));
-        group.bench_function("opencv", |b| {
-            b.iter(|| frames.iter().map(|f| contours(f, threshold, &mut mask)).sum::<usize>())
-        });
-        group.finish();
+    let mut frames = Frames::new(count);
+    let mut group = criterion.benchmark_group(format!("16 frames of {count} markers"));
+    group.throughput(Throughput::Bytes(FRAMES * u64::from(SIZE[0] * SIZE[1])));
+    for (way, name) in ["plain maximum", "ours", "opencv"].into_iter().enumerate() {
+        group.bench_function(name, |b| b.iter(|| frames.all(way)));
     }
+    group.finish();
 }
 
 /// Markers of radius 6 px on a grid, each flying on its own.

@@ -2,8 +2,8 @@
 //!
 //! Owns: [`Centre`], [`Window`]. Must not: decide what is a marker.
 
-use super::edge::LANES;
 use super::fit::{DiscFit, Fitted, LEAST_PATH_PX, Patch, Ring, Start};
+use super::lanes::{Eight, Job, LANES, work};
 use super::levels::{Levels, Side};
 use super::mask::Spans;
 use super::pixels::Pixels;
@@ -34,6 +34,8 @@ pub(crate) struct Window {
     y0: usize,
     width: usize,
     height: usize,
+    /// Values from the start of one row to the next: whole eights, of which those behind the last pixel mean nothing.
+    stride: usize,
     ground: Vec<f32>,
     ring: Ring,
 }
@@ -58,22 +60,22 @@ impl Window {
         self.y0 = (blob.y0 as usize).saturating_sub(margin);
         self.width = (blob.x1 as usize + margin + 1).min(pixels.width) - self.x0;
         self.height = (blob.y1 as usize + margin + 1).min(pixels.height) - self.y0;
-        self.heights.clear();
-        for y in self.y0..self.y0 + self.height {
-            pixels.append(y, self.x0, self.width, &mut self.row, &mut self.heights);
-        }
-        self.heights.resize(self.width * self.height + LANES, 0.0);
+        self.stride = self.width.next_multiple_of(LANES);
+        self.heights.resize(self.height * self.stride + LANES, 0.0);
+        let (from, size) = ([self.x0, self.y0], [self.width, self.height]);
+        pixels.floats(from, size, &mut self.row, &mut self.heights);
     }
 
     /// Rows of the window.
-    fn rows(&self) -> std::slice::ChunksExact<'_, f32> {
-        self.heights[..self.width * self.height].chunks_exact(self.width)
+    fn rows(&self) -> impl Iterator<Item = &[f32]> {
+        self.heights[..self.height * self.stride].chunks_exact(self.stride).map(|row| &row[..self.width])
     }
 
     /// Middle of the values at eight places around (cx, cy) at a distance; `None` where all lie outside.
     fn around(&self, cx: f64, cy: f64, distance: f64) -> Option<f64> {
         let mut values = [0.0f32; 8];
         let mut n = 0;
+        let (left, above) = (cx - self.x0 as f64 + 0.5, cy - self.y0 as f64 + 0.5);
         for (dx, dy) in [
             (1.0, 0.0),
             (0.7, 0.7),
@@ -84,15 +86,29 @@ impl Window {
             (0.0, -1.0),
             (0.7, -0.7),
         ] {
-            let i = (cx + distance * dx).round() - self.x0 as f64;
-            let j = (cy + distance * dy).round() - self.y0 as f64;
+            let (i, j) = (left + distance * dx, above + distance * dy);
             if i >= 0.0 && j >= 0.0 && (i as usize) < self.width && (j as usize) < self.height {
-                values[n] = self.heights[j as usize * self.width + i as usize];
+                values[n] = self.heights[j as usize * self.stride + i as usize];
                 n += 1;
             }
         }
+        if n == values.len() {
+            return Some(f64::from(middle(values)));
+        }
         values[..n].sort_unstable_by(f32::total_cmp);
         (n > 0).then(|| f64::from(values[(n - 1) / 2] + values[n / 2]) / 2.0)
+    }
+
+    /// The disc with the window's first moments above the base, and of that height: `[x, y, radius]`.
+    fn moments(&self, base: f64, height: f64) -> [f64; 3] {
+        let values = &self.heights[..self.height * self.stride];
+        let [sum, sum_x, sum_y] = work(Sums { values, width: self.width, stride: self.stride });
+        let (w, h) = (self.width as f64, self.height as f64);
+        let ground = base * w * h;
+        let light = sum - ground;
+        let x = (sum_x - ground * (w - 1.0) / 2.0) / light;
+        let y = (sum_y - ground * (h - 1.0) / 2.0) / light;
+        [self.x0 as f64 + x, self.y0 as f64 + y, (light / height / std::f64::consts::PI).max(0.0).sqrt()]
     }
 
     /// A disc fitted to a blob's edge, smeared along a path where that explains it better; `None` where none
@@ -107,7 +123,14 @@ impl Window {
         self.load(pixels, blob, (fit.table.reach_px + fit.band_px + 1.0).ceil() as usize);
         let [cx, cy] = blob.mean();
         let radius = (blob.area as f64 / std::f64::consts::PI).sqrt();
-        let start = self.start(fit, [cx, cy, radius], avoid)?;
+        let mut start = self.start(fit, [cx, cy, radius], avoid)?;
+        // Of a disc alone on its ground moments are so near that one round is enough.
+        let [_, _, _, base, height] = start.disc;
+        let [x, y, r] = self.moments(base, height);
+        let near = (x - cx).abs() < 0.5 && (y - cy).abs() < 0.5 && (r / radius - 1.0).abs() < 0.2;
+        if near && avoid == [[0.0; 3]; 2] {
+            start.disc = [x, y, r, base, height];
+        }
         let sharp = self.run(fit, &start)?;
         // Five standard deviations of chi-square over some hundred pixels, and worth the time.
         if sharp.chi2 < 1.6 * fit.usual_chi2.max(1.0) {
@@ -141,6 +164,7 @@ impl Window {
         let patch = Patch {
             values: &self.heights,
             width: self.width,
+            stride: self.stride,
             height: self.height,
             x0: self.x0 as f64,
             y0: self.y0 as f64,
@@ -318,5 +342,79 @@ impl Window {
         result.x_px = cx;
         result.y_px = cy;
         result
+    }
+}
+
+/// Middle of eight values: the mean of the fourth and the fifth in order. Two sorted fours, of which the greater half is
+/// the greater of each value and its opposite.
+fn middle(values: [f32; 8]) -> f32 {
+    let order = |a: f32, b: f32| if a < b { (a, b) } else { (b, a) };
+    let four = |v: [f32; 4]| {
+        let ((a, b), (c, d)) = (order(v[0], v[1]), order(v[2], v[3]));
+        let ((a, c), (b, d)) = (order(a, c), order(b, d));
+        let (b, c) = order(b, c);
+        [a, b, c, d]
+    };
+    let [a, b, c, d, e, f, g, h] = values;
+    let (one, two) = (four([a, b, c, d]), four([e, f, g, h]));
+    let pairs: [(f32, f32); 4] = std::array::from_fn(|i| order(one[i], two[3 - i]));
+    let lower = pairs.iter().fold(f32::NEG_INFINITY, |m, p| if p.0 > m { p.0 } else { m });
+    let upper = pairs.iter().fold(f32::INFINITY, |m, p| if p.1 < m { p.1 } else { m });
+    (lower + upper) / 2.0
+}
+
+/// Sums of values, of values by column and of values by row, from the window's corner.
+struct Sums<'a> {
+    values: &'a [f32],
+    width: usize,
+    stride: usize,
+}
+
+impl Job for Sums<'_> {
+    type Outcome = [f64; 3];
+
+    #[inline(always)]
+    fn run<V: Eight>(self, token: V::Token) -> [f64; 3] {
+        let mut sums = [0.0; 3];
+        // Eight columns after eight.
+        for left in (0..self.width).step_by(LANES) {
+            let (mut plain, mut by_row) = (V::all(token, 0.0), V::all(token, 0.0));
+            let (mut j, one) = (V::all(token, 0.0), V::all(token, 1.0));
+            for row in self.values.chunks_exact(self.stride) {
+                if let Some(eight) = row[left..].first_chunk() {
+                    let v = V::of(token, eight);
+                    plain += v;
+                    by_row += v * j;
+                    j += one;
+                }
+            }
+            let columns = plain.array().into_iter().zip(by_row.array()).take(self.width - left);
+            for (i, (plain, by_row)) in columns.enumerate() {
+                sums[0] += f64::from(plain);
+                sums[1] += f64::from(plain) * (left + i) as f64;
+                sums[2] += f64::from(by_row);
+            }
+        }
+        sums
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+
+    #[test]
+    fn the_middle_of_eight_is_that_of_the_sorted() {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        for _ in 0..2000 {
+            // With ties.
+            let values: [f32; 8] = std::array::from_fn(|_| rng.random_range(0..9u8).into());
+            let mut sorted = values;
+            sorted.sort_unstable_by(f32::total_cmp);
+            assert_eq!(middle(values), (sorted[3] + sorted[4]) / 2.0, "{values:?}");
+        }
     }
 }

@@ -2,12 +2,7 @@
 //!
 //! Owns: [`EdgeTable`]. Must not: fit anything.
 
-use std::array::from_fn;
-
-use wide::f32x8;
-
-/// Pixels worked on together.
-pub(crate) const LANES: usize = 8;
+use super::lanes::{Eight, LANES};
 
 /// Steps of distance per pixel.
 const PER_PX: usize = 32;
@@ -84,29 +79,50 @@ impl EdgeTable {
         Self { rows, last_column: (columns - 1) as f32, reach_px: half as f64 / PER_PX as f64 }
     }
 
-    /// Coverage and slope of eight pixels at distances inside the edge, where the edge's normal has the smaller
-    /// component `minor` (at most 0.71).
+    /// Where the table says of eight pixels how much of them is covered: at distances inside the edge, where the edge's
+    /// normal has the smaller component `minor` (at most 0.71).
     #[inline(always)]
-    pub fn at(&self, inside_px: f32x8, minor: f32x8) -> (f32x8, f32x8) {
+    pub fn spot<V: Eight>(&self, token: V::Token, inside_px: V, minor: V) -> Spot {
         // Adding 2^23 rounds to a whole number.
-        let whole = f32x8::splat(8_388_608.0);
-        let (steps, zero) = (PER_PX as f32, f32x8::ZERO);
-        let (last, columns) = (f32x8::splat(self.last_column), f32x8::splat(self.last_column + 1.0));
-        let t = ((inside_px + self.reach_px as f32) * steps).fast_max(zero).fast_min(last);
+        let all = |v: f32| V::all(token, v);
+        let (whole, zero) = (all(8_388_608.0), all(0.0));
+        let (last, columns) = (all(self.last_column), all(self.last_column + 1.0));
+        let t = ((inside_px + all(self.reach_px as f32)) * all(PER_PX as f32)).most(zero).least(last);
         let column = (t + whole) - whole;
-        let middle = minor * (DIRECTIONS as f32 * std::f32::consts::SQRT_2) - 0.5;
-        let row = (middle.fast_max(zero).fast_min(f32x8::splat(DIRECTIONS as f32 - 1.0)) + whole) - whole;
-        let place = (row * columns + column).fast_trunc_int().to_array();
-        let entry: [[f32; 2]; LANES] = from_fn(|i| self.rows[place[i] as usize % SIZE]);
-        let slope = f32x8::new(from_fn(|i| entry[i][1]));
-        let cover = f32x8::new(from_fn(|i| entry[i][0])) + slope * ((t - column) * (1.0 / steps));
-        (cover, slope)
+        let middle = minor * all(DIRECTIONS as f32 * std::f32::consts::SQRT_2) - all(0.5);
+        let row = (middle.most(zero).least(all(DIRECTIONS as f32 - 1.0)) + whole) - whole;
+        Spot {
+            entry: (row * columns + column).whole(),
+            behind_px: ((t - column) * all(1.0 / PER_PX as f32)).array(),
+        }
     }
+
+    /// Coverage and slope there.
+    #[inline(always)]
+    pub fn at<V: Eight>(&self, token: V::Token, spot: &Spot) -> (V, V) {
+        let (cover, slope) = V::pairs(token, spot.entry.map(|i| &self.rows[i as usize % SIZE]));
+        (cover + slope * V::of(token, &spot.behind_px), slope)
+    }
+}
+
+/// Eight entries of the table, and how far behind them the pixels are.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Spot {
+    entry: [i32; LANES],
+    behind_px: [f32; LANES],
 }
 
 #[cfg(test)]
 mod tests {
+    use wide::f32x8;
+
     use super::*;
+
+    /// Coverage at one place.
+    fn cover(table: &EdgeTable, inside_px: f64, minor: f64) -> f64 {
+        let spot = table.spot((), f32x8::splat(inside_px as f32), f32x8::splat(minor as f32));
+        f64::from(table.at::<f32x8>((), &spot).0.to_array()[0])
+    }
 
     #[test]
     fn the_table_gives_the_exact_area_of_a_sharp_disc() {
@@ -117,9 +133,7 @@ mod tests {
             for x in -8..=8 {
                 let (dx, dy) = (f64::from(x) - c[0], f64::from(y) - c[1]);
                 let rho = dx.hypot(dy);
-                let minor = (dx.abs().min(dy.abs()) / rho) as f32;
-                let p =
-                    f64::from(table.at(f32x8::splat((r - rho) as f32), f32x8::splat(minor)).0.to_array()[0]);
+                let p = cover(&table, r - rho, dx.abs().min(dy.abs()) / rho);
                 worst = worst.max((p - disc_in_pixel(dx, dy, r)).abs());
             }
         }
@@ -130,13 +144,9 @@ mod tests {
     #[test]
     fn blur_keeps_the_middle_and_widens_the_edge() {
         let (sharp, soft) = (EdgeTable::new(50.0, 0.0), EdgeTable::new(50.0, 0.8));
-        assert!(
-            (f64::from(soft.at(f32x8::splat(0.0), f32x8::splat(0.3)).0.to_array()[0]) - 0.5).abs() < 0.01
-        );
+        assert!((cover(&soft, 0.0, 0.3) - 0.5).abs() < 0.01);
         // One standard deviation of blur and pixel together: sqrt(0.64 + 1/12) = 0.85 px holds 84 %.
-        assert!(
-            (f64::from(soft.at(f32x8::splat(0.85), f32x8::splat(0.3)).0.to_array()[0]) - 0.841).abs() < 0.01
-        );
-        assert_eq!(sharp.at(f32x8::splat(0.85), f32x8::splat(0.3)).0.to_array()[0], 1.0);
+        assert!((cover(&soft, 0.85, 0.3) - 0.841).abs() < 0.01);
+        assert_eq!(cover(&sharp, 0.85, 0.3), 1.0);
     }
 }

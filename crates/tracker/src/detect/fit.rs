@@ -10,10 +10,8 @@
 
 use std::array::from_fn;
 
-use nalgebra::{SMatrix, SVector};
-use wide::f32x8;
-
-use super::edge::{EdgeTable, LANES};
+use super::edge::{EdgeTable, Spot};
+use super::lanes::{Eight, Job, LANES, work};
 use super::levels::{Noise, Side};
 
 /// A rectangle of pixels, raw units; behind the last pixel come [`LANES`] more values that mean nothing.
@@ -21,6 +19,8 @@ pub(crate) struct Patch<'a> {
     pub values: &'a [f32],
     pub width: usize,
     pub height: usize,
+    /// Values from the start of one row to the next.
+    pub stride: usize,
     /// Image coordinates of its first pixel.
     pub x0: f64,
     pub y0: f64,
@@ -86,7 +86,7 @@ const MOST_SHIFTS: usize = 32;
 /// A path shorter than this cannot be told from none, px.
 pub(crate) const LEAST_PATH_PX: f64 = 0.3;
 
-const STEPS: f32x8 = f32x8::new([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
+const STEPS: [f32; LANES] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
 
 /// Rounds of Gauss-Newton; two are usual.
 const ROUNDS: usize = 10;
@@ -104,6 +104,19 @@ pub(crate) struct Ring {
     live: Vec<f32>,
     used: usize,
     saturated: u32,
+    /// What is found of eight pixels on the way to the normal equations.
+    eights: Vec<Found>,
+}
+
+/// Of eight pixels of a ring. A processor does more at once where the way to the table and the way on from it are two
+/// loops.
+#[derive(Debug, Clone, Copy, Default)]
+struct Found {
+    spot: Spot,
+    /// The edge's normal, inwards from the disc's edge to larger coverage.
+    normal: [[f32; LANES]; 2],
+    /// Coverage and its slopes by x, y, radius and path, of a disc that moves.
+    sums: [[f32; LANES]; 6],
 }
 
 /// `line_k * line_l * weight` for k <= l, where a line is the model's derivative by one of its numbers, or last
@@ -117,10 +130,10 @@ const fn place(k: usize, l: usize, n: usize) -> usize {
 
 /// Adds line K's products; a function for each line, so that all indices are constants.
 #[inline(always)]
-fn products<const K: usize, const N: usize>(
-    sums: &mut [f32x8; PRODUCTS],
-    w: f32x8,
-    line: &[f32x8; MOVING + 1],
+fn products<V: Eight, const K: usize, const N: usize>(
+    sums: &mut [V; PRODUCTS],
+    w: V,
+    line: &[V; MOVING + 1],
 ) {
     if K > N {
         return;
@@ -131,12 +144,82 @@ fn products<const K: usize, const N: usize>(
     }
 }
 
+/// The normal equations of a round.
 struct Normal<const N: usize> {
-    matrix: SMatrix<f64, N, N>,
-    gradient: SVector<f64, N>,
+    matrix: [[f64; N]; N],
+    gradient: [f64; N],
     chi2: f64,
     squares: f64,
     count: f64,
+}
+
+/// A symmetric matrix as L D L^T, D a diagonal above 0 and L below it, with ones on it.
+struct Factor<const N: usize> {
+    lower: [[f64; N]; N],
+    inverse: [f64; N],
+}
+
+impl<const N: usize> Factor<N> {
+    /// `None` where the matrix is not positive.
+    #[inline(always)]
+    fn new(matrix: &[[f64; N]; N]) -> Option<Self> {
+        let (mut lower, mut inverse) = ([[0.0; N]; N], [0.0; N]);
+        for j in 0..N {
+            // What is left of column j, of which the first is D's.
+            let mut left: [f64; N] = from_fn(|i| matrix[i][j]);
+            for k in 0..j {
+                // lower[j][k] holds D L so far; L itself is needed once.
+                let l = lower[j][k] * inverse[k];
+                for i in j..N {
+                    left[i] -= lower[i][k] * l;
+                }
+            }
+            if !(left[j] > 0.0) {
+                return None;
+            }
+            inverse[j] = 1.0 / left[j];
+            for i in j..N {
+                lower[i][j] = left[i];
+            }
+        }
+        for i in 0..N {
+            for k in 0..i {
+                lower[i][k] *= inverse[k];
+            }
+        }
+        Some(Self { lower, inverse })
+    }
+
+    /// L^-1 times a vector of which only zeros are before `first`.
+    #[inline(always)]
+    fn down(&self, mut v: [f64; N], first: usize) -> [f64; N] {
+        for k in first..N {
+            for i in k + 1..N {
+                v[i] -= self.lower[i][k] * v[k];
+            }
+        }
+        v
+    }
+
+    /// The inverse times a vector.
+    #[inline(always)]
+    fn solve(&self, v: &[f64; N]) -> [f64; N] {
+        let down = self.down(*v, 0);
+        let mut v: [f64; N] = from_fn(|i| down[i] * self.inverse[i]);
+        for k in (0..N).rev() {
+            for i in 0..k {
+                v[i] -= self.lower[k][i] * v[k];
+            }
+        }
+        v
+    }
+
+    /// The inverse's diagonal at i.
+    #[inline(always)]
+    fn variance(&self, i: usize) -> f64 {
+        let unit = self.down(from_fn(|k| if k == i { 1.0 } else { 0.0 }), i);
+        (i..N).map(|k| unit[k] * unit[k] * self.inverse[k]).sum()
+    }
 }
 
 impl Ring {
@@ -146,31 +229,77 @@ impl Ring {
                 lanes.resize(most, 0.0);
             }
         }
+        let eights = most.div_ceil(LANES);
+        if self.eights.len() < eights {
+            self.eights.resize(eights, Found::default());
+        }
         self.used = 0;
         self.saturated = 0;
     }
 
     /// `count` pixels of a row from `values` on, the first at `x`; up to seven beyond are written too and then
     /// overwritten by those that follow.
-    fn push(&mut self, x: f32, y: f32, values: &[f32], count: usize) {
+    #[inline(always)]
+    fn push<V: Eight>(&mut self, token: V::Token, x: f32, y: f32, values: &[f32], count: usize) {
+        let (steps, y) = (V::of(token, &STEPS), V::all(token, y).array());
         for k in (0..count).step_by(LANES) {
             let (at, first) = (self.used + k, x + k as f32);
             let to = at..at + LANES;
-            self.x[to.clone()].copy_from_slice(&(f32x8::splat(first) + STEPS).to_array());
-            self.y[to.clone()].copy_from_slice(&[y; LANES]);
-            self.live[to.clone()].copy_from_slice(&[1.0; LANES]);
+            self.x[to.clone()].copy_from_slice(&(V::all(token, first) + steps).array());
+            self.y[to.clone()].copy_from_slice(&y);
             self.value[to].copy_from_slice(&values[k..k + LANES]);
         }
         self.used += count;
     }
+}
 
-    fn eights(&self) -> impl Iterator<Item = [f32x8; 4]> {
-        let n = self.used.div_ceil(LANES);
-        let part = |v| <[f32]>::as_chunks::<LANES>(v).0.iter().take(n).map(|&eight| f32x8::new(eight));
-        part(&self.x)
-            .zip(part(&self.y))
-            .zip(part(&self.value).zip(part(&self.live)))
-            .map(|((x, y), (value, live))| [x, y, value, live])
+/// Chooses the pixels near the edge of a disc.
+struct Choose<'a> {
+    patch: &'a Patch<'a>,
+    /// The disc's centre, greatest and least distance from it.
+    centre: [f64; 2],
+    outer: f64,
+    inner: f64,
+    ring: &'a mut Ring,
+}
+
+impl Job for Choose<'_> {
+    type Outcome = ();
+
+    #[inline(always)]
+    fn run<V: Eight>(self, token: V::Token) {
+        let Self { patch, centre: [cx, cy], outer, inner, ring } = self;
+        let all = |v: f64| V::all(token, v as f32);
+        let (left, above) = (cx - patch.x0, cy - patch.y0);
+        let first = (above - outer).max(0.0) as usize;
+        let last = ((above + outer).max(0.0) as usize + 1).min(patch.height);
+        ring.begin(last.saturating_sub(first) * (patch.width + 2 * LANES));
+        let (zero, width) = (all(0.0), all(patch.width as f64));
+        // The first pixel behind a place.
+        let behind = |x: V| (x + all(1.0)).most(zero).least(width).whole().map(|i| i as usize);
+        for eight in (first..last).step_by(LANES) {
+            let dy = all(eight as f64 - above) + V::of(token, &STEPS);
+            let half = |r: f64| (all(r * r) - dy * dy).most(zero).root();
+            let (far, near, middle) = (half(outer), half(inner), all(left));
+            let (a, b) = (behind(middle - far), behind(middle - near));
+            let (c, d) = (behind(middle + near), behind(middle + far));
+            let dy = dy.array();
+            for j in eight..last.min(eight + LANES) {
+                let k = j - eight;
+                // Left and right of the hole, or all of it.
+                let parts = if b[k] < c[k] { [(a[k], b[k]), (c[k], d[k])] } else { [(a[k], d[k]), (0, 0)] };
+                for (from, to) in parts {
+                    if from < to {
+                        let values = &patch.values[j * patch.stride + from..];
+                        ring.push::<V>(token, (from as f64 - left) as f32, dy[k], values, to - from);
+                    }
+                }
+            }
+        }
+        // Those that fill up the last eight do not count.
+        let used = ring.used;
+        ring.live[..used].fill(1.0);
+        ring.live[used..used.next_multiple_of(LANES)].fill(0.0);
     }
 }
 
@@ -201,15 +330,16 @@ impl DiscFit<'_> {
         // Relative to it x and y, as they are radius, base, height and path.
         let all = [0.0, 0.0, first_radius, sign * base, sign * height, path_x, path_y];
         let mut p: [f64; N] = from_fn(|i| all[i]);
-        let path = |p: &[f64; N]| if N == MOVING { p[N - 2].hypot(p[N - 1]) } else { 0.0 };
+        let length = |x: f64, y: f64| (x * x + y * y).sqrt();
+        let path = |p: &[f64; N]| if N == MOVING { length(p[N - 2], p[N - 1]) } else { 0.0 };
         self.choose(patch, &origin, &start.avoid, ring);
         let (mut round, mut chosen) = (0, 1);
         loop {
             if ring.used < 12 {
                 return None;
             }
-            let n = self.normal::<N>(ring, &p);
-            let factor = n.matrix.cholesky()?;
+            let n = work(Equations::<N> { fit: self, ring: &mut *ring, p: &p });
+            let factor = Factor::new(&n.matrix)?;
             let step = factor.solve(&n.gradient);
             round += 1;
             let limit = 0.25 * first_radius.max(2.0);
@@ -218,7 +348,7 @@ impl DiscFit<'_> {
                 *v += s * scale;
             }
             let at = [origin[0] + p[0], origin[1] + p[1]];
-            let strayed = (at[0] - x).hypot(at[1] - y) > 0.5 * first_radius + 1.0
+            let strayed = length(at[0] - x, at[1] - y) > 0.5 * first_radius + 1.0
                 || p[2] < 0.5 * first_radius
                 || p[2] > 1.6 * first_radius
                 || p[4] <= 0.0
@@ -226,7 +356,7 @@ impl DiscFit<'_> {
             if strayed || p.iter().any(|v| !v.is_finite()) {
                 return None;
             }
-            let off = p[0].hypot(p[1]) + (p[2] - origin[2]).abs() + (0.5 * (path(&p) - origin[3])).max(0.0);
+            let off = length(p[0], p[1]) + (p[2] - origin[2]).abs() + (0.5 * (path(&p) - origin[3])).max(0.0);
             if off > SLACK_PX && chosen < 4 {
                 origin = [at[0], at[1], p[2], path(&p)];
                 p[0] = 0.0;
@@ -237,15 +367,13 @@ impl DiscFit<'_> {
             }
             // Near the end each step is about the product of the one before with what else moved then; not so
             // where pixels come and go by saturation.
-            let moved = step[0].hypot(step[1]) * scale;
+            let moved = length(step[0], step[1]) * scale;
             let else_moved = step[2].abs() + (step[4] / p[4]).abs() + if N == MOVING { moved } else { 0.0 };
             let next = if ring.saturated > 0 { moved } else { moved * (moved + else_moved) };
-            let settled = next * next * (n.matrix[(0, 0)] + n.matrix[(1, 1)]) < 2.0 * SETTLED * SETTLED;
+            let settled = next * next * (n.matrix[0][0] + n.matrix[1][1]) < 2.0 * SETTLED * SETTLED;
             if (settled && scale >= 1.0) || round >= ROUNDS {
-                let unit = |i: usize| SVector::<f64, N>::from_fn(|k, _| f64::from(u8::from(k == i)));
-                let variance = |i: usize| factor.solve(&unit(i))[i];
                 // What the last step gains.
-                let chi2 = n.chi2 - step.dot(&n.gradient);
+                let chi2 = n.chi2 - step.iter().zip(&n.gradient).map(|(s, g)| s * g).sum::<f64>();
                 let freedom = (n.count - N as f64).max(1.0);
                 return Some(Fitted {
                     x_px: at[0],
@@ -253,8 +381,8 @@ impl DiscFit<'_> {
                     radius_px: p[2],
                     base: sign * p[3],
                     height: sign * p[4],
-                    radius_sigma_px: variance(2).sqrt(),
-                    sigma_px: variance(0).max(variance(1)).sqrt(),
+                    radius_sigma_px: factor.variance(2).sqrt(),
+                    sigma_px: factor.variance(0).max(factor.variance(1)).sqrt(),
                     chi2: chi2.max(0.0) / freedom,
                     freedom,
                     rms: (n.squares / n.count.max(1.0)).sqrt(),
@@ -270,35 +398,8 @@ impl DiscFit<'_> {
         let [cx, cy, r, path] = *disc;
         let reach = self.table.reach_px + SLACK_PX + path / 2.0 + self.band_px;
         let (outer, inner) = (r + reach, (r - reach).max(0.0));
-        let left = cx - patch.x0;
-        let first = (cy - outer - patch.y0).ceil().max(0.0) as usize;
-        let last = ((cy + outer - patch.y0).floor() as usize + 1).min(patch.height);
-        ring.begin(last.saturating_sub(first) * (patch.width + 2 * LANES));
-        for j in first..last {
-            let dy = patch.y0 + j as f64 - cy;
-            let half = (outer * outer - dy * dy).max(0.0).sqrt();
-            let hole = (inner * inner - dy * dy).max(0.0).sqrt();
-            // The first pixel at or behind a place, the first one behind it.
-            let clip = |i: i32| (i.max(0) as usize).min(patch.width);
-            let from = |x: f64| clip(x as i32 + i32::from(f64::from(x as i32) < x));
-            let behind = |x: f64| clip(x as i32 + i32::from(x >= 0.0));
-            let (a, d) = (from(left - half), behind(left + half));
-            let (b, c) = (behind(left - hole), from(left + hole));
-            let mut part = |from: usize, to: usize| {
-                let values = &patch.values[j * patch.width + from..];
-                ring.push((from as f64 - left) as f32, dy as f32, values, to.saturating_sub(from));
-            };
-            // Left and right of the hole, or all of it.
-            if hole > 0.0 && b < c {
-                part(a, b);
-                part(c, d);
-            } else {
-                part(a, d);
-            }
-        }
-        // Those that fill up the last eight do not count.
+        work(Choose { patch, centre: [cx, cy], outer, inner, ring: &mut *ring });
         let filled = ring.used.next_multiple_of(LANES);
-        ring.live[ring.used..filled].fill(0.0);
         if self.side == Side::Dark {
             ring.value[..filled].iter_mut().for_each(|v| *v = -*v);
         }
@@ -320,85 +421,121 @@ impl DiscFit<'_> {
             }
         }
     }
+}
 
-    /// Normal equations at a place; single precision holds a place inside the patch to 1e-6 px.
-    fn normal<const N: usize>(&self, ring: &Ring, p: &[f64; N]) -> Normal<N> {
-        let sign = self.side.sign() as f32;
+/// Normal equations at a place; single precision holds a place inside the patch to 1e-6 px.
+struct Equations<'a, const N: usize> {
+    fit: &'a DiscFit<'a>,
+    ring: &'a mut Ring,
+    p: &'a [f64; N],
+}
+
+impl<const N: usize> Job for Equations<'_, N> {
+    type Outcome = Normal<N>;
+
+    #[inline(always)]
+    fn run<V: Eight>(self, token: V::Token) -> Normal<N> {
+        let Self { fit, ring, p } = self;
+        let all = |v: f32| V::all(token, v);
+        let of = |v: &[f32; LANES]| V::of(token, v);
+        let sign = fit.side.sign() as f32;
         let [x, y, r, base, height]: [f32; 5] = from_fn(|i| p[i] as f32);
-        let (read, shot, dark) = (self.noise.read as f32, self.noise.shot as f32, self.noise.dark as f32);
-        let limit = self.saturation.map_or(f32::INFINITY, |l| l as f32 * sign);
-        // A smeared disc is the mean of discs along its path: x, y, and the part of the path to there.
-        let mut shifts = [[x, y, 0.0]; MOST_SHIFTS];
-        let mut count = 1;
-        if N == MOVING {
-            let path = [p[N - 2], p[N - 1]];
-            count = ((path[0].hypot(path[1]) / SHIFT_PX).ceil() as usize).clamp(3, MOST_SHIFTS);
-            for (k, shift) in shifts[..count].iter_mut().enumerate() {
-                let part = (k as f64 + 0.5) / count as f64 - 0.5;
-                *shift = [(p[0] + part * path[0]) as f32, (p[1] + part * path[1]) as f32, part as f32];
+        let limit = fit.saturation.map_or(f32::INFINITY, |l| l as f32 * sign);
+        let n = ring.used.div_ceil(LANES);
+        let eights = |v| &<[f32]>::as_chunks::<LANES>(v).0[..n];
+        let (places_x, places_y) = (eights(&ring.x), eights(&ring.y));
+        let (values, lives) = (eights(&ring.value), eights(&ring.live));
+        let found = &mut ring.eights[..n];
+        let (r, zero, one, least) = (all(r), all(0.0), all(1.0), all(1e-6));
+        // Where the edge of a disc about (x, y) is, of all pixels.
+        let look = |found: &mut [Found], x: f32, y: f32| {
+            for ((found, px), py) in found.iter_mut().zip(places_x).zip(places_y) {
+                let (dx, dy) = (of(px) - all(x), of(py) - all(y));
+                let rho = (dx * dx + dy * dy).most(least).root();
+                let inverse = one.over(rho);
+                let (c, s) = (dx * inverse, dy * inverse);
+                found.spot = fit.table.spot(token, r - rho, c.size().least(s.size()));
+                found.normal = [c.array(), s.array()];
             }
-        }
-        let share = 1.0 / count as f32;
-        let (read, dark) = (f32x8::splat(read), f32x8::splat(dark));
-        let (limit, zero) = (f32x8::splat(limit), f32x8::ZERO);
-        let mut sums = [zero; PRODUCTS];
-        let (mut squares, mut open) = (zero, zero);
-        for [px, py, value, live] in ring.eights() {
-            // Coverage, its slopes by x, y and radius, and by the path.
-            let mut sum = [zero; 6];
-            for [sx, sy, part] in &shifts[..count] {
-                let (dx, dy) = (px - *sx, py - *sy);
-                let rho = (dx * dx + dy * dy).fast_max(f32x8::splat(1e-6)).sqrt();
-                let (c, s) = (dx / rho, dy / rho);
-                let (cover, rise) = self.table.at(f32x8::splat(r) - rho, c.abs().fast_min(s.abs()));
-                let rise = rise * share;
-                let (rise_x, rise_y) = (rise * c, rise * s);
-                sum[0] += cover * share;
-                sum[1] += rise_x;
-                sum[2] += rise_y;
-                sum[3] += rise;
-                if N == MOVING {
-                    sum[4] += rise_x * *part;
-                    sum[5] += rise_y * *part;
+        };
+        if N == MOVING {
+            // A smeared disc is the mean of discs along its path, each by the part of the path to there.
+            let path = [p[N - 2], p[N - 1]];
+            let count = ((path[0].hypot(path[1]) / SHIFT_PX).ceil() as usize).clamp(3, MOST_SHIFTS);
+            let share = all(1.0 / count as f32);
+            found.iter_mut().for_each(|f| f.sums = Default::default());
+            for k in 0..count {
+                let part = (k as f64 + 0.5) / count as f64 - 0.5;
+                look(found, (p[0] + part * path[0]) as f32, (p[1] + part * path[1]) as f32);
+                for f in found.iter_mut() {
+                    let (cover, rise) = fit.table.at::<V>(token, &f.spot);
+                    let rise = rise * share;
+                    let (rise_x, rise_y) = (rise * of(&f.normal[0]), rise * of(&f.normal[1]));
+                    let part = all(part as f32);
+                    let more = [cover * share, rise_x, rise_y, rise, rise_x * part, rise_y * part];
+                    for (sum, more) in f.sums.iter_mut().zip(more) {
+                        *sum = (of(sum) + more).array();
+                    }
                 }
             }
+        } else {
+            look(found, x, y);
+        }
+        let (base, height, sign) = (all(base), all(height), all(sign));
+        let [read, shot, dark] = [fit.noise.read, fit.noise.shot, fit.noise.dark].map(|v| all(v as f32));
+        let limit = all(limit);
+        let mut sums = [zero; PRODUCTS];
+        let (mut squares, mut open) = (zero, zero);
+        for ((found, value), live) in found.iter().zip(values).zip(lives) {
+            // Coverage, its slopes by x, y and radius, and by the path.
+            let sum = if N == MOVING {
+                found.sums.map(|s| of(&s))
+            } else {
+                let (cover, rise) = fit.table.at::<V>(token, &found.spot);
+                [cover, rise * of(&found.normal[0]), rise * of(&found.normal[1]), rise, zero, zero]
+            };
+            let value = of(value);
             let full = sum[0] * height + base;
-            let model = full.fast_min(limit);
+            let model = full.least(limit);
             // Saturated in the model and in the picture: nothing to learn.
-            let known = live & (full.simd_lt(limit) | value.simd_lt(limit));
-            let w = known / (read + (model * sign - dark).fast_max(zero) * shot);
+            let known = of(live).where_below(full, value, limit);
+            let w = known.over(read + (model * sign - dark).most(zero) * shot);
             let e = value - model;
             let mut line = [zero; MOVING + 1];
             line[0] = sum[1] * height;
             line[1] = sum[2] * height;
             line[2] = sum[3] * height;
-            line[3] = f32x8::splat(1.0);
+            line[3] = one;
             line[4] = sum[0];
             if N == MOVING {
                 line[5] = sum[4] * height;
                 line[6] = sum[5] * height;
             }
             line[N] = e;
-            products::<0, N>(&mut sums, w, &line);
-            products::<1, N>(&mut sums, w, &line);
-            products::<2, N>(&mut sums, w, &line);
-            products::<3, N>(&mut sums, w, &line);
-            products::<4, N>(&mut sums, w, &line);
-            products::<5, N>(&mut sums, w, &line);
-            products::<6, N>(&mut sums, w, &line);
-            products::<7, N>(&mut sums, w, &line);
+            products::<V, 0, N>(&mut sums, w, &line);
+            products::<V, 1, N>(&mut sums, w, &line);
+            products::<V, 2, N>(&mut sums, w, &line);
+            products::<V, 3, N>(&mut sums, w, &line);
+            products::<V, 4, N>(&mut sums, w, &line);
+            products::<V, 5, N>(&mut sums, w, &line);
+            products::<V, 6, N>(&mut sums, w, &line);
+            products::<V, 7, N>(&mut sums, w, &line);
             squares += known * e * e;
             open += known;
         }
-        // One lane after another, so that every processor adds in the same order.
-        let total = |s: f32x8| s.to_array().iter().map(|&v| f64::from(v)).sum::<f64>();
-        let product = |k: usize, l: usize| {
-            let (k, l) = (k.min(l), k.max(l));
-            total(sums[place(k, l, N)])
+        // In one order for every processor.
+        let total = |s: V| -> f64 {
+            let [a, b, c, d, e, f, g, h] = s.array().map(f64::from);
+            ((a + e) + (c + g)) + ((b + f) + (d + h))
         };
+        let mut totals = [0.0; PRODUCTS];
+        for (total_of, sum) in totals.iter_mut().zip(&sums[..(N + 1) * (N + 2) / 2]) {
+            *total_of = total(*sum);
+        }
+        let product = |k: usize, l: usize| totals[place(k.min(l), k.max(l), N)];
         Normal {
-            matrix: SMatrix::from_fn(product),
-            gradient: SVector::from_fn(|k, _| product(k, N)),
+            matrix: from_fn(|k| from_fn(|l| product(k, l))),
+            gradient: from_fn(|k| product(k, N)),
             chi2: product(N, N),
             squares: total(squares),
             count: total(open),

@@ -10,6 +10,7 @@ mod contours;
 mod detector;
 mod edge;
 mod fit;
+mod lanes;
 mod lens;
 mod levels;
 mod marker;

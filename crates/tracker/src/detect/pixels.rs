@@ -5,6 +5,8 @@
 use crate::error::{Error, Fault, Place, Result};
 use crate::frame::{Frame, PixelFormat};
 
+use super::lanes::{Eight, Job, LANES, work};
+
 /// A frame's plane, checked once so that every row inside it can be read.
 #[derive(Clone, Copy)]
 pub(crate) struct Pixels<'a> {
@@ -62,15 +64,6 @@ impl<'a> Pixels<'a> {
         (bit / 8, bit % 8)
     }
 
-    /// First byte from which packed groups are counted for row `y`.
-    pub fn group_origin(&self, y: usize) -> usize {
-        if self.row_bits == self.width * self.format.bits_per_pixel() as usize {
-            0
-        } else {
-            y * self.row_bits / 8
-        }
-    }
-
     /// Samples from `x` of row `y` into `out`, as many as `out` holds.
     ///
     /// Both ends must lie inside the row.
@@ -89,33 +82,92 @@ impl<'a> Pixels<'a> {
                     *o = u16::from_le_bytes([b[0], b[1]]);
                 }
             }
-            PixelFormat::Packed10 => self.unpack::<10>(byte, skip, out),
-            PixelFormat::Packed12 => self.unpack::<12>(byte, skip, out),
+            PixelFormat::Packed10 => self.unpack::<10, 4, 5>(byte, skip, out),
+            PixelFormat::Packed12 => self.unpack::<12, 2, 3>(byte, skip, out),
         }
     }
 
-    /// The same as floats, appended to `out`; `row` is scratch.
-    #[inline]
-    pub fn append(&self, y: usize, x: usize, count: usize, row: &mut Vec<u16>, out: &mut Vec<f32>) {
+    /// A window's samples as floats: `height` rows from `y` on of `width` samples from `x` on, each row in whole eights
+    /// of `out`, what is behind its last sample means nothing; `row` is scratch.
+    pub fn floats(
+        &self,
+        [x, y]: [usize; 2],
+        [width, height]: [usize; 2],
+        row: &mut Vec<u16>,
+        out: &mut [f32],
+    ) {
+        let stride = width.next_multiple_of(LANES);
+        let rows = out.chunks_exact_mut(stride).take(height);
         if self.format == PixelFormat::Gray8 {
-            let (byte, _) = self.start(y, x);
-            out.extend(self.bytes[byte..byte + count].iter().map(|&b| f32::from(b)));
-        } else {
-            row.resize(count, 0);
-            self.read(y, x, row);
-            out.extend(row.iter().map(|&v| f32::from(v)));
+            let (from, _) = self.start(y, x);
+            let to = from + (height - 1) * self.row_bits / 8 + stride;
+            if let Some(bytes) = self.bytes.get(from..to) {
+                // Eight after eight, also beyond the last one wanted, is faster.
+                let row_bytes = self.row_bits / 8;
+                return work(Floats { bytes, row_bytes, stride, out: &mut out[..height * stride] });
+            }
+        }
+        row.resize(width, 0);
+        for (j, out) in rows.enumerate() {
+            self.read(y + j, x, row);
+            out.iter_mut().zip(&*row).for_each(|(o, &v)| *o = f32::from(v));
         }
     }
 
-    /// Most significant bits first; a sample of 10 or 12 bits spans at most three bytes.
-    fn unpack<const BITS: usize>(&self, byte: usize, skip: usize, out: &mut [u16]) {
-        let mut bit = byte * 8 + skip;
-        for o in out {
-            let at = bit / 8;
-            let b = |i: usize| u32::from(self.bytes.get(at + i).copied().unwrap_or(0));
-            let word = b(0) << 16 | b(1) << 8 | b(2);
-            *o = (word >> (24 - BITS - bit % 8)) as u16 & ((1 << BITS) - 1);
-            bit += BITS;
+    /// Most significant bits first, `COUNT` samples in `BYTES` bytes.
+    fn unpack<const BITS: usize, const COUNT: usize, const BYTES: usize>(
+        &self,
+        byte: usize,
+        skip: usize,
+        out: &mut [u16],
+    ) {
+        let mask = (1 << BITS) - 1;
+        // A sample of 10 or 12 bits spans at most three bytes.
+        let single = |out: &mut [u16], mut bit: usize| {
+            for o in out {
+                let b = |i: usize| u32::from(self.bytes.get(bit / 8 + i).copied().unwrap_or(0));
+                let word = b(0) << 16 | b(1) << 8 | b(2);
+                *o = (word >> (24 - BITS - bit % 8)) as u16 & mask;
+                bit += BITS;
+            }
+        };
+        // Those before the first that begins on a byte, then groups, then the rest.
+        let bit = byte * 8 + skip;
+        let ahead = (0..COUNT).find(|k| (bit + k * BITS).is_multiple_of(8)).unwrap_or(0).min(out.len());
+        let (before, out) = out.split_at_mut(ahead);
+        single(before, bit);
+        let from = (bit + ahead * BITS) / 8;
+        let (groups, rest) = out.as_chunks_mut::<COUNT>();
+        for (group, bytes) in
+            groups.iter_mut().zip(self.bytes[from.min(self.bytes.len())..].as_chunks::<BYTES>().0)
+        {
+            let word = bytes.iter().fold(0u64, |word, &b| word << 8 | u64::from(b));
+            for (k, o) in group.iter_mut().enumerate() {
+                *o = (word >> (BITS * (COUNT - 1 - k))) as u16 & mask;
+            }
+        }
+        single(rest, (from + groups.len() * BYTES) * 8);
+    }
+}
+
+/// Bytes as floats, row by row in whole eights.
+struct Floats<'a> {
+    bytes: &'a [u8],
+    row_bytes: usize,
+    stride: usize,
+    out: &'a mut [f32],
+}
+
+impl Job for Floats<'_> {
+    type Outcome = ();
+
+    #[inline(always)]
+    fn run<V: Eight>(self, token: V::Token) {
+        for (j, out) in self.out.chunks_exact_mut(self.stride).enumerate() {
+            let bytes = &self.bytes[j * self.row_bytes..][..self.stride];
+            for (out, eight) in out.as_chunks_mut().0.iter_mut().zip(bytes.as_chunks().0) {
+                *out = V::of_bytes(token, eight).array();
+            }
         }
     }
 }

@@ -27,7 +27,7 @@ pub(crate) struct Cell {
 
 /// Height of a cell, px.
 const CELL_ROWS: usize = 16;
-/// Width of a cell, px: whole vectors of 8 and 16 bits and, nearly, of packed samples.
+/// Width of a cell, px: whole blocks of vectors of 8 and 16 bits, whole bytes of packed samples.
 pub(crate) const CELL_PX: u32 = 320;
 /// Width of the stretches of a row that share one threshold where the background is not flat, px.
 const STRETCH_PX: u32 = 64;
@@ -122,10 +122,11 @@ impl Plan {
         &self.segments[self.first[y] as usize..self.first[y + 1] as usize]
     }
 
-    /// The cell of a row at a column of cells.
+    /// The cells of a row, as many as [`Plan::columns`].
     #[inline(always)]
-    pub fn cell(&self, y: usize, column: usize) -> Cell {
-        self.cells[y / CELL_ROWS * self.columns + column]
+    pub fn cells(&self, y: usize) -> &[Cell] {
+        let first = y / CELL_ROWS * self.columns;
+        &self.cells[first..first + self.columns]
     }
 }
 
@@ -152,7 +153,7 @@ mod tests {
             for y in 0..100 {
                 for s in plan.row(y) {
                     for x in [s.start, s.end - 1] {
-                        let cell = plan.cell(y, (x / CELL_PX) as usize);
+                        let cell = plan.cells(y)[(x / CELL_PX) as usize];
                         assert!((cell.start..cell.end).contains(&x), "{s:?} {cell:?}");
                         assert!(match side {
                             Side::Bright => cell.threshold <= s.threshold,

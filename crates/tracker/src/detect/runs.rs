@@ -7,7 +7,7 @@
 use super::levels::Side;
 use super::pixels::Pixels;
 use super::plan::{CELL_PX, Plan, Segment};
-use super::skip::{FEW, Sample, Skip};
+use super::skip::{MANY, Sample, Skip};
 use crate::frame::PixelFormat;
 
 /// What one pass adds up about a connected set of pixels beyond the threshold.
@@ -99,14 +99,20 @@ impl Blob {
 struct Run {
     x0: u32,
     end: u32,
+    /// Touches the border of the image or the region.
+    border: bool,
+    /// Of its blob, once its row is at its end.
     label: u32,
 }
 
 /// Finds blobs; owns its scratch, so a frame allocates nothing once it has grown.
 #[derive(Debug, Default)]
 pub(crate) struct Labeller {
+    /// Runs of the row above and of this one.
     above: Vec<Run>,
     here: Vec<Run>,
+    /// The row that is at work.
+    y: u32,
     parents: Vec<u32>,
     blobs: Vec<Blob>,
     row: Vec<u16>,
@@ -127,6 +133,7 @@ impl Labeller {
         for (y, column) in skip.marks() {
             if row != Some(y) {
                 self.next_row(row.is_some_and(|r| r + 1 == y));
+                self.y = y;
                 row = Some(y);
             }
             let (left, right) = (column * CELL_PX, (column + 1) * CELL_PX);
@@ -162,30 +169,30 @@ impl Labeller {
         let count = (s.end - s.start) as usize;
         if pixels.format == PixelFormat::Gray8 {
             let from = pixels.start(y, s.start as usize).0;
-            self.runs(&pixels.bytes[from..from + count], y, s, edge_row, side);
+            self.runs(&pixels.bytes[from..from + count], s, edge_row, side);
         } else {
             let mut row = std::mem::take(&mut self.row);
             row.resize(count, 0);
             pixels.read(y, s.start as usize, &mut row);
-            self.runs(&row, y, s, edge_row, side);
+            self.runs(&row, s, edge_row, side);
             self.row = row;
         }
     }
 
     /// The runs of a piece in which there may be some.
-    fn runs<T: Sample>(&mut self, row: &[T], y: usize, s: Segment, edge_row: bool, side: Side) {
+    fn runs<T: Sample>(&mut self, row: &[T], s: Segment, edge_row: bool, side: Side) {
         let Some(limit) = T::limit(s.threshold, side) else { return };
         let mut open: Option<u32> = None;
         let mut x = s.start;
-        let (few, rest) = row.as_chunks::<FEW>();
-        let tail = rest.iter().enumerate().fold(0, |m, (i, v)| m | u32::from(v.beyond(limit, side)) << i);
-        for mask in few.iter().map(|few| T::beyond_of(few, limit, side)).chain([tail]) {
+        let (many, rest) = row.as_chunks::<MANY>();
+        let mut last = [limit; MANY];
+        last[..rest.len()].copy_from_slice(rest);
+        for many in many.iter().chain((!rest.is_empty()).then_some(&last)) {
+            let mask = T::beyond(many, limit, side);
             // What begins or ends: beyond here and not just before, or the other way round.
-            let mut turns = mask ^ (mask << 1 | u32::from(open.is_some()));
-            if x + FEW as u32 > s.end {
+            let mut turns = mask ^ (mask << 1 | u64::from(open.is_some()));
+            if x + MANY as u32 > s.end {
                 turns &= (1 << (s.end - x)) - 1;
-            } else {
-                turns &= 0xffff;
             }
             while turns != 0 {
                 let at = x + turns.trailing_zeros();
@@ -193,33 +200,27 @@ impl Labeller {
                 open = match open {
                     None => Some(at),
                     Some(x0) => {
-                        self.run(y as u32, x0, at, edge_row || (s.edge.0 && x0 == s.start));
+                        self.run(x0, at, edge_row || (s.edge.0 && x0 == s.start));
                         None
                     }
                 };
             }
-            x += FEW as u32;
+            x += MANY as u32;
         }
         if let Some(x0) = open {
-            self.run(y as u32, x0, s.end, edge_row || (s.edge.0 && x0 == s.start) || s.edge.1);
+            self.run(x0, s.end, edge_row || (s.edge.0 && x0 == s.start) || s.edge.1);
         }
     }
 
-    fn run(&mut self, y: u32, x0: u32, end: u32, border: bool) {
-        let blob = Blob::of_run(y, x0, end, border);
-        if let Some(last) = self.here.last_mut()
-            && last.end == x0
-        {
+    fn run(&mut self, x0: u32, end: u32, border: bool) {
+        match self.here.last_mut() {
             // The same run went on across two segments.
-            last.end = end;
-            let label = last.label as usize;
-            self.blobs[label].absorb(&blob);
-            return;
+            Some(last) if last.end == x0 => {
+                last.end = end;
+                last.border |= border;
+            }
+            _ => self.here.push(Run { x0, end, border, label: 0 }),
         }
-        let label = self.blobs.len() as u32;
-        self.blobs.push(blob);
-        self.parents.push(label);
-        self.here.push(Run { x0, end, label });
     }
 
     fn root(parents: &mut [u32], mut i: u32) -> u32 {
@@ -230,23 +231,40 @@ impl Labeller {
         i
     }
 
-    /// Joins the runs of this row to those of the row above that they touch.
+    /// Gives the runs of this row to the blobs in the row above that they touch, which become one; a run that touches
+    /// none begins one.
     fn join(&mut self) {
         let mut first = 0;
         for run in &mut self.here {
+            let mut blob = Blob::of_run(self.y, run.x0, run.end, run.border);
+            let mut own = None;
             while first < self.above.len() && self.above[first].end < run.x0 {
                 first += 1;
             }
             for up in self.above[first..].iter().take_while(|up| up.x0 <= run.end) {
-                let a = Self::root(&mut self.parents, up.label);
-                let b = Self::root(&mut self.parents, run.label);
-                if a != b {
-                    let (keep, gone) = (a.min(b), a.max(b));
-                    self.parents[gone as usize] = keep;
-                    let lost = self.blobs[gone as usize];
-                    self.blobs[keep as usize].absorb(&lost);
+                let root = Self::root(&mut self.parents, up.label);
+                match own {
+                    None => own = Some(root),
+                    Some(own_root) if own_root != root => {
+                        let (keep, gone) = (root.min(own_root), root.max(own_root));
+                        self.parents[gone as usize] = keep;
+                        blob.absorb(&self.blobs[gone as usize]);
+                        own = Some(keep);
+                    }
+                    Some(_) => {}
                 }
             }
+            run.label = match own {
+                Some(label) => {
+                    self.blobs[label as usize].absorb(&blob);
+                    label
+                }
+                None => {
+                    self.parents.push(self.blobs.len() as u32);
+                    self.blobs.push(blob);
+                    self.blobs.len() as u32 - 1
+                }
+            };
         }
     }
 }

@@ -5,18 +5,17 @@
 
 use std::array::from_fn;
 use std::marker::PhantomData;
-use std::ops::Range;
 
 use multiversion::multiversion;
 use wide::{u8x16, u16x8};
 
 use super::levels::Side;
 use super::pixels::Pixels;
-use super::plan::{Cell, Plan};
+use super::plan::{CELL_PX, Cell, Plan};
 use crate::frame::PixelFormat;
 
 /// Samples whose bits are found together.
-pub(crate) const FEW: usize = 16;
+pub(crate) const MANY: usize = 64;
 
 /// A sample that can be compared with a threshold many at a time.
 pub(crate) trait Sample: Copy {
@@ -24,14 +23,12 @@ pub(crate) trait Sample: Copy {
     fn limit(threshold: u16, side: Side) -> Option<Self>;
     /// Whether any sample in blocks of little-endian bytes is beyond the limit.
     fn any(blocks: &[Block], limit: Self, side: Side) -> bool;
-    /// Which of a few samples are beyond the limit, as bits from the lowest on.
-    fn beyond_of(few: &[Self; FEW], limit: Self, side: Side) -> u32;
-    /// Whether this one is.
-    fn beyond(self, limit: Self, side: Side) -> bool;
+    /// Which of many samples are beyond the limit, as bits from the lowest on.
+    fn beyond(many: &[Self; MANY], limit: Self, side: Side) -> u64;
 }
 
 macro_rules! sample {
-    ($t:ty, $any:ident, $beyond_of:ident) => {
+    ($t:ty, $any:ident, $beyond:ident) => {
         impl Sample for $t {
             #[inline(always)]
             fn limit(threshold: u16, side: Side) -> Option<Self> {
@@ -48,36 +45,51 @@ macro_rules! sample {
             }
 
             #[inline(always)]
-            fn beyond_of(few: &[Self; FEW], limit: Self, side: Side) -> u32 {
-                $beyond_of(few, limit, side)
-            }
-
-            #[inline(always)]
-            fn beyond(self, limit: Self, side: Side) -> bool {
-                match side {
-                    Side::Bright => self > limit,
-                    Side::Dark => self < limit,
-                }
+            fn beyond(many: &[Self; MANY], limit: Self, side: Side) -> u64 {
+                $beyond(many, limit, side)
             }
         }
     };
 }
-sample!(u8, any_u8, bits_u8);
-sample!(u16, any_u16, bits_u16);
+sample!(u8, any_u8, beyond_u8);
+sample!(u16, any_u16, beyond_u16);
 
 #[inline(always)]
-fn bits_u8(few: &[u8; FEW], limit: u8, side: Side) -> u32 {
-    let (values, limit) = (u8x16::new(*few), u8x16::splat(limit));
-    let beyond = match side {
-        Side::Bright => values.saturating_sub(limit),
-        Side::Dark => limit.saturating_sub(values),
-    };
-    0xffff ^ beyond.simd_eq(u8x16::splat(0)).to_bitmask()
+fn beyond_u8(many: &[u8; MANY], limit: u8, side: Side) -> u64 {
+    let limit = u8x16::splat(limit);
+    let within = many.as_chunks().0.iter().enumerate().fold(0, |bits, (i, few)| {
+        let further = further(u8x16::new(*few), limit, side);
+        bits | u64::from(further.simd_eq(limit).to_bitmask()) << (16 * i)
+    });
+    !within
 }
 
 #[inline(always)]
-fn bits_u16(few: &[u16; FEW], limit: u16, side: Side) -> u32 {
-    few.iter().enumerate().fold(0, |m, (i, v)| m | u32::from(v.beyond(limit, side)) << i)
+fn beyond_u16(many: &[u16; MANY], limit: u16, side: Side) -> u64 {
+    let limit = u16x8::splat(limit);
+    let within = many.as_chunks().0.iter().enumerate().fold(0, |bits, (i, few)| {
+        let beyond = distance(u16x8::new(*few), limit, side);
+        bits | u64::from(beyond.simd_eq(u16x8::splat(0)).to_bitmask()) << (8 * i)
+    });
+    !within
+}
+
+/// What is farther on the markers' side.
+#[inline(always)]
+fn further(a: u8x16, b: u8x16, side: Side) -> u8x16 {
+    match side {
+        Side::Bright => a.max(b),
+        Side::Dark => a.min(b),
+    }
+}
+
+/// How far beyond the limit: not every processor has extremes of 16 bits, but all have saturating differences.
+#[inline(always)]
+fn distance(values: u16x8, limit: u16x8, side: Side) -> u16x8 {
+    match side {
+        Side::Bright => values.saturating_sub(limit),
+        Side::Dark => limit.saturating_sub(values),
+    }
 }
 
 /// Bytes that are worked on together: four vectors of every processor.
@@ -87,21 +99,18 @@ type Block = [u8; BLOCK];
 /// The extreme of bytes.
 #[inline(always)]
 fn any_u8(blocks: &[Block], limit: u8, side: Side) -> bool {
-    let further = |a: u8x16, b: u8x16| match side {
-        Side::Bright => a.max(b),
-        Side::Dark => a.min(b),
-    };
-    let mut extremes = [u8x16::splat(limit); 4];
+    let limit = u8x16::splat(limit);
+    let mut extremes = [limit; 4];
     for block in blocks {
         for (e, few) in extremes.iter_mut().zip(block.as_chunks().0) {
-            *e = further(*e, u8x16::new(*few));
+            *e = further(*e, u8x16::new(*few), side);
         }
     }
     let [a, b, c, d] = extremes;
-    further(further(a, b), further(c, d)).simd_eq(u8x16::splat(limit)).to_bitmask() != 0xffff
+    further(further(a, b, side), further(c, d, side), side).simd_eq(limit).to_bitmask() != 0xffff
 }
 
-/// Not every processor has that for 16 bits, but all have saturating differences. Little-endian samples in bytes.
+/// Little-endian samples in bytes.
 #[inline(always)]
 fn any_u16(blocks: &[Block], limit: u16, side: Side) -> bool {
     let limit = u16x8::splat(limit);
@@ -109,11 +118,7 @@ fn any_u16(blocks: &[Block], limit: u16, side: Side) -> bool {
     for block in blocks {
         for (b, few) in beyond.iter_mut().zip(block.as_chunks::<16>().0) {
             let pairs: [[u8; 2]; 8] = from_fn(|i| [few[2 * i], few[2 * i + 1]]);
-            let values = u16x8::new(pairs.map(u16::from_le_bytes));
-            *b |= match side {
-                Side::Bright => values.saturating_sub(limit),
-                Side::Dark => limit.saturating_sub(values),
-            };
+            *b |= distance(u16x8::new(pairs.map(u16::from_le_bytes)), limit, side);
         }
     }
     let [a, b, c, d] = beyond;
@@ -129,47 +134,71 @@ pub(crate) type Mark = (u32, u32);
 
 type Marks = [Vec<Mark>; STREAMS];
 
-/// Whether a stretch of bytes in a row may hold a pixel beyond a threshold. A trait and no closure, since a closure is
-/// not compiled for the instructions of the function that it is in.
+/// A row, or nothing below the last one.
+struct Line<'a> {
+    y: u32,
+    cells: &'a [Cell],
+    /// The bytes of the plane, and after how many bits of them the row starts.
+    bytes: &'a [u8],
+    bit: usize,
+}
+
+impl<'a> Line<'a> {
+    #[inline(always)]
+    fn new(pixels: &Pixels<'a>, plan: &'a Plan, y: usize) -> Self {
+        if y >= pixels.height {
+            return Self { y: 0, cells: &[], bytes: &[], bit: 0 };
+        }
+        let (byte, within) = pixels.start(y, 0);
+        Self { y: y as u32, cells: plan.cells(y), bytes: pixels.bytes, bit: byte * 8 + within }
+    }
+}
+
+/// Whether a cell of a row may hold a pixel beyond its threshold. A trait and no closure, since a closure is not
+/// compiled for the instructions of the function that it is in.
 trait Test {
-    fn any(&mut self, pixels: &Pixels<'_>, y: usize, at: Range<usize>, threshold: u16) -> bool;
+    fn any(&mut self, line: &Line<'_>, cell: Cell) -> bool;
 }
 
 /// Asks of every cell of every row, and notes where the answer is yes.
 #[inline(always)]
 fn pass(pixels: &Pixels<'_>, plan: &Plan, marks: &mut Marks, mut test: impl Test) {
     let rows = pixels.height.div_ceil(STREAMS);
-    let bits = pixels.format.bits_per_pixel() as usize;
     marks.iter_mut().for_each(Vec::clear);
     for row in 0..rows {
+        let lines: [Line<'_>; STREAMS] = from_fn(|stream| Line::new(pixels, plan, stream * rows + row));
         for column in 0..plan.columns {
-            for (stream, marks) in marks.iter_mut().enumerate() {
-                let y = stream * rows + row;
-                if y >= pixels.height {
-                    break;
-                }
-                let Cell { start, end, threshold } = plan.cell(y, column);
-                let (from, skip) = pixels.start(y, start as usize);
-                let to = from + (skip + (end - start) as usize * bits).div_ceil(8);
-                if start < end && test.any(pixels, y, from..to, threshold) {
-                    marks.push((y as u32, column as u32));
+            for (line, marks) in lines.iter().zip(marks.iter_mut()) {
+                if let Some(&cell) = line.cells.get(column)
+                    && cell.start < cell.end
+                    && test.any(line, cell)
+                {
+                    marks.push((line.y, column as u32));
                 }
             }
         }
     }
 }
 
-/// Samples of 8 or 16 bits in whole blocks, which reach beyond the stretch; at the end of the plane the last one is
-/// filled up with what is there. The side is a constant for the compiler's sake.
+/// Samples of 8 or 16 bits in whole blocks, which reach beyond a cell that is cut; at the end of the plane the last
+/// one is filled up with what is there. The side is a constant for the compiler's sake.
 struct Blocks<T, const BRIGHT: bool>(PhantomData<T>);
 
 impl<T: Sample, const BRIGHT: bool> Test for Blocks<T, BRIGHT> {
     #[inline(always)]
-    fn any(&mut self, pixels: &Pixels<'_>, _: usize, at: Range<usize>, threshold: u16) -> bool {
+    fn any(&mut self, line: &Line<'_>, cell: Cell) -> bool {
         let side = if BRIGHT { Side::Bright } else { Side::Dark };
-        let Some(limit) = T::limit(threshold, side) else { return false };
-        let (whole, rest) = pixels.bytes[at.start..].as_chunks::<BLOCK>();
-        match whole.get(..at.len().div_ceil(BLOCK)) {
+        let Some(limit) = T::limit(cell.threshold, side) else { return false };
+        let bytes = &line.bytes[line.bit / 8 + cell.start as usize * size_of::<T>()..];
+        // Most cells are whole ones, whose number of blocks the compiler knows.
+        if cell.end - cell.start == CELL_PX
+            && let Some(whole) = bytes.get(..CELL_PX as usize * size_of::<T>())
+        {
+            return T::any(whole.as_chunks().0, limit, side);
+        }
+        let (whole, rest) = bytes.as_chunks();
+        let count = ((cell.end - cell.start) as usize * size_of::<T>()).div_ceil(BLOCK);
+        match whole.get(..count) {
             Some(whole) => T::any(whole, limit, side),
             None => {
                 let mut last = [0; BLOCK];
@@ -180,44 +209,108 @@ impl<T: Sample, const BRIGHT: bool> Test for Blocks<T, BRIGHT> {
     }
 }
 
-fn pass_u8(pixels: &Pixels<'_>, plan: &Plan, side: Side, marks: &mut Marks) {
+#[multiversion(targets("x86_64+avx2"))]
+fn pass_u8<'a>(pixels: &Pixels<'a>, plan: &Plan, side: Side, marks: &mut Marks) {
     match side {
         Side::Bright => pass(pixels, plan, marks, Blocks::<u8, true>(PhantomData)),
         Side::Dark => pass(pixels, plan, marks, Blocks::<u8, false>(PhantomData)),
     }
 }
 
-fn pass_u16(pixels: &Pixels<'_>, plan: &Plan, side: Side, marks: &mut Marks) {
+#[multiversion(targets("x86_64+avx2"))]
+fn pass_u16<'a>(pixels: &Pixels<'a>, plan: &Plan, side: Side, marks: &mut Marks) {
     match side {
         Side::Bright => pass(pixels, plan, marks, Blocks::<u16, true>(PhantomData)),
         Side::Dark => pass(pixels, plan, marks, Blocks::<u16, false>(PhantomData)),
     }
 }
 
-/// Packed samples.
-struct Packed<'a> {
-    known: &'a mut Vec<(u16, Words)>,
-    side: Side,
+/// For a packed format: at each byte of a cell's a big-endian word holds one whole sample or none; there are `N` words
+/// at even and as many at odd bytes. `keep` takes the neighbours' upper bits away, `limit` is the threshold shifted to
+/// where the sample lies; the lower bits that are left of its neighbour do not change the comparison.
+#[derive(Debug, Clone, PartialEq)]
+struct Words<const N: usize> {
+    keep: [[u16; N]; 2],
+    limit: [[u16; N]; 2],
+}
+
+impl<const N: usize> Words<N> {
+    fn new(bits: usize, threshold: u16, side: Side) -> Self {
+        let never = match side {
+            Side::Bright => u16::MAX,
+            Side::Dark => 0,
+        };
+        let mut this = Self { keep: [[0; N]; 2], limit: [[never; N]; 2] };
+        for byte in 0..2 * N {
+            let within = (byte * 8).next_multiple_of(bits) - byte * 8;
+            if within >= 8 {
+                continue;
+            }
+            let shift = 16 - within - bits;
+            let t = u32::from(threshold);
+            this.keep[byte % 2][byte / 2] = u16::MAX >> within;
+            this.limit[byte % 2][byte / 2] = match side {
+                Side::Bright => (t << shift).saturating_sub(1).min(0xffff) as u16,
+                Side::Dark => ((t + 1) << shift).min(0xffff) as u16,
+            };
+        }
+        this
+    }
+
+    /// Whether any sample in `bytes` is beyond, but for those of the last byte. Where there are `2 * N + 1`, the
+    /// compiler should know.
+    #[inline(always)]
+    fn any<const BRIGHT: bool>(&self, bytes: &[u8]) -> bool {
+        let mut beyond = 0;
+        for phase in 0..2 {
+            let words = bytes[phase..phase + bytes.len() - 1].as_chunks().0.iter();
+            for ((word, keep), limit) in words.zip(&self.keep[phase]).zip(&self.limit[phase]) {
+                let v = u16::from_be_bytes(*word) & keep;
+                beyond |= if BRIGHT { v.saturating_sub(*limit) } else { limit.saturating_sub(v) };
+            }
+        }
+        beyond != 0
+    }
+}
+
+/// The words for each threshold of a recording in use, in order.
+type Known<const N: usize> = Vec<(u16, Words<N>)>;
+
+/// Packed samples; a cell takes `2 * N` bytes.
+struct Packed<'a, const N: usize, const BRIGHT: bool> {
+    known: &'a mut Known<N>,
     bits: usize,
 }
 
-impl Test for Packed<'_> {
+impl<const N: usize, const BRIGHT: bool> Test for Packed<'_, N, BRIGHT> {
     #[inline(always)]
-    fn any(&mut self, pixels: &Pixels<'_>, y: usize, at: Range<usize>, threshold: u16) -> bool {
-        let found = self.known.binary_search_by_key(&threshold, |k| k.0);
+    fn any(&mut self, line: &Line<'_>, cell: Cell) -> bool {
+        let side = if BRIGHT { Side::Bright } else { Side::Dark };
+        let found = self.known.binary_search_by_key(&cell.threshold, |k| k.0);
         let i = found.unwrap_or_else(|i| {
-            self.known.insert(i, (threshold, Words::new(self.bits, threshold, self.side)));
+            self.known.insert(i, (cell.threshold, Words::new(self.bits, cell.threshold, side)));
             i
         });
         let words = &self.known[i].1;
-        // Back to the start of a group of samples that begins on a byte.
-        let (origin, period) = (pixels.group_origin(y), if self.bits == 12 { 3 } else { 5 });
-        let mut from = origin + (at.start - origin) / period * period;
-        while from < at.end {
-            let count = (at.end - from).next_multiple_of(32).min(2 * LANES);
+        let start = line.bit + cell.start as usize * self.bits;
+        // Most cells are whole ones that begin with a sample on a byte, as words do.
+        if start.is_multiple_of(8)
+            && cell.end - cell.start == CELL_PX
+            && let Some(whole) = line.bytes.get(start / 8..start / 8 + 2 * N + 1)
+        {
+            return words.any::<BRIGHT>(whole);
+        }
+        // Others from the sample before them that does; samples run on over the ends of rows that end inside a byte.
+        let mut from = start;
+        while !from.is_multiple_of(8) {
+            from -= self.bits;
+        }
+        let (mut from, to) = (from / 8, (start + (cell.end - cell.start) as usize * self.bits).div_ceil(8));
+        while from < to {
+            let count = (to - from).next_multiple_of(2).min(2 * N);
             // At the end of the plane each is looked at.
-            let Some(chunk) = pixels.bytes.get(from..from + count + 1) else { return true };
-            if words.any(chunk, self.side) {
+            let Some(part) = line.bytes.get(from..from + count + 1) else { return true };
+            if words.any::<BRIGHT>(part) {
                 return true;
             }
             from += count;
@@ -227,100 +320,49 @@ impl Test for Packed<'_> {
 }
 
 #[multiversion(targets("x86_64+avx2"))]
-fn pass_packed<'a>(
+fn pass_packed<'a, const N: usize>(
     pixels: &Pixels<'a>,
     plan: &Plan,
     side: Side,
-    known: &mut Vec<(u16, Words)>,
+    known: &mut Known<N>,
     marks: &mut Marks,
 ) {
     let bits = pixels.format.bits_per_pixel() as usize;
     match side {
-        Side::Bright => pass(pixels, plan, marks, Packed { known, side: Side::Bright, bits }),
-        Side::Dark => pass(pixels, plan, marks, Packed { known, side: Side::Dark, bits }),
+        Side::Bright => pass(pixels, plan, marks, Packed::<N, true> { known, bits }),
+        Side::Dark => pass(pixels, plan, marks, Packed::<N, false> { known, bits }),
     }
 }
 
-/// Sixteen-bit words of a packed stretch tested at once: a multiple of the packing's period and of a vector.
-const LANES: usize = 120;
-
-/// For a packed format: at each byte of the period a big-endian word holds one whole sample or none. `keep`
-/// takes the neighbours' upper bits away, `limit` is the threshold shifted to where the sample lies; the lower
-/// bits that are left of its neighbour do not change the comparison.
-#[derive(Debug, Clone, PartialEq)]
-struct Words {
-    keep: [[u16; LANES]; 2],
-    limit: [[u16; LANES]; 2],
-}
-
-impl Words {
-    fn new(bits: usize, threshold: u16, side: Side) -> Self {
-        let period = if bits == 12 { 3 } else { 5 };
-        let never = match side {
-            Side::Bright => u16::MAX,
-            Side::Dark => 0,
-        };
-        let mut this = Self { keep: [[0; LANES]; 2], limit: [[never; LANES]; 2] };
-        for phase in 0..2 {
-            for lane in 0..LANES {
-                let byte = (2 * lane + phase) % period;
-                let within = (byte * 8).next_multiple_of(bits) - byte * 8;
-                if within >= 8 {
-                    continue;
-                }
-                let shift = 16 - within - bits;
-                this.keep[phase][lane] = u16::MAX >> within;
-                let t = u32::from(threshold);
-                this.limit[phase][lane] = match side {
-                    Side::Bright => (t << shift).saturating_sub(1).min(0xffff) as u16,
-                    Side::Dark => ((t + 1) << shift).min(0xffff) as u16,
-                };
-            }
-        }
-        this
-    }
-
-    /// Whether any sample in `bytes` is beyond, but for those of the last byte: at most `2 * LANES + 1`.
-    #[inline(always)]
-    fn any(&self, bytes: &[u8], side: Side) -> bool {
-        let mut beyond = 0;
-        for phase in 0..2 {
-            let words = bytes[phase..phase + bytes.len() - 1].chunks_exact(2);
-            for ((b, keep), limit) in words.zip(&self.keep[phase]).zip(&self.limit[phase]) {
-                let v = u16::from_be_bytes([b[0], b[1]]) & keep;
-                beyond |= match side {
-                    Side::Bright => v.saturating_sub(*limit),
-                    Side::Dark => limit.saturating_sub(v),
-                };
-            }
-        }
-        beyond != 0
-    }
+/// Words in half of the bytes of a cell of packed samples.
+const fn words_of(bits: usize) -> usize {
+    CELL_PX as usize * bits / 8 / 2
 }
 
 /// Finds the cells of a frame that may hold a pixel beyond the threshold; owns its scratch.
 #[derive(Debug, Default)]
 pub(crate) struct Skip {
     marks: Marks,
-    /// By threshold, for one packed format and side.
-    words: Vec<(u16, Words)>,
-    words_of: Option<(PixelFormat, Side)>,
+    known_10: Known<{ words_of(10) }>,
+    known_12: Known<{ words_of(12) }>,
+    /// The side that words are known for.
+    side: Option<Side>,
 }
 
 impl Skip {
     /// The cells that may hold a pixel beyond their threshold, row by row. None is left out that does; pixels just
     /// beside a cell may be the reason that it is there.
     pub fn find(&mut self, pixels: &Pixels<'_>, plan: &Plan, side: Side) {
+        if self.side != Some(side) {
+            self.known_10.clear();
+            self.known_12.clear();
+            self.side = Some(side);
+        }
         match pixels.format {
             PixelFormat::Gray8 => pass_u8(pixels, plan, side, &mut self.marks),
             PixelFormat::Gray16 => pass_u16(pixels, plan, side, &mut self.marks),
-            PixelFormat::Packed10 | PixelFormat::Packed12 => {
-                if self.words_of != Some((pixels.format, side)) {
-                    self.words.clear();
-                    self.words_of = Some((pixels.format, side));
-                }
-                pass_packed(pixels, plan, side, &mut self.words, &mut self.marks);
-            }
+            PixelFormat::Packed10 => pass_packed(pixels, plan, side, &mut self.known_10, &mut self.marks),
+            PixelFormat::Packed12 => pass_packed(pixels, plan, side, &mut self.known_12, &mut self.marks),
         }
     }
 
@@ -333,7 +375,6 @@ impl Skip {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::detect::plan::CELL_PX;
 
     #[test]
     fn a_single_pixel_is_never_passed_over_in_any_format() {
