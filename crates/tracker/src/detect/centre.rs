@@ -2,11 +2,12 @@
 //!
 //! Owns: [`Centre`], [`Window`]. Must not: decide what is a marker.
 
-use super::fit::{DiscFit, Fitted, LEAST_PATH_PX, Patch, Ring, Start};
+use super::fit::{DiscFit, Fitted, LEAST_PATH_PX, Start};
 use super::lanes::{Eight, Job, LANES, work};
 use super::levels::{Levels, Side};
 use super::mask::Spans;
 use super::pixels::Pixels;
+use super::ring::{Patch, Ring};
 use super::runs::Blob;
 
 /// A centre and what was seen on the way to it.

@@ -2,10 +2,9 @@
 //!
 //! Owns: [`Pixels`]. Must not: judge a sample.
 
+use super::lanes::{Eight, Job, LANES, work};
 use crate::error::{Error, Fault, Place, Result};
 use crate::frame::{Frame, PixelFormat};
-
-use super::lanes::{Eight, Job, LANES, work};
 
 /// A frame's plane, checked once so that every row inside it can be read.
 #[derive(Clone, Copy)]
@@ -62,6 +61,14 @@ impl<'a> Pixels<'a> {
     pub fn start(&self, y: usize, x: usize) -> (usize, usize) {
         let bit = y * self.row_bits + x * self.format.bits_per_pixel() as usize;
         (bit / 8, bit % 8)
+    }
+
+    /// Asks memory for samples from `x` of row `y` on, as many of `count` as there are, without waiting for them.
+    #[inline]
+    pub fn fetch(&self, y: usize, x: usize, count: usize) {
+        let (byte, _) = self.start(y, x);
+        let end = self.bytes.len().min(byte + count * self.format.bits_per_pixel() as usize / 8);
+        self.bytes[byte..end].chunks(64).for_each(fetch);
     }
 
     /// Samples from `x` of row `y` into `out`, as many as `out` holds.
@@ -148,6 +155,19 @@ impl<'a> Pixels<'a> {
         }
         single(rest, (from + groups.len() * BYTES) * 8);
     }
+}
+
+/// Asks memory for the line that some bytes begin in.
+#[inline]
+fn fetch(bytes: &[u8]) {
+    #[cfg(target_arch = "x86_64")]
+    {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        // SAFETY: every x86-64 processor has the instruction, and it reads nothing.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(bytes.as_ptr().cast()) };
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = bytes;
 }
 
 /// Bytes as floats, row by row in whole eights.

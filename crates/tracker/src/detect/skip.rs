@@ -1,6 +1,6 @@
 //! Passing over background at the speed of memory: which cells may hold a pixel beyond the threshold.
 //!
-//! Owns: [`Skip`], the trait [`Sample`]. Must not: say where in a cell. The extreme of many bytes, or saturating
+//! Owns: [`Skip`], the trait [`Sample`]. Must not: say where in a cell. The extreme of many samples, or saturating
 //! differences or-ed together, and one test at the end.
 
 use std::array::from_fn;
@@ -28,7 +28,7 @@ pub(crate) trait Sample: Copy {
 }
 
 macro_rules! sample {
-    ($t:ty, $any:ident, $beyond:ident) => {
+    ($t:ty, $beyond:ident) => {
         impl Sample for $t {
             #[inline(always)]
             fn limit(threshold: u16, side: Side) -> Option<Self> {
@@ -39,9 +39,20 @@ macro_rules! sample {
                 }
             }
 
+            // Written so that the compiler makes one vector of what is farthest, and one instruction a block.
             #[inline(always)]
             fn any(blocks: &[Block], limit: Self, side: Side) -> bool {
-                $any(blocks, limit, side)
+                let mut farthest = [limit; BLOCK / size_of::<$t>()];
+                for block in blocks {
+                    for (f, bytes) in farthest.iter_mut().zip(block.as_chunks().0) {
+                        let v = <$t>::from_le_bytes(*bytes);
+                        *f = match side {
+                            Side::Bright => v.max(*f),
+                            Side::Dark => v.min(*f),
+                        };
+                    }
+                }
+                farthest.iter().fold(0, |all, f| all | (f ^ limit)) != 0
             }
 
             #[inline(always)]
@@ -51,15 +62,23 @@ macro_rules! sample {
         }
     };
 }
-sample!(u8, any_u8, beyond_u8);
-sample!(u16, any_u16, beyond_u16);
+sample!(u8, beyond_u8);
+sample!(u16, beyond_u16);
+
+/// Bytes that are worked on together.
+const BLOCK: usize = 32;
+type Block = [u8; BLOCK];
 
 #[inline(always)]
 fn beyond_u8(many: &[u8; MANY], limit: u8, side: Side) -> u64 {
     let limit = u8x16::splat(limit);
     let within = many.as_chunks().0.iter().enumerate().fold(0, |bits, (i, few)| {
-        let further = further(u8x16::new(*few), limit, side);
-        bits | u64::from(further.simd_eq(limit).to_bitmask()) << (16 * i)
+        let values = u8x16::new(*few);
+        let farther = match side {
+            Side::Bright => values.max(limit),
+            Side::Dark => values.min(limit),
+        };
+        bits | u64::from(farther.simd_eq(limit).to_bitmask()) << (16 * i)
     });
     !within
 }
@@ -68,61 +87,15 @@ fn beyond_u8(many: &[u8; MANY], limit: u8, side: Side) -> u64 {
 fn beyond_u16(many: &[u16; MANY], limit: u16, side: Side) -> u64 {
     let limit = u16x8::splat(limit);
     let within = many.as_chunks().0.iter().enumerate().fold(0, |bits, (i, few)| {
-        let beyond = distance(u16x8::new(*few), limit, side);
+        let values = u16x8::new(*few);
+        // Not every processor has extremes of 16 bits, but all have saturating differences.
+        let beyond = match side {
+            Side::Bright => values.saturating_sub(limit),
+            Side::Dark => limit.saturating_sub(values),
+        };
         bits | u64::from(beyond.simd_eq(u16x8::splat(0)).to_bitmask()) << (8 * i)
     });
     !within
-}
-
-/// What is farther on the markers' side.
-#[inline(always)]
-fn further(a: u8x16, b: u8x16, side: Side) -> u8x16 {
-    match side {
-        Side::Bright => a.max(b),
-        Side::Dark => a.min(b),
-    }
-}
-
-/// How far beyond the limit: not every processor has extremes of 16 bits, but all have saturating differences.
-#[inline(always)]
-fn distance(values: u16x8, limit: u16x8, side: Side) -> u16x8 {
-    match side {
-        Side::Bright => values.saturating_sub(limit),
-        Side::Dark => limit.saturating_sub(values),
-    }
-}
-
-/// Bytes that are worked on together: four vectors of every processor.
-const BLOCK: usize = 64;
-type Block = [u8; BLOCK];
-
-/// The extreme of bytes.
-#[inline(always)]
-fn any_u8(blocks: &[Block], limit: u8, side: Side) -> bool {
-    let limit = u8x16::splat(limit);
-    let mut extremes = [limit; 4];
-    for block in blocks {
-        for (e, few) in extremes.iter_mut().zip(block.as_chunks().0) {
-            *e = further(*e, u8x16::new(*few), side);
-        }
-    }
-    let [a, b, c, d] = extremes;
-    further(further(a, b, side), further(c, d, side), side).simd_eq(limit).to_bitmask() != 0xffff
-}
-
-/// Little-endian samples in bytes.
-#[inline(always)]
-fn any_u16(blocks: &[Block], limit: u16, side: Side) -> bool {
-    let limit = u16x8::splat(limit);
-    let mut beyond = [u16x8::splat(0); 4];
-    for block in blocks {
-        for (b, few) in beyond.iter_mut().zip(block.as_chunks::<16>().0) {
-            let pairs: [[u8; 2]; 8] = from_fn(|i| [few[2 * i], few[2 * i + 1]]);
-            *b |= distance(u16x8::new(pairs.map(u16::from_le_bytes)), limit, side);
-        }
-    }
-    let [a, b, c, d] = beyond;
-    ((a | b) | (c | d)).simd_eq(u16x8::splat(0)).to_bitmask() != 0xff
 }
 
 /// Parts of a frame that are read side by side: a processor that reads one row after another waits for memory half

@@ -1,0 +1,119 @@
+//! The pixels near the edge of a disc, packed one after another.
+//!
+//! Owns: [`Patch`], [`Ring`]. Must not: judge them.
+
+use super::lanes::{Eight, Job, LANES, work};
+use super::normal::Found;
+
+/// A rectangle of pixels, raw units; behind the last pixel come [`LANES`] more values that mean nothing.
+pub(crate) struct Patch<'a> {
+    pub values: &'a [f32],
+    pub width: usize,
+    pub height: usize,
+    /// Values from the start of one row to the next.
+    pub stride: usize,
+    /// Image coordinates of its first pixel.
+    pub x0: f64,
+    pub y0: f64,
+}
+
+const STEPS: [f32; LANES] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
+
+/// Pixels around an edge: place relative to the first guess of the centre, value, and 1 where it counts.
+#[derive(Debug, Default)]
+pub(crate) struct Ring {
+    pub x: Vec<f32>,
+    pub y: Vec<f32>,
+    pub value: Vec<f32>,
+    pub live: Vec<f32>,
+    /// How many there are; those that fill up the last eight do not count.
+    pub used: usize,
+    pub saturated: u32,
+    /// What is found of eight pixels on the way to the normal equations.
+    pub eights: Vec<Found>,
+}
+
+impl Ring {
+    /// Takes the pixels between two distances from a centre.
+    pub fn choose(&mut self, patch: &Patch<'_>, centre: [f64; 2], inner: f64, outer: f64) {
+        work(Choose { patch, centre, inner, outer, ring: self });
+    }
+
+    fn begin(&mut self, most: usize) {
+        for lanes in [&mut self.x, &mut self.y, &mut self.value, &mut self.live] {
+            if lanes.len() < most {
+                lanes.resize(most, 0.0);
+            }
+        }
+        let eights = most.div_ceil(LANES);
+        if self.eights.len() < eights {
+            self.eights.resize(eights, Found::default());
+        }
+        self.used = 0;
+        self.saturated = 0;
+    }
+
+    /// `count` pixels of a row from `values` on, the first at `x`; up to seven beyond are written too and then
+    /// overwritten by those that follow.
+    #[inline(always)]
+    fn push<V: Eight>(&mut self, token: V::Token, x: f32, y: f32, values: &[f32], count: usize) {
+        let (steps, y) = (V::of(token, &STEPS), V::all(token, y).array());
+        for k in (0..count).step_by(LANES) {
+            let (at, first) = (self.used + k, x + k as f32);
+            let to = at..at + LANES;
+            self.x[to.clone()].copy_from_slice(&(V::all(token, first) + steps).array());
+            self.y[to.clone()].copy_from_slice(&y);
+            self.value[to].copy_from_slice(&values[k..k + LANES]);
+        }
+        self.used += count;
+    }
+}
+
+/// Takes pixels by their distance from a centre.
+struct Choose<'a> {
+    patch: &'a Patch<'a>,
+    centre: [f64; 2],
+    inner: f64,
+    outer: f64,
+    ring: &'a mut Ring,
+}
+
+impl Job for Choose<'_> {
+    type Outcome = ();
+
+    #[inline(always)]
+    fn run<V: Eight>(self, token: V::Token) {
+        let Self { patch, centre: [cx, cy], outer, inner, ring } = self;
+        let all = |v: f64| V::all(token, v as f32);
+        let (left, above) = (cx - patch.x0, cy - patch.y0);
+        let first = (above - outer).max(0.0) as usize;
+        let last = ((above + outer).max(0.0) as usize + 1).min(patch.height);
+        ring.begin(last.saturating_sub(first) * (patch.width + 2 * LANES));
+        let (zero, width) = (all(0.0), all(patch.width as f64));
+        // The first pixel behind a place.
+        let behind = |x: V| (x + all(1.0)).most(zero).least(width).whole().map(|i| i as usize);
+        for eight in (first..last).step_by(LANES) {
+            let dy = all(eight as f64 - above) + V::of(token, &STEPS);
+            let half = |r: f64| (all(r * r) - dy * dy).most(zero).root();
+            let (far, near, middle) = (half(outer), half(inner), all(left));
+            let (a, b) = (behind(middle - far), behind(middle - near));
+            let (c, d) = (behind(middle + near), behind(middle + far));
+            let dy = dy.array();
+            for j in eight..last.min(eight + LANES) {
+                let k = j - eight;
+                // Left and right of the hole, or all of it.
+                let parts = if b[k] < c[k] { [(a[k], b[k]), (c[k], d[k])] } else { [(a[k], d[k]), (0, 0)] };
+                for (from, to) in parts {
+                    if from < to {
+                        let values = &patch.values[j * patch.stride + from..];
+                        ring.push::<V>(token, (from as f64 - left) as f32, dy[k], values, to - from);
+                    }
+                }
+            }
+        }
+        // Those that fill up the last eight do not count.
+        let used = ring.used;
+        ring.live[..used].fill(1.0);
+        ring.live[used..used.next_multiple_of(LANES)].fill(0.0);
+    }
+}
