@@ -124,20 +124,31 @@ def plan(options: Options, folder: Path, digests: Digests | None = None) -> list
             lambda into, tell, resume: stages.prediction(found, options, folder, into, tell),
         )
     for r in found:
-        if r.kind == "film" and options.overlay:
-            _plan_overlay(r, folder / r.name, add)
+        _plan_page(r, options, folder / r.name, add)
     return out
 
 
-def _plan_overlay(r: Recording, here: Path, add: Callable[..., None]) -> None:
-    add(
-        f"{r.name}/overlay",
-        f"Drawing into {r.label}",
-        (f"{r.name}/track",),
-        r.name,
-        [r.digest],
-        lambda into, tell, resume: stages.overlay(r, here, into, tell),
-    )
+def _plan_page(r: Recording, options: Options, here: Path, add: Callable[..., None]) -> None:
+    """What only the page needs, and no number waits for."""
+    needs = (f"{r.name}/track",) if r.kind == "film" else ()
+    if r.kind != "angles":
+        add(
+            f"{r.name}/markers",
+            f"Markers of {r.label} against their rigid bodies",
+            needs,
+            r.name,
+            [r.digest],
+            lambda into, tell, resume: stages.markers(r, here, into),
+        )
+    if r.kind == "film" and options.overlay:
+        add(
+            f"{r.name}/overlay",
+            f"Drawing into {r.label}",
+            needs,
+            r.name,
+            [r.digest],
+            lambda into, tell, resume: stages.overlay(r, here, into, tell),
+        )
 
 
 def _plan_recording(
@@ -155,15 +166,6 @@ def _plan_recording(
             ("nodes.parquet",),
         )
         needs = (f"{r.name}/track",)
-    if r.kind != "angles":
-        add(
-            f"{r.name}/markers",
-            f"Markers of {r.label} against their rigid bodies",
-            needs,
-            r.name,
-            [r.digest],
-            lambda into, tell, resume: stages.markers(r, here, into),
-        )
     add(
         f"{r.name}/angles",
         f"Angles of {r.label}",

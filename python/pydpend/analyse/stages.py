@@ -6,8 +6,10 @@ write to. Every function returns one sentence for ``run.json``.
 
 from __future__ import annotations
 
+import importlib
 import json
 import math
+import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -50,10 +52,17 @@ def _share(tell: Tell) -> Callable[[str, int, int | None], None]:
     return progress
 
 
+def _import_ahead() -> None:
+    for name in ("scipy.special", "scipy.optimize", "matplotlib.figure"):
+        importlib.import_module(name)
+
+
 def track(r: Recording, options: Options, into: Path, tell: Tell, resume: bool) -> str:
     """Film to ``nodes.parquet``; ``resume``: go on with what an interrupted run of the same left."""
     from pydpend.tracking import track as track_film
 
+    # Tracking is busy outside Python; what the stages after it compute with is imported meanwhile.
+    threading.Thread(target=_import_ahead).start()
     nodes = track_film(
         r.path,
         options.rig,
