@@ -171,6 +171,15 @@ def test_profile_of_a_coefficient_at_zero_is_one_sided_and_bends_the_others() ->
         fit_damping(angles, MODEL, "energy", intervals="profile")
 
 
+def test_no_profile_where_there_is_no_likelihood() -> None:
+    model = replace(MODEL, lambda_kg_m2=MODEL.lambda_kg_m2 * 1.1)
+    angles = measured(released(8, 8.0, 250.0), 8, 0.01)
+    fit = fit_damping(angles, model, laws="mu_q1,rmu1", ratios=False, intervals="profile")
+    assert fit.chi2_slack > 10
+    assert not fit.intervals
+    assert any(note.startswith("no intervals by profile likelihood: chi-square is") for note in fit.notes)
+
+
 def test_repeatable_bias_is_learned_and_taken_off_another_recording() -> None:
     def biased(seed: int) -> tuple[LinkAngles, np.ndarray]:
         angles = measured(released(seed, 16.0, 500.0), seed, 0.05)

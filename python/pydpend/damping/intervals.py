@@ -38,6 +38,25 @@ FARTHER = 3.0
 """Most that one refit goes beyond the last."""
 
 
+LARGEST = 10.0
+"""Chi-square with the slack beyond which there is no likelihood to profile: less than a tenth of what is left of the
+angles is noise. The rise is then that of model error, and one number per coefficient does not turn it into a
+likelihood's: along a profile others come to their bound zero, and in the directions that remain model error has raised
+the variance by quite another factor (7000 and 14000 in two of trial1's with Table 8's ratios held)."""
+
+
+def refusal(solution: Solution) -> str:
+    """Why there are no intervals by profile likelihood; empty where there can be."""
+    if solution.chi2 <= LARGEST:
+        return ""
+    return (
+        f"no intervals by profile likelihood: chi-square is {solution.chi2:.0f} even with the slack, so what is left "
+        "of the angles is not their noise, and its likelihood says nothing of the coefficients; the standard errors "
+        "are from the scatter of the residuals. Give better constants or free the ratios, or truer uncertainties of "
+        "the angles"
+    )
+
+
 @dataclass
 class _Profile:
     """The rise along one coefficient, refit by refit."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pydpend.coefficients import FULL, RATIOS, parameters, ratios_of
 from pydpend.damping import maps, plausible, shooting
-from pydpend.damping.intervals import profile_intervals
+from pydpend.damping.intervals import profile_intervals, refusal
 from pydpend.damping.recording import Recording
 from pydpend.damping.result import DampingFit, estimates
 from pydpend.damping.shares import energy_curve, shares, unit_works
@@ -130,6 +130,8 @@ def fit_trajectory(
     fit = _judge(recordings, used, model, names, wanted, solution, bias, progress)
     if not profile:
         return fit
+    if refused := refusal(solution):
+        return replace(fit, notes=(*fit.notes, refused))
     found = profile_intervals(used, solution, fit.coefficients, huber=huber, progress=progress)
     return replace(fit, intervals=found)
 

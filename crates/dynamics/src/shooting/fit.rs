@@ -114,6 +114,7 @@ pub fn fit(
     while iterations < settings.max_iterations {
         let step = problem.step(&point, &locals, weight(slack), &mut damping);
         iterations += 1;
+        let moved = step.next.is_some();
         if let Some(next) = step.next {
             point = next;
             locals = problem.locals(&point);
@@ -159,7 +160,8 @@ pub fn fit(
             status = Status::Converged;
             break;
         }
-        if step.damping > STUCK {
+        // Without a step the next one would be tried from the same point with the same damping.
+        if !moved || step.damping > STUCK {
             status = Status::Stalled;
             break;
         }
@@ -177,14 +179,14 @@ pub fn fit(
     };
     let chained_count = segments.iter().filter(|s| s.chained).count() as f64;
     let cost = problem.local_cost(&point, &locals, weight(slack));
-    // Components whose slack is not what their jumps ask for, but given or the least allowed.
-    let given = match settings.slack {
-        Slack::Learned(_) => {
-            let lowest = floor(own);
-            std::array::from_fn(|i| slack[i] < lowest[i] * (1.0 + KNOWN))
-        }
-        _ => [true; 4],
-    };
+    // Components whose slack is not what their jumps ask for, but given or the least allowed. A link that is not there
+    // does not jump and says nothing.
+    let lowest = floor(own);
+    let links = recordings.iter().map(|r| r.links).max().unwrap_or(2);
+    let given = std::array::from_fn(|i| {
+        let asked = matches!(settings.slack, Slack::Learned(_)) && slack[i] >= lowest[i] * (1.0 + KNOWN);
+        i % 2 < links && !asked
+    });
     let jumps_shown = if chained { shown(&problem, &point, &locals, slack, given) } else { [1.0; 4] };
     let log_evidence =
         -cost - chained_count * slack.iter().map(|s| s.ln()).sum::<f64>() - 0.5 * done.log_determinant();
