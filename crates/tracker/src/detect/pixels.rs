@@ -158,8 +158,8 @@ impl<'a> Pixels<'a> {
 }
 
 /// Asks memory for the line that some bytes begin in.
-#[inline]
-fn fetch(bytes: &[u8]) {
+#[inline(always)]
+pub(crate) fn fetch(bytes: &[u8]) {
     #[cfg(target_arch = "x86_64")]
     {
         use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};

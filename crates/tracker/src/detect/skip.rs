@@ -10,7 +10,7 @@ use multiversion::multiversion;
 use wide::{u8x16, u16x8};
 
 use super::levels::Side;
-use super::pixels::Pixels;
+use super::pixels::{Pixels, fetch};
 use super::plan::{CELL_PX, Cell, Plan};
 use crate::frame::PixelFormat;
 
@@ -198,6 +198,9 @@ fn pass_u16<'a>(pixels: &Pixels<'a>, plan: &Plan, side: Side, marks: &mut Marks)
     }
 }
 
+/// Words that are worked on together.
+const FEW: usize = 16;
+
 /// For a packed format: at each byte of a cell's a big-endian word holds one whole sample or none; there are `N` words
 /// at even and as many at odd bytes. `keep` takes the neighbours' upper bits away, `limit` is the threshold shifted to
 /// where the sample lies; the lower bits that are left of its neighbour do not change the comparison.
@@ -230,14 +233,33 @@ impl<const N: usize> Words<N> {
         this
     }
 
-    /// Whether any sample in `bytes` is beyond, but for those of the last byte. Where there are `2 * N + 1`, the
-    /// compiler should know.
+    /// Whether any sample in `2 * N + 1` bytes is beyond, but for those of the last byte.
+    // Written so that the compiler makes one vector of what is beyond.
     #[inline(always)]
     fn any<const BRIGHT: bool>(&self, bytes: &[u8]) -> bool {
+        let mut beyond = [0; FEW];
+        for (phase, (keep, limit)) in self.keep.iter().zip(&self.limit).enumerate() {
+            let words: &[[u8; 2]] = bytes[phase..phase + 2 * N].as_chunks().0;
+            for few in 0..N.div_ceil(FEW) {
+                // The last ones may be looked at twice.
+                let at = (few * FEW).min(N - FEW);
+                let (words, keep, limit) = (&words[at..at + FEW], &keep[at..at + FEW], &limit[at..at + FEW]);
+                for (i, beyond) in beyond.iter_mut().enumerate() {
+                    let v = u16::from_be_bytes(words[i]) & keep[i];
+                    *beyond |= if BRIGHT { v.saturating_sub(limit[i]) } else { limit[i].saturating_sub(v) };
+                }
+            }
+        }
+        beyond.iter().fold(0, |all, b| all | b) != 0
+    }
+
+    /// The same in fewer bytes.
+    #[inline(always)]
+    fn any_of_few<const BRIGHT: bool>(&self, bytes: &[u8]) -> bool {
         let mut beyond = 0;
-        for phase in 0..2 {
+        for (phase, (keep, limit)) in self.keep.iter().zip(&self.limit).enumerate() {
             let words = bytes[phase..phase + bytes.len() - 1].as_chunks().0.iter();
-            for ((word, keep), limit) in words.zip(&self.keep[phase]).zip(&self.limit[phase]) {
+            for ((word, keep), limit) in words.zip(keep).zip(limit) {
                 let v = u16::from_be_bytes(*word) & keep;
                 beyond |= if BRIGHT { v.saturating_sub(*limit) } else { limit.saturating_sub(v) };
             }
@@ -266,6 +288,10 @@ impl<const N: usize, const BRIGHT: bool> Test for Packed<'_, N, BRIGHT> {
         });
         let words = &self.known[i].1;
         let start = line.bit + cell.start as usize * self.bits;
+        // What is next but one in this stream: a cell takes so long that a processor does not look that far ahead.
+        if let Some(next) = line.bytes.get(start / 8 + 4 * N..start / 8 + 6 * N) {
+            next.chunks(64).for_each(fetch);
+        }
         // Most cells are whole ones that begin with a sample on a byte, as words do.
         if start.is_multiple_of(8)
             && cell.end - cell.start == CELL_PX
@@ -283,7 +309,7 @@ impl<const N: usize, const BRIGHT: bool> Test for Packed<'_, N, BRIGHT> {
             let count = (to - from).next_multiple_of(2).min(2 * N);
             // At the end of the plane each is looked at.
             let Some(part) = line.bytes.get(from..from + count + 1) else { return true };
-            if words.any::<BRIGHT>(part) {
+            if words.any_of_few::<BRIGHT>(part) {
                 return true;
             }
             from += count;
