@@ -11,7 +11,7 @@ use super::marker::{self, Sample};
 use super::pixels::Pixels;
 use super::{DetectSettings, Polarity, Threshold};
 use crate::error::{Error, Fault, Place, Result};
-use crate::frame::{Frame, PixelFormat};
+use crate::frame::Frame;
 
 pub use super::background::Background;
 pub use super::marker::Marker;
@@ -183,16 +183,11 @@ impl Levels {
             ));
         }
         let noise = Noise { read, shot: 0.0, dark: background.median() };
-        let bytes: Vec<Vec<u8>> =
-            images.par_iter().map(|i| i.iter().flat_map(|v| v.to_le_bytes()).collect()).collect();
         let samples: Vec<Sample<'_>> = best
             .blobs
             .iter()
             .filter(|b| b.area >= area_px[0] && b.area <= area_px[1])
-            .map(|b| Sample {
-                pixels: Pixels::of_samples(&bytes[b.image], width, height, PixelFormat::Gray16),
-                blob: b.blob,
-            })
+            .map(|b| Sample { pixels: planes[b.image], blob: b.blob })
             .collect();
         let (marker, noise) = match marker::learn(&samples, best.side, noise, saturation) {
             Some((marker, noise)) => (Some(marker), noise),
