@@ -190,6 +190,38 @@ def test_zoom_is_shared_and_undone(opened: Page) -> None:
     until(opened, f"{ranges}.every(r => r[1] - r[0] > 2.9)")
 
 
+def test_a_drag_with_shift_moves_and_keys_too(opened: Page) -> None:
+    over = opened.locator("#two .u-over")
+    over.scroll_into_view_if_needed()
+    box = over.bounding_box()
+    assert box is not None
+    x, y = box["x"] + 0.5 * box["width"], box["y"] + box["height"] / 2
+    ranges = "window.pydpendReport.groups.get('g').charts.map(c => [c.scales.x.min, c.scales.x.max])"
+    opened.mouse.move(x, y)
+    opened.keyboard.down("Control")
+    opened.mouse.wheel(0, -100)
+    opened.keyboard.up("Control")
+    # Four fifths of 3 s are left, the middle where it was; a tenth of the plot to the left is 0.24 s on.
+    until(opened, f"{ranges}.every(r => Math.abs(r[0] - 0.3) < 0.02 && Math.abs(r[1] - 2.7) < 0.02)")
+    opened.keyboard.down("Shift")
+    opened.mouse.down()
+    opened.mouse.move(x - 0.1 * box["width"], y, steps=4)
+    opened.mouse.up()
+    opened.keyboard.up("Shift")
+    until(opened, f"{ranges}.every(r => Math.abs(r[0] - 0.54) < 0.02 && Math.abs(r[1] - 2.94) < 0.02)")
+    opened.focus("#two")
+    opened.keyboard.press("Shift+ArrowLeft")
+    until(opened, f"{ranges}.every(r => Math.abs(r[0] - 0.3) < 0.02 && Math.abs(r[1] - 2.7) < 0.02)")
+
+
+def test_charts_stay_within_a_printed_page(opened: Page) -> None:
+    opened.set_viewport_size({"width": 680, "height": 900})  # A4 less its margins
+    opened.emulate_media(media="print")
+    wide = "[...document.querySelectorAll('.chart canvas')].map(c => c.getBoundingClientRect().right)"
+    assert max(opened.evaluate(wide)) <= 680
+    assert not opened.evaluate("[...document.querySelectorAll('.u-over')].some(o => o.offsetParent !== null)")
+
+
 def test_two_fingers_zoom_and_one_moves(browser: Browser, html: Path) -> None:
     with open_report(browser, html, width=390, touch=True) as page:
         over = page.locator("#two .u-over")

@@ -13,6 +13,8 @@ from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Browser, Page
 from pydpend.analyse import Options, analyse
 from pydpend.nodes import Rig, read_nodes
+from pydpend.report import report_page
+from pydpend.report.page import Heading
 
 from tests.browsing import open_report, until
 
@@ -150,6 +152,32 @@ def test_it_prints(opened: Page) -> None:
     assert opened.evaluate(shown, "#r0-phi canvas")
     pages = opened.pdf(format="A4").count(b"/Type /Page\n")
     assert 3 <= pages <= 15
+
+
+def test_the_answer_comes_first_and_in_words(opened: Page) -> None:
+    answer = opened.inner_text("#answer")
+    assert answer.index("Of the energy lost") < answer.index("mu_v1") < answer.index("markers seen")
+    assert "viscous friction, upper joint" in answer
+    assert "The last part predicted from a fit to the rest" in answer
+    # psi of Table 8's parts: 3.431e6 +- 3.7e4 g mm2.
+    assert "This 1.1 % is common to all coefficients" in answer.replace("\u00a0", " ")
+    # One line an option, and still a command.
+    said = opened.inner_text("#reproduce pre")
+    assert said.startswith("pydpend analyse ")
+    assert "\\\n    --calibration" in said
+
+
+def test_an_energy_fit_whose_laws_miss_is_warned_of(demo_run: Path, tmp_path: Path) -> None:
+    nodes = str(demo_run / "drop" / "nodes.parquet")
+    options = Options(
+        inputs=(nodes,), zero="-178,-182", start_s=0.6, method="energy", laws="paper", ten_coefficients=True
+    )
+    analyse(options, tmp_path / "run")
+    page = report_page(tmp_path / "run")
+    # The film has constant dry torques, which are none of the paper's laws.
+    assert any("do not take out the energy" in w for w in page.warnings)
+    headings = [b.text for s in page.sections for b in s.blocks if isinstance(b, Heading)]
+    assert "The paper's ten coefficients" in headings
 
 
 @pytest.fixture(scope="module")
