@@ -317,7 +317,7 @@ def _constants(fit: dict[str, Any]) -> list[Block]:
 
 def ratio_unit(name: str) -> str:
     """Unit of a ratio over psi, as a page has it."""
-    return {"1": "", "1/s2": "s⁻²"}[RATIO_UNITS[name]]
+    return "" if RATIO_UNITS[name] == "1" else with_squares(RATIO_UNITS[name])
 
 
 def _ten(fit: dict[str, Any]) -> list[Block]:

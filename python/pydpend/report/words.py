@@ -66,7 +66,7 @@ def digits(value: float, count: int = 2) -> str:
 
 def with_squares(unit: str) -> str:
     """``N m s2`` as ``N m s²``, on one line."""
-    return re.sub(r"\b([ms])2\b", r"\1²", unit).replace(" ", "\u00a0")
+    return re.sub(r"\b([ms])2\b", r"\1²", unit.replace("1/s2", "s⁻²")).replace(" ", "\u00a0")
 
 
 def sentence(text: str) -> str:
