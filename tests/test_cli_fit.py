@@ -161,7 +161,7 @@ def test_a_single_pendulum_with_a_model_of_one_link(folder: Path, tmp_path: Path
         "angles of one link": ("fit", one, "--model", "derived"),
         "angles of two links": ("fit", folder / "21.csv", "--model", bar),
         "no elbow to pin": ("fit", one, "--model", bar, "--pinned"),
-        "links, but the model 'the stored fit' has one": ("predict", folder / "21.csv", "--fit", tmp_path / "out"),
+        "but the fit is of one. Give a table of one link": ("predict", folder / "21.csv", "--fit", tmp_path / "out"),
     }  # fmt: skip
     for words, arguments in cases.items():
         done = command(*arguments, "-o", tmp_path / "none", "--quiet")

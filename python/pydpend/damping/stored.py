@@ -15,7 +15,6 @@ from pydpend.damping.maps import Maps, corrected
 from pydpend.damping.prediction import WINDOWS_S, Prediction, initial_state, predict
 from pydpend.damping.recording import prepare
 from pydpend.damping.result import DampingFit
-from pydpend.damping.single import same_links
 from pydpend.errors import FitError, fault
 from pydpend.model import Model
 
@@ -63,7 +62,12 @@ class StoredFit:
     ) -> Prediction:
         """Predicts a recording's free decay. Raises FitError when it has none, or other links than the fit."""
         model = self.model()
-        same_links([angles], model)
+        if angles.links > model.links:
+            advice = "Give a table of one link (time_s, phi1_rad; zero where the body hangs), or a fit without --pinned"
+            raise FitError(fault(angles.name, "angles of two links, but the fit is of one", advice))
+        if angles.links < model.links:
+            advice = "Give a table of both links, or a fit of a one-link model"
+            raise FitError(fault(angles.name, "angles of one link, but the fit is of two", advice))
         recording = prepare(angles, model, start_s, stop_s)
         return predict(recording, self.parameters, windows_s, self.maps)
 
