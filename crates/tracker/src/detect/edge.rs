@@ -63,13 +63,12 @@ impl EdgeTable {
                 // Past the centre the far edge would come in; a small disc ends there.
                 *v = if rho <= 0.0 { 1.0 } else { disc_in_pixel(rho * c, rho * s, radius_px) };
             }
-            for (i, v) in soft.iter_mut().enumerate() {
-                *v = if spread == 0 {
-                    sharp[i]
-                } else {
-                    kernel.iter().zip(&sharp[i..]).map(|(a, b)| a * b).sum::<f64>() / total
-                };
+            // Tap after tap, so that the compiler works on many places at once.
+            soft.fill(0.0);
+            for (tap, weight) in kernel.iter().enumerate() {
+                soft.iter_mut().zip(&sharp[tap..]).for_each(|(to, v)| *to += weight * v);
             }
+            soft.iter_mut().for_each(|v| *v /= total);
             for i in 0..columns {
                 // The slope over two steps: coverage has kinks, and a pixel is found within half a step.
                 let slope = (soft[i + 2] - soft[i]) * PER_PX as f64 / 2.0;

@@ -89,8 +89,8 @@ impl<'a> Pixels<'a> {
                     *o = u16::from_le_bytes([b[0], b[1]]);
                 }
             }
-            PixelFormat::Packed10 => self.unpack::<10, 4, 5>(byte, skip, out),
-            PixelFormat::Packed12 => self.unpack::<12, 2, 3>(byte, skip, out),
+            PixelFormat::Packed10 => self.unpack::<10>(byte, skip, out),
+            PixelFormat::Packed12 => self.unpack::<12>(byte, skip, out),
         }
     }
 
@@ -121,13 +121,8 @@ impl<'a> Pixels<'a> {
         }
     }
 
-    /// Most significant bits first, `COUNT` samples in `BYTES` bytes.
-    fn unpack<const BITS: usize, const COUNT: usize, const BYTES: usize>(
-        &self,
-        byte: usize,
-        skip: usize,
-        out: &mut [u16],
-    ) {
+    /// Most significant bits first.
+    fn unpack<const BITS: usize>(&self, byte: usize, skip: usize, out: &mut [u16]) {
         let mask = (1 << BITS) - 1;
         // A sample of 10 or 12 bits spans at most three bytes.
         let single = |out: &mut [u16], mut bit: usize| {
@@ -138,22 +133,20 @@ impl<'a> Pixels<'a> {
                 bit += BITS;
             }
         };
-        // Those before the first that begins on a byte, then groups, then the rest.
+        // Those before the first that begins on a byte, then fours out of eight bytes, then the rest.
         let bit = byte * 8 + skip;
-        let ahead = (0..COUNT).find(|k| (bit + k * BITS).is_multiple_of(8)).unwrap_or(0).min(out.len());
+        let ahead = (0..4).find(|k| (bit + k * BITS).is_multiple_of(8)).unwrap_or(0).min(out.len());
         let (before, out) = out.split_at_mut(ahead);
         single(before, bit);
-        let from = (bit + ahead * BITS) / 8;
-        let (groups, rest) = out.as_chunks_mut::<COUNT>();
-        for (group, bytes) in
-            groups.iter_mut().zip(self.bytes[from.min(self.bytes.len())..].as_chunks::<BYTES>().0)
-        {
-            let word = bytes.iter().fold(0u64, |word, &b| word << 8 | u64::from(b));
-            for (k, o) in group.iter_mut().enumerate() {
-                *o = (word >> (BITS * (COUNT - 1 - k))) as u16 & mask;
-            }
+        let (mut from, mut done) = ((bit + ahead * BITS) / 8, 0);
+        for four in out.as_chunks_mut::<4>().0 {
+            let Some(eight) = self.bytes.get(from..).and_then(|b| b.first_chunk()) else { break };
+            let word = u64::from_be_bytes(*eight);
+            *four = std::array::from_fn(|k| (word >> (64 - BITS * (k + 1))) as u16 & mask);
+            from += BITS / 2;
+            done += 4;
         }
-        single(rest, (from + groups.len() * BYTES) * 8);
+        single(&mut out[done..], from * 8);
     }
 }
 
