@@ -219,6 +219,7 @@ def test_a_config_says_whatever_a_flag_can(tmp_path: Path, capsys: pytest.Captur
                 words.append(f"{flag_of(name)}={value}")
         assert main(words) == 0
         (tmp_path / "run.toml").write_text(capsys.readouterr().out, encoding="utf-8")
+        # A dict of options of several types: what each may be is what the test is about.
         assert read_config(tmp_path / "run.toml") == Options(**given)  # type: ignore[arg-type]
     assert set(trajectory) | set(energy) == {f.name for f in fields(Options)}
     # Every other flag says how to run, not what.
@@ -249,6 +250,7 @@ def test_whatever_a_fit_can_be_told_an_analysis_can() -> None:
 )
 def test_options_that_make_no_sense_name_the_flag(wrong: dict[str, object], words: str) -> None:
     with pytest.raises(PydpendError) as caught:
+        # A dict of options of several types, wrong on purpose.
         Options(**wrong)  # type: ignore[arg-type]
     assert words in str(caught.value)
 

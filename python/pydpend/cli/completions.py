@@ -43,4 +43,5 @@ def _name_files(p: argparse.ArgumentParser) -> None:
             for sub in action.choices.values():
                 _name_files(sub)
         elif action.nargs != 0 and action.choices is None and action.type in (None, str, Path):
+            # shtab looks for an attribute that argparse does not declare.
             action.complete = shtab.FILE  # type: ignore[attr-defined]
