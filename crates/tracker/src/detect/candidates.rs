@@ -5,10 +5,10 @@
 use rayon::prelude::*;
 
 use super::background::Background;
-use super::levels::Side;
 use super::pixels::Pixels;
 use super::plan::Plan;
 use super::runs::{Blob, Labeller};
+use super::side::Side;
 use crate::frame::PixelFormat;
 
 /// Sample images and what is known of them.

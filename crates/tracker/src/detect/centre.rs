@@ -4,11 +4,12 @@
 
 use super::fit::{DiscFit, Fitted, LEAST_PATH_PX, Start};
 use super::lanes::{Eight, Job, LANES, work};
-use super::levels::{Levels, Side};
+use super::levels::Levels;
 use super::mask::Spans;
 use super::pixels::Pixels;
 use super::ring::{Patch, Ring};
 use super::runs::Blob;
+use super::side::Side;
 
 /// A centre and what was seen on the way to it.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -121,7 +122,7 @@ impl Window {
         fit: &DiscFit<'_>,
         avoid: [[f64; 3]; 2],
     ) -> Option<Fitted> {
-        self.load(pixels, blob, (fit.table.reach_px + fit.band_px + 1.0).ceil() as usize);
+        self.load(pixels, blob, (fit.model.table.reach_px + fit.band_px + 1.0).ceil() as usize);
         let [cx, cy] = blob.mean();
         let radius = (blob.area as f64 / std::f64::consts::PI).sqrt();
         let mut start = self.start(fit, [cx, cy, radius], avoid)?;
@@ -139,7 +140,7 @@ impl Window {
         }
         let Some(smear_px) = self.smear(&sharp) else { return Some(sharp) };
         let path = smear_px[0].hypot(smear_px[1]);
-        self.load(pixels, blob, (fit.table.reach_px + fit.band_px + path / 2.0 + 1.0).ceil() as usize);
+        self.load(pixels, blob, (fit.model.table.reach_px + fit.band_px + path / 2.0 + 1.0).ceil() as usize);
         let disc = [sharp.x_px, sharp.y_px, sharp.radius_px, sharp.base, sharp.height];
         match self.run(fit, &Start { disc, smear_px, avoid }) {
             Some(smeared) if smeared.chi2 < 0.7 * sharp.chi2 => Some(smeared),
@@ -156,7 +157,7 @@ impl Window {
         disc: [f64; 3],
         other: [f64; 3],
     ) -> Option<Fitted> {
-        self.load(pixels, blob, (fit.table.reach_px + fit.band_px + 1.0).ceil() as usize);
+        self.load(pixels, blob, (fit.model.table.reach_px + fit.band_px + 1.0).ceil() as usize);
         let start = self.start(fit, disc, [other, [0.0; 3]])?;
         self.run(fit, &start)
     }
@@ -175,8 +176,8 @@ impl Window {
 
     fn start(&self, fit: &DiscFit<'_>, disc: [f64; 3], avoid: [[f64; 3]; 2]) -> Option<Start> {
         let [cx, cy, radius] = disc;
-        let base = self.around(cx, cy, radius + fit.table.reach_px + 0.7)?;
-        let top = self.around(cx, cy, (radius - fit.table.reach_px - 0.7).max(0.0))?;
+        let base = self.around(cx, cy, radius + fit.model.table.reach_px + 0.7)?;
+        let top = self.around(cx, cy, (radius - fit.model.table.reach_px - 0.7).max(0.0))?;
         Some(Start { disc: [cx, cy, radius, base, top - base], smear_px: [0.0; 2], avoid })
     }
 
@@ -221,7 +222,7 @@ impl Window {
         fit: &DiscFit<'_>,
         flat: &mut [Vec<f64>; 2],
     ) {
-        let reach = fit.table.reach_px + fitted.smear_px[0].hypot(fitted.smear_px[1]) / 2.0;
+        let reach = fit.model.table.reach_px + fitted.smear_px[0].hypot(fitted.smear_px[1]) / 2.0;
         self.load(pixels, blob, (reach + 3.0).ceil() as usize);
         let mut sums = [[0.0; 3]; 2];
         for (j, row) in self.rows().enumerate() {
@@ -230,7 +231,7 @@ impl Window {
                 let dy = (self.y0 + j) as f64 - fitted.y_px;
                 let inside = fitted.radius_px - dx.hypot(dy);
                 let v = f64::from(v);
-                let lost = fit.saturated(v);
+                let lost = fit.model.saturated(v);
                 if inside.abs() > reach && inside.abs() < reach + 2.0 && !lost {
                     let s = &mut sums[usize::from(inside > 0.0)];
                     let h = v - fitted.base - if inside > 0.0 { fitted.height } else { 0.0 };

@@ -7,16 +7,20 @@ use std::sync::Arc;
 
 use super::centre::{Centre, Window};
 use super::contours::contour_centres;
+use super::detection::{Detection, Flags};
 use super::edge::EdgeTable;
 use super::fit::{DiscFit, Fitted};
 use super::lens::Undistort;
-use super::levels::{Levels, Side};
+use super::levels::Levels;
 use super::marker::LARGEST_MISFIT;
 use super::mask::Spans;
+use super::normal::DiscModel;
 use super::pixels::Pixels;
 use super::plan::Plan;
 use super::runs::{Blob, Labeller};
-use super::{Centroid, DetectSettings, Detection, Flags, shape};
+use super::settings::{Centroid, DetectSettings};
+use super::shape;
+use super::side::Side;
 use crate::error::{Error, Fault, Place, Result};
 use crate::frame::Frame;
 
@@ -247,14 +251,8 @@ impl Detector {
 fn disc_fit<'a>(table: &'a EdgeTable, levels: &Levels) -> DiscFit<'a> {
     // In much noise more pixels beside the edge are worth their time.
     let band_px = if levels.clear() { 0.5 } else { 2.0 };
-    DiscFit {
-        table,
-        noise: levels.noise,
-        side: levels.side,
-        saturation: levels.saturation,
-        band_px,
-        usual_chi2: levels.marker.map_or(1.0, |m| m.chi2),
-    }
+    let model = DiscModel { table, noise: levels.noise, side: levels.side, saturation: levels.saturation };
+    DiscFit { model, band_px, usual_chi2: levels.marker.map_or(1.0, |m| m.chi2) }
 }
 
 fn centre_of(f: &Fitted) -> Centre {

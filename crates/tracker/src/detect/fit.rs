@@ -10,11 +10,10 @@
 
 use std::array::from_fn;
 
-use super::edge::EdgeTable;
 use super::lanes::LANES;
-use super::levels::{Noise, Side};
-use super::normal::{Factor, MOVING, Normal, STILL};
+use super::normal::{DiscModel, Factor, MOVING, Normal, STILL};
 use super::ring::{Patch, Ring};
+use super::side::Side;
 
 /// A fitted disc.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,13 +40,10 @@ pub(crate) struct Fitted {
     pub smear_px: [f64; 2],
 }
 
-/// What a fit needs beside the pixels.
+/// The fit of a disc: its model, and which pixels it takes.
 #[derive(Clone, Copy)]
 pub(crate) struct DiscFit<'a> {
-    pub table: &'a EdgeTable,
-    pub noise: Noise,
-    pub side: Side,
-    pub saturation: Option<f64>,
+    pub model: DiscModel<'a>,
     /// Pixels beyond the blurred edge, on both sides, that tell base and height.
     pub band_px: f64,
     /// Mean square of weighted residuals that markers of this recording usually have.
@@ -76,14 +72,6 @@ const SETTLED: f64 = 0.2;
 const SLACK_PX: f64 = 0.2;
 
 impl DiscFit<'_> {
-    /// Whether a value is at the end of the recording's range on the markers' side.
-    pub fn saturated(&self, value: f64) -> bool {
-        self.saturation.is_some_and(|limit| match self.side {
-            Side::Bright => value >= limit,
-            Side::Dark => value <= limit,
-        })
-    }
-
     /// Fits a disc from a start; `None` where it does not come to rest near it.
     pub fn fit(&self, patch: &Patch<'_>, start: &Start, ring: &mut Ring) -> Option<Fitted> {
         if start.smear_px == [0.0; 2] {
@@ -94,7 +82,7 @@ impl DiscFit<'_> {
     }
 
     fn settle<const N: usize>(&self, patch: &Patch<'_>, start: &Start, ring: &mut Ring) -> Option<Fitted> {
-        let sign = self.side.sign();
+        let sign = self.model.side.sign();
         let [x, y, first_radius, base, height] = start.disc;
         let [path_x, path_y] = start.smear_px;
         // Where the pixels were chosen: x, y, radius, length of the path.
@@ -110,7 +98,7 @@ impl DiscFit<'_> {
             if ring.used < 12 {
                 return None;
             }
-            let n = Normal::at(self, ring, &p);
+            let n = Normal::at(&self.model, ring, &p);
             let factor = Factor::new(&n.matrix)?;
             let step = factor.solve(&n.gradient);
             round += 1;
@@ -168,16 +156,16 @@ impl DiscFit<'_> {
     /// Chooses the pixels near the edge of a disc, `[x, y, radius, length of its path]`.
     fn choose(&self, patch: &Patch<'_>, disc: &[f64; 4], avoid: &[[f64; 3]; 2], ring: &mut Ring) {
         let [cx, cy, r, path] = *disc;
-        let reach = self.table.reach_px + SLACK_PX + path / 2.0 + self.band_px;
+        let reach = self.model.table.reach_px + SLACK_PX + path / 2.0 + self.band_px;
         let (outer, inner) = (r + reach, (r - reach).max(0.0));
         ring.choose(patch, [cx, cy], inner, outer);
         let filled = ring.used.next_multiple_of(LANES);
-        if self.side == Side::Dark {
+        if self.model.side == Side::Dark {
             ring.value[..filled].iter_mut().for_each(|v| *v = -*v);
         }
         if avoid.iter().any(|a| a[2] > 0.0) {
             // A pixel that shows, in part, a neighbour's disc.
-            let near = self.table.reach_px + SLACK_PX;
+            let near = self.model.table.reach_px + SLACK_PX;
             for i in 0..ring.used {
                 let (x, y) = (cx + f64::from(ring.x[i]), cy + f64::from(ring.y[i]));
                 if avoid.iter().any(|a| a[2] > 0.0 && (x - a[0]).hypot(y - a[1]) < a[2] + near) {
@@ -185,8 +173,8 @@ impl DiscFit<'_> {
                 }
             }
         }
-        if let Some(limit) = self.saturation {
-            let limit = (limit * self.side.sign()) as f32;
+        if let Some(limit) = self.model.saturation {
+            let limit = (limit * self.model.side.sign()) as f32;
             for (v, live) in ring.value[..ring.used].iter_mut().zip(&ring.live) {
                 ring.saturated += u32::from(*v >= limit && *live > 0.0);
                 *v = v.min(limit);

@@ -6,7 +6,7 @@ use opencv::calib3d;
 use opencv::core::{Mat, Point2d, TermCriteria, TermCriteria_COUNT, TermCriteria_EPS, Vector};
 use opencv::prelude::*;
 
-use super::Detection;
+use super::detection::Detection;
 use crate::error::{Error, Fault, Result};
 use crate::rig::Lens;
 

@@ -1,13 +1,14 @@
 //! The normal equations of a disc's fit and their solution.
 //!
-//! Owns: [`Normal`], [`Factor`]. Must not: choose pixels, or take a step.
+//! Owns: [`DiscModel`], [`Normal`], [`Factor`]. Must not: choose pixels, or take a step.
 
 use std::array::from_fn;
 
-use super::edge::Spot;
-use super::fit::DiscFit;
+use super::edge::EdgeTable;
 use super::lanes::{Eight, Job, LANES, work};
-use super::ring::Ring;
+use super::noise::Noise;
+use super::ring::{EdgeLookup, Ring};
+use super::side::Side;
 
 /// Free numbers of a disc that stands still and of one that moves.
 pub(crate) const STILL: usize = 5;
@@ -17,15 +18,24 @@ pub(crate) const MOVING: usize = 7;
 /// cannot be told from a line.
 const SHIFT_PX: f64 = 0.45;
 const MOST_SHIFTS: usize = 32;
-/// Of eight pixels of a ring. A processor does more at once where the way to the table and the way on from it are two
-/// loops.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Found {
-    spot: Spot,
-    /// The edge's normal, inwards from the disc's edge to larger coverage.
-    normal: [[f32; LANES]; 2],
-    /// Coverage and its slopes by x, y, radius and path, of a disc that moves.
-    sums: [[f32; LANES]; 6],
+/// The model of a disc's pixels: the edge's coverage, the noise of a sample, and the value at which samples saturate.
+#[derive(Clone, Copy)]
+pub(crate) struct DiscModel<'a> {
+    pub table: &'a EdgeTable,
+    pub noise: Noise,
+    pub side: Side,
+    /// Raw units; `None` where no sample saturates.
+    pub saturation: Option<f64>,
+}
+
+impl DiscModel<'_> {
+    /// Whether a value is at the end of the recording's range on the markers' side.
+    pub fn saturated(&self, value: f64) -> bool {
+        self.saturation.is_some_and(|limit| match self.side {
+            Side::Bright => value >= limit,
+            Side::Dark => value <= limit,
+        })
+    }
 }
 
 /// `line_k * line_l * weight` for k <= l, where a line is the model's derivative by one of its numbers, or last
@@ -66,8 +76,8 @@ pub(crate) struct Normal<const N: usize> {
 
 impl<const N: usize> Normal<N> {
     /// At a place, `[x, y, radius, base, height, path]`; single precision holds a place inside the patch to 1e-6 px.
-    pub fn at(fit: &DiscFit<'_>, ring: &mut Ring, p: &[f64; N]) -> Self {
-        work(Equations { fit, ring, p })
+    pub fn at(model: &DiscModel<'_>, ring: &mut Ring, p: &[f64; N]) -> Self {
+        work(Equations { model, ring, p })
     }
 }
 
@@ -143,7 +153,7 @@ impl<const N: usize> Factor<N> {
 
 /// What the normal equations are made of.
 struct Equations<'a, const N: usize> {
-    fit: &'a DiscFit<'a>,
+    model: &'a DiscModel<'a>,
     ring: &'a mut Ring,
     p: &'a [f64; N],
 }
@@ -153,12 +163,12 @@ impl<const N: usize> Job for Equations<'_, N> {
 
     #[inline(always)]
     fn run<V: Eight>(self, token: V::Token) -> Normal<N> {
-        let Self { fit, ring, p } = self;
+        let Self { model, ring, p } = self;
         let all = |v: f32| V::all(token, v);
         let of = |v: &[f32; LANES]| V::of(token, v);
-        let sign = fit.side.sign() as f32;
+        let sign = model.side.sign() as f32;
         let [x, y, r, base, height]: [f32; 5] = from_fn(|i| p[i] as f32);
-        let limit = fit.saturation.map_or(f32::INFINITY, |l| l as f32 * sign);
+        let limit = model.saturation.map_or(f32::INFINITY, |l| l as f32 * sign);
         let n = ring.used.div_ceil(LANES);
         let eights = |v| &<[f32]>::as_chunks::<LANES>(v).0[..n];
         let (places_x, places_y) = (eights(&ring.x), eights(&ring.y));
@@ -166,13 +176,13 @@ impl<const N: usize> Job for Equations<'_, N> {
         let found = &mut ring.eights[..n];
         let (r, zero, one, least) = (all(r), all(0.0), all(1.0), all(1e-6));
         // Where the edge of a disc about (x, y) is, of all pixels.
-        let look = |found: &mut [Found], x: f32, y: f32| {
+        let look = |found: &mut [EdgeLookup], x: f32, y: f32| {
             for ((found, px), py) in found.iter_mut().zip(places_x).zip(places_y) {
                 let (dx, dy) = (of(px) - all(x), of(py) - all(y));
                 let rho = (dx * dx + dy * dy).most(least).root();
                 let inverse = one.over(rho);
                 let (c, s) = (dx * inverse, dy * inverse);
-                found.spot = fit.table.spot(token, r - rho, c.size().least(s.size()));
+                found.spot = model.table.spot(token, r - rho, c.size().least(s.size()));
                 found.normal = [c.array(), s.array()];
             }
         };
@@ -186,7 +196,7 @@ impl<const N: usize> Job for Equations<'_, N> {
                 let part = (k as f64 + 0.5) / count as f64 - 0.5;
                 look(found, (p[0] + part * path[0]) as f32, (p[1] + part * path[1]) as f32);
                 for f in found.iter_mut() {
-                    let (cover, rise) = fit.table.at::<V>(token, &f.spot);
+                    let (cover, rise) = model.table.at::<V>(token, &f.spot);
                     let rise = rise * share;
                     let (rise_x, rise_y) = (rise * of(&f.normal[0]), rise * of(&f.normal[1]));
                     let part = all(part as f32);
@@ -200,7 +210,8 @@ impl<const N: usize> Job for Equations<'_, N> {
             look(found, x, y);
         }
         let (base, height, sign) = (all(base), all(height), all(sign));
-        let [read, shot, dark] = [fit.noise.read, fit.noise.shot, fit.noise.dark].map(|v| all(v as f32));
+        let [read, shot, dark] =
+            [model.noise.read, model.noise.shot, model.noise.dark].map(|v| all(v as f32));
         let limit = all(limit);
         let mut sums = [zero; PRODUCTS];
         let (mut squares, mut open) = (zero, zero);
@@ -209,7 +220,7 @@ impl<const N: usize> Job for Equations<'_, N> {
             let sum = if N == MOVING {
                 found.sums.map(|s| of(&s))
             } else {
-                let (cover, rise) = fit.table.at::<V>(token, &found.spot);
+                let (cover, rise) = model.table.at::<V>(token, &found.spot);
                 [cover, rise * of(&found.normal[0]), rise * of(&found.normal[1]), rise, zero, zero]
             };
             let value = of(value);

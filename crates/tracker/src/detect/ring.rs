@@ -2,8 +2,8 @@
 //!
 //! Owns: [`Patch`], [`Ring`]. Must not: judge them.
 
+use super::edge::Spot;
 use super::lanes::{Eight, Job, LANES, work};
-use super::normal::Found;
 
 /// A rectangle of pixels, raw units; behind the last pixel come [`LANES`] more values that mean nothing.
 pub(crate) struct Patch<'a> {
@@ -19,6 +19,17 @@ pub(crate) struct Patch<'a> {
 
 const STEPS: [f32; LANES] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
 
+/// The edge table's values for eight pixels of a ring, kept so that look-up and accumulation are two loops: a processor
+/// then overlaps more of the work.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct EdgeLookup {
+    pub(super) spot: Spot,
+    /// The edge's normal, inwards from the disc's edge to larger coverage.
+    pub(super) normal: [[f32; LANES]; 2],
+    /// Coverage and its slopes by x, y, radius and path, of a disc that moves.
+    pub(super) sums: [[f32; LANES]; 6],
+}
+
 /// Pixels around an edge: place relative to the first guess of the centre, value, and 1 where it counts.
 #[derive(Debug, Default)]
 pub(crate) struct Ring {
@@ -30,7 +41,7 @@ pub(crate) struct Ring {
     pub used: usize,
     pub saturated: u32,
     /// What is found of eight pixels on the way to the normal equations.
-    pub eights: Vec<Found>,
+    pub eights: Vec<EdgeLookup>,
 }
 
 impl Ring {
@@ -47,7 +58,7 @@ impl Ring {
         }
         let eights = most.div_ceil(LANES);
         if self.eights.len() < eights {
-            self.eights.resize(eights, Found::default());
+            self.eights.resize(eights, EdgeLookup::default());
         }
         self.used = 0;
         self.saturated = 0;

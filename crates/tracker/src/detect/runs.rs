@@ -4,9 +4,9 @@
 //!
 //! Pixels are neighbours along sides and corners (8-connected).
 
-use super::levels::Side;
 use super::pixels::Pixels;
 use super::plan::{CELL_PX, Plan, Segment};
+use super::side::Side;
 use super::skip::{MANY, Sample, Skip};
 use crate::frame::PixelFormat;
 

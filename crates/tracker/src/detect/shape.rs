@@ -2,8 +2,8 @@
 //!
 //! Owns: [`judge`], [`two_discs`]. Must not: move a centre.
 
-use super::Flags;
 use super::centre::Centre;
+use super::detection::Flags;
 use super::fit::Fitted;
 use super::levels::Levels;
 use super::runs::Blob;

@@ -1,0 +1,42 @@
+//! A detection: the centre of one blob that may be a marker, with what makes it less trustworthy.
+//!
+//! Owns: [`Detection`], [`Flags`]. Must not: know how a centre is found.
+
+/// Facts about a detection that make its centre less trustworthy, as bits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Flags(pub u8);
+
+impl Flags {
+    /// Pixels at the top (or bottom) of the recording's range.
+    pub const SATURATED: u8 = 1;
+    /// The blob touches the image's border or the region's.
+    pub const BORDER: u8 = 2;
+    /// The blob holds more than one marker.
+    pub const MERGED: u8 = 4;
+    /// The blob is not the whole marker: its centre is biased.
+    pub const PARTIAL: u8 = 8;
+
+    /// Whether any of `bits` is set.
+    pub fn has(self, bits: u8) -> bool {
+        self.0 & bits != 0
+    }
+}
+
+/// One blob that may be a marker.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Detection {
+    /// Centre, px; x right.
+    pub x_px: f64,
+    /// Centre, px; y down.
+    pub y_px: f64,
+    /// Standard uncertainty of each coordinate, px.
+    pub sigma_px: f32,
+    /// Area beyond the threshold, px.
+    pub area_px: f32,
+    /// Largest difference from the background, raw units of the recording, above 0 for either polarity.
+    pub peak: f32,
+    /// Longer over shorter principal axis, at least 1.
+    pub elongation: f32,
+    /// What makes it less trustworthy.
+    pub flags: Flags,
+}

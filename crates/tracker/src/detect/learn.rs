@@ -1,0 +1,168 @@
+//! Learns the levels of a recording from frames spread over it.
+//!
+//! Owns: [`Levels::learn`]. Must not: look at the frames that are detected later.
+
+use rayon::prelude::*;
+
+use super::background;
+use super::candidates::{self, Candidate};
+use super::learn_marker::{self, Sample};
+use super::levels::Levels;
+use super::noise::Noise;
+use super::pixels::Pixels;
+use super::quantile::{quantile, sorted};
+use super::settings::{DetectSettings, Polarity, Threshold};
+use super::side::Side;
+use crate::error::{Error, Fault, Place, Result};
+use crate::frame::Frame;
+
+/// Frames that are looked at; more would change nothing.
+const MOST_FRAMES: usize = 12;
+
+impl Levels {
+    /// Learns from frames spread over a recording. What the settings give is taken from them.
+    ///
+    /// # Errors
+    /// [`Error::Detect`] if no frame was decoded, frames differ in size, a threshold is out of range, or
+    /// nothing like a marker is found.
+    pub fn learn(samples: &[Frame], settings: &DetectSettings) -> Result<Self> {
+        // Step 1: unpack.
+        let mut planes = Vec::new();
+        let mut first: Option<&Frame> = None;
+        let step = samples.len().div_ceil(MOST_FRAMES).max(1);
+        for frame in samples.iter().step_by(step) {
+            let Some(pixels) = Pixels::of(frame)? else { continue };
+            let known = *first.get_or_insert(frame);
+            if (frame.width, frame.height) != (known.width, known.height) {
+                return Err(Error::Detect(
+                    Fault::new(
+                        "sample",
+                        format!(
+                            "{} x {} px, others are {} x {} px",
+                            frame.width, frame.height, known.width, known.height
+                        ),
+                    )
+                    .at(Place::Frame(frame.index))
+                    .advice("A recording must keep one size"),
+                ));
+            }
+            planes.push(pixels);
+        }
+        let Some(known) = first else {
+            return Err(Error::Detect(
+                Fault::new("recording", "none of its sample frames could be decoded")
+                    .advice("Look at it with `tracker info`"),
+            ));
+        };
+        let (width, height) = (known.width as usize, known.height as usize);
+        let images: Vec<Vec<u16>> = planes
+            .par_iter()
+            .map(|pixels| {
+                let mut image = vec![0; width * height];
+                for (y, row) in image.chunks_exact_mut(width).enumerate() {
+                    pixels.read(y, 0, row);
+                }
+                image
+            })
+            .collect();
+        let top = f64::from((1u32 << known.depth_bits.clamp(1, 16)) - 1);
+        if let Threshold::Raw(t) = settings.threshold
+            && !(t > 0.0 && t <= top)
+        {
+            return Err(Error::Detect(
+                Fault::new("threshold", format!("{t} is outside the recording's range, 1 to {top}"))
+                    .advice("It is in raw units of the recording"),
+            ));
+        }
+
+        // Step 2: background and noise.
+        let background = background::learn(&images, width, height);
+        let read = background::noise_variance(&images, width);
+
+        // Step 3: polarity and height, by which blobs come and stay.
+        let sides: &[Side] = match settings.polarity {
+            Polarity::Auto => &[Side::Bright, Side::Dark],
+            Polarity::Bright => &[Side::Bright],
+            Polarity::Dark => &[Side::Dark],
+        };
+        let field = candidates::Field { images: &images, width, height, background: &background, read };
+        let fixed = match settings.threshold {
+            Threshold::Auto => None,
+            Threshold::Raw(t) => Some(t),
+        };
+        let Some(best) = candidates::best(&field, sides, fixed) else {
+            return Err(Error::Detect(
+                Fault::new("recording", "nothing like a marker stands out from the background")
+                    .advice("Give a threshold and a polarity, or check that markers are lit"),
+            ));
+        };
+
+        // Step 4: saturation, limits, typical marker.
+        let saturation = saturation(&images, best.side, top);
+        let area = |part: f64| candidates::weighted_quantile(&best.blobs, |b| b.area, part);
+        let low = (0.15 * area(0.05)).max(0.01 * area(0.5)).max(4.0);
+        // Where most blobs are of one size, a few large ones are something else.
+        let high = 6.0 * typical(&best.blobs).unwrap_or_else(|| area(0.95)).min(area(0.95));
+        let area_px = [settings.min_area_px.unwrap_or(low), settings.max_area_px.unwrap_or(high)];
+        if !(area_px[0] >= 0.0 && area_px[0] <= area_px[1]) {
+            return Err(Error::Detect(
+                Fault::new("area limits", format!("least {} px, greatest {} px", area_px[0], area_px[1]))
+                    .advice("Give a least area below the greatest"),
+            ));
+        }
+        let noise = Noise { read, shot: 0.0, dark: background.median() };
+        let samples: Vec<Sample<'_>> = best
+            .blobs
+            .iter()
+            .filter(|b| b.area >= area_px[0] && b.area <= area_px[1])
+            .map(|b| Sample { pixels: planes[b.image], blob: b.blob })
+            .collect();
+        let (marker, noise) = match learn_marker::learn(&samples, best.side, noise, saturation) {
+            Some((marker, noise)) => (Some(marker), noise),
+            None => (None, noise),
+        };
+        Ok(Self {
+            side: best.side,
+            image_px: [known.width, known.height],
+            depth_bits: known.depth_bits,
+            background,
+            height: best.height,
+            fixed_threshold: fixed,
+            contrast: candidates::weighted_quantile(&best.blobs, |b| b.contrast, 0.5),
+            noise,
+            saturation,
+            area_px,
+            marker_area_px: typical(&best.blobs),
+            marker,
+            frames: images.len(),
+            blobs: best.blobs.len(),
+        })
+    }
+}
+
+/// The value that samples pile up at on the markers' side.
+fn saturation(images: &[Vec<u16>], side: Side, top: f64) -> Option<f64> {
+    let extremes = images.par_iter().filter_map(|image| match side {
+        Side::Bright => image.iter().max().copied(),
+        Side::Dark => image.iter().min().copied(),
+    });
+    let extreme = match side {
+        Side::Bright => extremes.max()?,
+        Side::Dark => extremes.min()?,
+    };
+    let at: usize = images.par_iter().map(|image| image.iter().filter(|&&v| v == extreme).count()).sum();
+    let piled = at >= 20 * images.len();
+    let end = match side {
+        Side::Bright => f64::from(extreme) >= 0.9 * top,
+        Side::Dark => f64::from(extreme) <= 0.02 * top,
+    };
+    (piled && end).then_some(f64::from(extreme))
+}
+
+/// The area most blobs have, if most have it within a third.
+fn typical(blobs: &[Candidate]) -> Option<f64> {
+    let areas = sorted(blobs.iter().map(|b| b.area));
+    let middle = quantile(&areas, 0.5);
+    let near = areas.iter().filter(|&&a| (a / middle - 1.0).abs() < 0.33).count();
+    (near * 4 >= areas.len() * 3).then_some(middle)
+}
