@@ -1,8 +1,8 @@
 //! The two equations at one state: what does not depend on the accelerations, evaluated once, and their solution.
 
-use crate::motion::{Contact, Motion, State};
 use crate::parameters::{Field, Parameters};
 use crate::scalar::Real;
+use crate::state::{Contact, Motion, State};
 use crate::terms::{Kind, Kinematics, TERMS};
 
 /// Sines and cosines of a state, once.

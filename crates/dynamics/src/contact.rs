@@ -1,7 +1,8 @@
 //! Stick and slip: which contact each joint is in, what ends it, and what follows.
 
-use crate::motion::{Contact, State, flow};
+use crate::motion::flow;
 use crate::parameters::{Field, Parameters};
+use crate::state::{Contact, State};
 
 /// How dry friction is taken.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -2,9 +2,9 @@
 
 use rayon::prelude::*;
 
-use crate::motion::State;
 use crate::parameters::Parameters;
 use crate::simulate::{Failure, Run, Settings, simulate};
+use crate::state::State;
 
 /// One motion of an ensemble.
 #[derive(Clone, Copy, Debug)]

@@ -2,9 +2,9 @@
 
 use crate::contact::{Friction, Joints, rate};
 use crate::dop853::{Dense, Step, next_factor};
-use crate::motion::{Contact, State, energies, flow};
+use crate::motion::{energies, flow};
 use crate::parameters::{Field, Parameters};
-use crate::simulate::{Event, Failure, Settings};
+use crate::state::{Contact, State};
 use crate::terms::TERMS;
 
 /// State and the work taken out by each of [`TERMS`].
@@ -15,6 +15,66 @@ const LOOKS: u32 = 8;
 const RATE_ZERO: f64 = 1e-13;
 /// Steps after which a run is given up.
 const MAX_STEPS: usize = 10_000_000;
+
+/// What a simulation is asked.
+#[derive(Clone, Copy, Debug)]
+pub struct Settings {
+    /// Local error allowed per step, relative to one radian, to the larger of the rate and 1 rad/s, and to the
+    /// energy's scale.
+    pub tolerance: f64,
+    /// Dry friction's law.
+    pub friction: Friction,
+    /// Whether joint 2 is pinned.
+    pub pinned: bool,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { tolerance: 3e-13, friction: Friction::Exact, pinned: false }
+    }
+}
+
+/// A change of contact.
+#[derive(Clone, Copy, Debug)]
+pub struct Event {
+    /// When, s.
+    pub t_s: f64,
+    /// Joint, 0 or 1.
+    pub joint: usize,
+    /// The contact it left.
+    pub from: Contact,
+    /// The contact it went into.
+    pub to: Contact,
+}
+
+/// Why a simulation could not be done.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Failure {
+    /// The state is not finite, or a pinned joint turns.
+    #[error("state: {0}")]
+    State(String),
+    /// The times do not increase.
+    #[error("t_s, index {index}: {now} s does not come after {before} s")]
+    Times {
+        /// Where.
+        index: usize,
+        /// The time before.
+        before: f64,
+        /// The time there.
+        now: f64,
+    },
+    /// A setting out of range.
+    #[error("{0}")]
+    Settings(String),
+    /// The step became too small, or there were too many.
+    #[error("simulation, t = {t_s} s: {problem}. Check the coefficients and the tolerance")]
+    Stalled {
+        /// When.
+        t_s: f64,
+        /// What happened.
+        problem: String,
+    },
+}
 
 /// A pendulum on its way: the state, its contact, and the size of the next step.
 pub struct Flight<'a> {

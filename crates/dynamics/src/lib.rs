@@ -31,10 +31,12 @@ pub mod section;
 pub mod shooting;
 pub mod simulate;
 pub mod smoother;
+pub mod state;
 mod tableau;
 pub mod terms;
 
-pub use motion::{Contact, Motion, State, accelerations, energies, mass_matrix, normal_forces};
+pub use motion::{accelerations, energies, mass_matrix, normal_forces};
 pub use parameters::{Field, Fixed, Parameters};
 pub use scalar::{Dual, Real};
+pub use state::{Contact, Motion, State};
 pub use terms::{Kind, Law, Place, TERMS, Term};

@@ -1,10 +1,11 @@
 //! The largest Lyapunov exponent, by the growth of an exactly carried tangent vector.
 
 use crate::dop853::{Step, next_factor};
-use crate::motion::{Contact, State, accelerations};
+use crate::motion::accelerations;
 use crate::parameters::{Field, Parameters};
 use crate::scalar::Dual;
 use crate::simulate::Failure;
+use crate::state::{Contact, State};
 
 /// What is asked.
 #[derive(Clone, Copy, Debug)]

@@ -7,35 +7,9 @@
 use crate::balance::{Balance, joint_forces, masses, norm, signs, solve2, trig};
 use crate::parameters::{Field, Parameters};
 use crate::scalar::{Dual, Real};
+use crate::state::{Contact, Motion, State};
 use crate::terms::{Kinematics, TERMS};
 
-/// `[phi1, phi2, w1, w2]`, rad and rad/s.
-pub type State<S> = [S; 4];
-
-/// How a joint's dry friction acts.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Contact {
-    /// Sliding with this sign (+1 or -1) of the joint's rate (`w1`, `w2 - w1`).
-    Slip(f64),
-    /// The smooth law: sign replaced by `tanh(rate / width)`, width in rad/s.
-    Smooth(f64),
-    /// Not sliding: the joint's rate stays as it is and the torque is whatever that needs. A pinned joint, too.
-    Stuck,
-}
-
-/// What [`accelerations`] gives.
-#[derive(Clone, Copy, Debug)]
-pub struct Motion<S> {
-    /// Accelerations of the links, rad/s^2.
-    pub a: [S; 2],
-    /// Magnitude of the normal forces at the joints, N (Eq. 34 with erratum 16).
-    pub normal: [S; 2],
-    /// Dry torque at each joint, N m: `sign * capacity` when sliding, the constraint's torque when stuck. The
-    /// torque on link 1 is `-dry[0] + dry[1]`, on link 2 `-dry[1]`.
-    pub dry: [S; 2],
-    /// What dry friction can hold at each joint, N m: `r mu N + tau_c`.
-    pub capacity: [S; 2],
-}
 /// The symmetric mass matrix `[m11, m12, m22]` at these angles, kg m^2 (`T = w' M w / 2`).
 pub fn mass_matrix<S: Real>(p: &Parameters<S>, phi: [S; 2]) -> [S; 3] {
     let (_, c_d) = (phi[0] - phi[1]).sin_cos();

@@ -3,9 +3,9 @@
 use std::f64::consts::TAU;
 
 use crate::flight::Flight;
-use crate::motion::State;
 use crate::parameters::Parameters;
 use crate::simulate::{Failure, Settings};
+use crate::state::State;
 
 /// Points of each step at which the angle is examined.
 const LOOKS: u32 = 8;

@@ -1,41 +1,12 @@
 //! A motion with exact dry friction: DOP853 between located events, energies and works beside the state.
 
-use crate::contact::Friction;
 use crate::flight::{Flight, SIZE, state};
-use crate::motion::{Contact, State, energies, flow};
+use crate::motion::{energies, flow};
 use crate::parameters::Parameters;
+use crate::state::{Contact, State};
 use crate::terms::TERMS;
 
-/// What a simulation is asked.
-#[derive(Clone, Copy, Debug)]
-pub struct Settings {
-    /// Local error allowed per step, relative to one radian, to the larger of the rate and 1 rad/s, and to the
-    /// energy's scale.
-    pub tolerance: f64,
-    /// Dry friction's law.
-    pub friction: Friction,
-    /// Whether joint 2 is pinned.
-    pub pinned: bool,
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Self { tolerance: 3e-13, friction: Friction::Exact, pinned: false }
-    }
-}
-
-/// A change of contact.
-#[derive(Clone, Copy, Debug)]
-pub struct Event {
-    /// When, s.
-    pub t_s: f64,
-    /// Joint, 0 or 1.
-    pub joint: usize,
-    /// The contact it left.
-    pub from: Contact,
-    /// The contact it went into.
-    pub to: Contact,
-}
+pub use crate::flight::{Event, Failure, Settings};
 
 /// How a simulation ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -76,35 +47,6 @@ pub struct Run {
     pub end_s: f64,
     /// Steps taken.
     pub steps: usize,
-}
-
-/// Why a simulation could not be done.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum Failure {
-    /// The state is not finite, or a pinned joint turns.
-    #[error("state: {0}")]
-    State(String),
-    /// The times do not increase.
-    #[error("t_s, index {index}: {now} s does not come after {before} s")]
-    Times {
-        /// Where.
-        index: usize,
-        /// The time before.
-        before: f64,
-        /// The time there.
-        now: f64,
-    },
-    /// A setting out of range.
-    #[error("{0}")]
-    Settings(String),
-    /// The step became too small, or there were too many.
-    #[error("simulation, t = {t_s} s: {problem}. Check the coefficients and the tolerance")]
-    Stalled {
-        /// When.
-        t_s: f64,
-        /// What happened.
-        problem: String,
-    },
 }
 
 fn sample(p: &Parameters<f64>, y: &[f64; SIZE], contact: [Contact; 2]) -> Sample {
@@ -175,6 +117,7 @@ pub fn simulate(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::contact::Friction;
     use crate::fixture::{damped, pendulum};
     use crate::parameters::Field;
 

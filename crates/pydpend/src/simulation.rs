@@ -2,11 +2,11 @@
 
 use std::collections::HashMap;
 
+use dynamics::Contact;
 use dynamics::TERMS;
 use dynamics::contact::Friction;
 use dynamics::ensemble::{Case, ensemble};
 use dynamics::lyapunov::{Growth, growth_rates};
-use dynamics::motion::Contact;
 use dynamics::section::{Section, poincare};
 use dynamics::simulate::{Ending, Failure, Run, Settings};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, ToPyArray};

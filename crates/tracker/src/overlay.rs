@@ -20,11 +20,11 @@ use opencv::imgproc;
 use crate::detect::Detection;
 use crate::error::{Error, Fault, Result};
 use crate::frame::Frame;
+use crate::observation::{Observation, Status};
 use crate::rig::Rig;
-use crate::track::mechanism::{Holder, Mechanism};
-use crate::track::predict::{Motion, Unrest, hung_at};
-use crate::track::rigid::{Pair, fit_pose, place};
-use crate::track::{Observation, Status};
+use crate::rigid::body::{Holder, Mechanism};
+use crate::rigid::forecast::{Motion, Unrest, hung_at};
+use crate::rigid::pose::{Pair, fit_pose, place};
 
 /// Frames that a trail is long.
 const TRAIL: usize = 40;

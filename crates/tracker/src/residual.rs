@@ -5,9 +5,9 @@
 use nalgebra::Vector2;
 
 use crate::rig::Rig;
+use crate::rigid::body::Mechanism;
+use crate::rigid::pose::{Pair, fit_pose, place};
 use crate::table::Rows;
-use crate::track::mechanism::Mechanism;
-use crate::track::rigid::{Pair, fit_pose, place};
 
 /// What a table says of one node's motion. `None` where too little was seen.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]

@@ -6,6 +6,7 @@
 
 mod block;
 mod spool;
+mod stamp;
 
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
@@ -13,17 +14,7 @@ use crate::detect::Detection;
 use crate::error::{Error, Fault, Place, Result};
 use block::{BLOCK_FRAMES, Block};
 pub use spool::{Finished, Spool};
-
-/// A frame's place in the recording, without its pixels.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct FrameStamp {
-    /// Index in the recording, from 0.
-    pub index: u64,
-    /// Time in ticks of the source's time base.
-    pub ticks: i64,
-    /// Whether its pixels could be decoded.
-    pub decoded: bool,
-}
+pub use stamp::FrameStamp;
 
 /// Bytes of detections held in memory before they go to disk: about 15,000 frames of 20 markers.
 pub const MEMORY_BOUND_BYTES: usize = 12 << 20;

@@ -4,9 +4,9 @@ use nalgebra::{DMatrix, DVector, Matrix4, Matrix4xX, Vector4};
 
 use super::path::{Span, follow};
 use super::problem::{Recording, Segment, Settings};
-use crate::motion::State;
 use crate::parameters::Parameters;
 use crate::scalar::{Dual, Real};
+use crate::state::State;
 
 /// Where the fit stands.
 #[derive(Clone, Debug)]

@@ -9,9 +9,10 @@
 //! nothing is rounded to a number of steps or to a sample. Near the upright a second of motion makes a thousand times
 //! more of any jump, and a fit could not get below it.
 
-use crate::motion::{Contact, Flow, Motion, State, accelerations};
+use crate::motion::{Flow, accelerations};
 use crate::parameters::{Field, Parameters};
 use crate::scalar::Real;
+use crate::state::{Contact, Motion, State};
 
 /// Angle per step, rad: classical RK4 then errs by `0.06^5/120 = 6e-9` rad a step.
 const ANGLE_PER_STEP: f64 = 0.06;

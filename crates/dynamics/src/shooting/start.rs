@@ -3,7 +3,7 @@
 use nalgebra::{Matrix4, Vector4};
 
 use super::problem::Recording;
-use crate::motion::State;
+use crate::state::State;
 
 /// Half width of the window of the local cubic, s, and the fewest samples in it.
 const HALF_WIDTH_S: f64 = 0.012;

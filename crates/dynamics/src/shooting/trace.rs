@@ -5,8 +5,9 @@ use rayon::prelude::*;
 use super::linearise::Point;
 use super::path::{Span, follow};
 use super::problem::{Recording, Segment};
-use crate::motion::{Contact, State, accelerations, normal_forces};
+use crate::motion::{accelerations, normal_forces};
 use crate::parameters::Parameters;
+use crate::state::{Contact, State};
 use crate::terms::{Kinematics, TERMS};
 
 /// One row per sample of a segment, in the order of the segments.

@@ -7,11 +7,12 @@ use tracker::detect::{DetectSettings, Detector, Levels};
 use tracker::discover::discover;
 use tracker::film::{Film, Scene, Truth};
 use tracker::frame::FrameSource;
+use tracker::observation::Status;
 use tracker::rig::Rig;
 use tracker::score::{LIMIT_PX, Score, Tracked, score};
 use tracker::source::synthetic::SyntheticSource;
 use tracker::store::{DetectionStore, FrameStamp};
-use tracker::track::{Status, track_recording};
+use tracker::track::track_recording;
 
 /// Frames whose detections are learned from, as in `pipeline`.
 const SAMPLES: usize = 12;

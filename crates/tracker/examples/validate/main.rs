@@ -20,8 +20,8 @@ use anyhow::{Context, Result, bail};
 use films::{Filmed, Followed};
 use rayon::prelude::*;
 use tracker::film::{NodeTruth, PRESETS, preset};
+use tracker::observation::Status;
 use tracker::score::{FULL, HALF, LIMIT_PX, Score, Tracked};
-use tracker::track::Status;
 
 struct Outcome {
     score: Score,

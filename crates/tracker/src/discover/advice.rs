@@ -4,9 +4,9 @@
 
 use nalgebra::Vector2;
 
+use super::signature::Signatures;
 use crate::rig::Rig;
 use crate::table::Rows;
-use crate::track::signature::Signatures;
 
 /// Signatures that differ by less are too alike, px: some times the misfit of a compressed film.
 const ALIKE_PX: f64 = 1.5;

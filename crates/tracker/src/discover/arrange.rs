@@ -6,10 +6,10 @@ use nalgebra::{Isometry2, Vector2};
 
 use super::circle::Circle;
 use crate::rig::{Body, Joint, Node, RIG_SCHEMA, Rig};
-use crate::track::joints::{Shared, Turning};
-use crate::track::mechanism::Link;
-use crate::track::predict::hung_at;
-use crate::track::rigid::{place, pose_at};
+use crate::rigid::body::Link;
+use crate::rigid::forecast::hung_at;
+use crate::rigid::joint::{Shared, Turning};
+use crate::rigid::pose::{place, pose_at};
 
 /// A body and its pose in each frame of the sample.
 #[derive(Debug, Clone)]

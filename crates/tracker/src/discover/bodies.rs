@@ -9,12 +9,13 @@
 use nalgebra::{Isometry2, Vector2};
 use rayon::prelude::*;
 
+use super::median::middle;
 use super::sample::Sample;
 use crate::detect::{Detection, Flags};
-use crate::track::constellation::{Search, Sighting};
-use crate::track::mechanism::Link;
-use crate::track::nearest::Sky;
-use crate::track::rigid::place;
+use crate::rigid::body::Link;
+use crate::rigid::index::Sky;
+use crate::rigid::pose::place;
+use crate::rigid::search::{Search, Sighting};
 
 /// Frames from which bodies are sought.
 const BASES: usize = 16;
@@ -264,15 +265,6 @@ fn complete(links: &mut Vec<Link>, sample: &Sample) {
             return;
         }
     }
-}
-
-/// Coordinate-wise median.
-pub fn middle(points: &[Vector2<f64>]) -> Vector2<f64> {
-    let mut x: Vec<f64> = points.iter().map(|p| p.x).collect();
-    let mut y: Vec<f64> = points.iter().map(|p| p.y).collect();
-    x.sort_by(f64::total_cmp);
-    y.sort_by(f64::total_cmp);
-    Vector2::new(x[x.len() / 2], y[y.len() / 2])
 }
 
 /// Places to which points of at least `least` frames come.

@@ -9,9 +9,9 @@ use super::arrange::Found;
 use super::bodies::{self, FLOOR_PX, link_of, looks_whole};
 use super::sample::Sample;
 use crate::detect::Detection;
+use crate::rigid::body::Link;
+use crate::rigid::pose::{Pair, fit_pose, place};
 use crate::store::DetectionStore;
-use crate::track::mechanism::Link;
-use crate::track::rigid::{Pair, fit_pose, place};
 
 /// Frames linked at most.
 const FRAMES: usize = 3000;

@@ -7,16 +7,18 @@ mod arrange;
 mod bodies;
 mod circle;
 mod lone;
+mod median;
 mod sample;
+pub mod signature;
 
 use nalgebra::Vector2;
 use rayon::prelude::*;
 
 use crate::error::{Error, Fault, Result};
 use crate::rig::Rig;
+use crate::rigid::body::Link;
+use crate::rigid::pose::place;
 use crate::store::DetectionStore;
-use crate::track::mechanism::Link;
-use crate::track::rigid::place;
 use arrange::Found;
 use sample::Sample;
 
@@ -138,7 +140,7 @@ fn reference(sample: &Sample, found: &[Found], image_px: [u32; 2]) -> (usize, bo
     let all: usize = found.iter().map(|f| f.link.nodes.len()).sum();
     let mut best = (0, 0);
     for (k, frame) in sample.moving.iter().enumerate() {
-        let sky = crate::track::nearest::Sky::new(frame);
+        let sky = crate::rigid::index::Sky::new(frame);
         let mut seen = 0;
         for f in found {
             let Some(pose) = &f.poses[k] else { continue };

@@ -4,9 +4,10 @@
 
 use nalgebra::Vector2;
 
+use super::median::middle;
 use crate::detect::Detection;
+use crate::rigid::index::Sky;
 use crate::store::DetectionStore;
-use crate::track::nearest::Sky;
 
 /// Frames looked at, at most.
 const FRAMES: usize = 3000;
@@ -111,7 +112,7 @@ pub fn still_place(places: &[Vector2<f64>]) -> Option<Vector2<f64>> {
     if places.is_empty() {
         return None;
     }
-    let centre = super::bodies::middle(places);
+    let centre = middle(places);
     let far = places.iter().filter(|p| (*p - centre).norm() > STILL_PX).count();
     (10 * far <= places.len()).then_some(centre)
 }

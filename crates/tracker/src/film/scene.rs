@@ -10,7 +10,6 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::scene_check::Checker;
 use crate::error::{Error, Fault, Place, Result};
 use crate::frame::TimeBase;
 
@@ -386,13 +385,5 @@ impl Scene {
                 .at(Place::Key("rate_hz".into()))
                 .advice("Give a rate above 0 with at most four decimals"),
         ))
-    }
-
-    /// Checks that names are known and numbers make sense.
-    ///
-    /// # Errors
-    /// [`Error::Film`] naming the first key at fault.
-    pub fn check(&self, name: &str) -> Result<()> {
-        Checker { name }.scene(self)
     }
 }

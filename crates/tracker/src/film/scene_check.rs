@@ -1,14 +1,24 @@
 //! Whether a scene makes sense.
 //!
-//! Owns: [`Checker`]. Must not: change a scene.
+//! Owns: [`Scene::check`]. Must not: change a scene.
 
 use super::scene::{LinkMotion, SCENE_SCHEMA, Scene};
 use crate::error::{Error, Fault, Place, Result};
 
+impl Scene {
+    /// Checks that names are known and numbers make sense.
+    ///
+    /// # Errors
+    /// [`Error::Film`] naming the first key at fault.
+    pub fn check(&self, name: &str) -> Result<()> {
+        Checker { name }.scene(self)
+    }
+}
+
 /// Refuses with the key at fault.
-pub(super) struct Checker<'a> {
+struct Checker<'a> {
     /// What the scene is called in messages.
-    pub(super) name: &'a str,
+    name: &'a str,
 }
 
 impl Checker<'_> {

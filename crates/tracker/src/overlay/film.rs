@@ -12,10 +12,10 @@ use super::{Overlay, failed};
 use crate::error::{Error, Fault, Result};
 use crate::film::encode::{Codec, VideoSettings, VideoWriter};
 use crate::frame::TimeBase;
+use crate::observation::Observation;
 use crate::pipeline::{self, Observer, Stage};
 use crate::source::OpenOptions;
 use crate::table::NodeTable;
-use crate::track::Observation;
 
 /// How the film with the drawings is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

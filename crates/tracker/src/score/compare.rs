@@ -2,7 +2,7 @@
 //!
 //! Owns: [`Comparison`]. Must not: read tables.
 
-use super::{AngleError, FULL, HALF, Match, Reacquisition, Score, Tracked};
+use super::result::{AngleError, FULL, HALF, Match, Reacquisition, Score, Tracked};
 use crate::error::Result;
 use crate::film::Truth;
 

@@ -2,7 +2,7 @@
 //!
 //! Owns: [`Block`], its bytes. Must not: open a file.
 
-use super::FrameStamp;
+use super::stamp::FrameStamp;
 use crate::detect::{Detection, Flags};
 
 /// Frames in a block; all but the last of a store are full.

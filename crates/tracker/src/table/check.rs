@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::{NodeTable, STATUS_WORDS, row_fault};
 use crate::error::{Error, Fault, Result};
-use crate::track::Status;
+use crate::observation::Status;
 
 impl NodeTable {
     /// Checks everything a reader may rely on: as many rows as frames times nodes; frames and times increasing;

@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 
 use super::{NodeTable, Rows, TableMeta, csv, csv_read, parquet, parquet_read};
 use crate::error::{Error, Fault, Result};
+use crate::observation::Observation;
 use crate::rig::Rig;
-use crate::track::Observation;
 
 /// Rows of a Parquet row group, and of what is held in memory before it is written, about 5 MB.
 pub(super) const GROUP_ROWS: usize = 1 << 17;

@@ -31,7 +31,7 @@ pub use file::{Form, TableWriter, read_meta, read_table};
 pub use meta::{RunEnding, SCHEMA_VERSION, SourceFacts, TableMeta};
 pub use tally::{NodeSummary, Tally};
 
-use crate::track::{Observation, Status};
+use crate::observation::{Observation, Status};
 
 /// Columns of the table in their order.
 pub const COLUMNS: [&str; 9] =

@@ -5,8 +5,8 @@
 use serde::Serialize;
 
 use super::NodeTable;
+use crate::observation::{Observation, Status};
 use crate::rig::Rig;
-use crate::track::{Observation, Status};
 
 /// What became of one node over a recording.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -1,6 +1,6 @@
 //! Half hidden markers: the detection beside the place that a firm body gives a node not seen.
 //!
-//! Owns: [`Beside`], [`look_beside`]. Must not: move a pose (what is beside is no part of it).
+//! Owns: [`look_beside`]. Must not: move a pose (what is beside is no part of it).
 //!
 //! A blob in which markers run together shows all of them of which its area leaves a half, each at the place that its
 //! own body gives it.
@@ -9,35 +9,21 @@ use std::f64::consts::PI;
 
 use nalgebra::Vector2;
 
-use super::engine::BodySeen;
-use super::mechanism::{Link, Mechanism};
-use super::nearest::Sky;
-use super::rigid::place;
+use super::seen::{Beside, BodySeen};
 use crate::detect::Flags;
+use crate::rigid::body::{LEAST_PART, Link, Mechanism};
+use crate::rigid::index::Sky;
+use crate::rigid::pose::place;
 
 /// How far the centre of a marker that is at least half seen may be from the marker's, in radii: that of half a
 /// disc is 0.42 from its centre.
 const BESIDE_RADII: f64 = 0.5;
 /// The same where the marker's size is not known, px.
 const BESIDE_PX: f64 = 2.0;
-/// Part of a marker that must be left of a merged blob for it to be seen in it, and of a cut one for its own centre
-/// to be given.
-pub(super) const LEAST_PART: f64 = 0.5;
 /// Discs no farther apart than this run together in the picture, px: blur and the threshold's edge.
 const TOUCH_PX: f64 = 2.0;
 /// How well a node's place must be known for a detection beside it to be its, px.
 const FIRM_PX: f64 = 0.3;
-
-/// The visible part of a half hidden marker, or the blob in which it runs together with others.
-#[derive(Debug, Clone, Copy)]
-pub struct Beside {
-    /// The detection.
-    pub detection: usize,
-    /// Where the body says the marker's centre is, px.
-    pub place: Vector2<f64>,
-    /// The detection's centre from there, px.
-    pub off: Vector2<f64>,
-}
 
 /// Finds half hidden markers: where a body's pose is firm, the detection beside the place of a node not seen.
 pub fn look_beside(

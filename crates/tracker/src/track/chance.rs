@@ -1,18 +1,19 @@
 //! How likely a sighting is by chance alone.
 //!
-//! Owns: [`by_chance`], [`likeness`], [`twins`]. Must not: decide what is accepted (`engine` does).
+//! Owns: [`by_chance`], [`likeness`], [`twins`]. Must not: decide what is accepted (`finding` does).
 
 use std::f64::consts::PI;
 
 use nalgebra::Vector2;
 
-use super::constellation::{Anchor, Search, Sighting};
-use super::engine::{PAIRS, REACH_SIGMA};
 use super::habits::Habits;
-use super::mechanism::{Link, Mechanism};
-use super::nearest::Sky;
 use crate::detect::Detection;
+use crate::rigid::body::{Link, Mechanism};
+use crate::rigid::index::Sky;
+use crate::rigid::search::{Anchor, PAIRS, REACH_SIGMA, Search, Sighting};
 
+/// Greatest expected number of chance sightings for a body found anywhere.
+pub(super) const CHANCE_ANYWHERE: f64 = 1e-5;
 /// How exactly the only node seen of a body must be expected, px: within what a half hidden marker may be off.
 const LONE_GATE_PX: f64 = 1.5;
 /// The same where its area shows that it is whole.

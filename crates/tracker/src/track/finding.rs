@@ -6,13 +6,14 @@ use std::f64::consts::PI;
 
 use nalgebra::Vector2;
 
-use super::chance::by_chance;
-use super::constellation::{Anchor, Search, Sighting};
-use super::engine::{BodySeen, CHANCE_ANYWHERE, Engine, REACH_SIGMA};
-use super::mechanism::Holder;
-use super::nearest::Sky;
-use super::predict::{Forecast, hung_at};
-use super::rigid::place;
+use super::bodies::Bodies;
+use super::chance::{CHANCE_ANYWHERE, by_chance};
+use super::seen::{BodySeen, accepted};
+use crate::rigid::body::Holder;
+use crate::rigid::forecast::{Forecast, hung_at};
+use crate::rigid::index::Sky;
+use crate::rigid::pose::place;
+use crate::rigid::search::{Anchor, REACH_SIGMA, Search, Sighting};
 
 /// Greatest expected number of chance sightings for a body found where its motion carries it.
 const CHANCE_EXPECTED: f64 = 2e-3;
@@ -40,7 +41,7 @@ pub(super) struct Finding {
     pub(super) undecided: Vec<(Sighting, f64)>,
 }
 
-impl Engine {
+impl Bodies {
     /// Looks for one body; `known` are the bodies found so far in this frame.
     pub(super) fn find(
         &self,
@@ -287,9 +288,4 @@ fn of_three(s: &Sighting, best: &Sighting) -> bool {
         && best.support == 3
         && s.support == 2
         && s.picks.iter().flatten().all(|&d| best.picks.contains(&Some(d)))
-}
-
-/// What a sighting that stands says of a body of `n` nodes.
-pub(super) fn accepted(s: Sighting, n: usize) -> BodySeen {
-    BodySeen { fit: Some(s.fit), picks: s.picks, open: vec![false; n], beside: vec![None; n] }
 }

@@ -4,8 +4,8 @@
 
 use nalgebra::Vector2;
 
-use super::mechanism::Mechanism;
-use super::predict::Unrest;
+use crate::rigid::body::Mechanism;
+use crate::rigid::forecast::Unrest;
 
 /// What was learned of a recording's motion and clutter.
 #[derive(Debug, Clone)]

@@ -4,12 +4,12 @@
 
 use nalgebra::{Isometry2, Vector2};
 
-use super::engine::BodySeen;
 use super::habits::Habits;
-use super::joints::Shared;
-use super::mechanism::{Holder, Mechanism};
-use super::nearest::Sky;
-use super::rigid::place;
+use super::seen::BodySeen;
+use crate::rigid::body::{Holder, Mechanism};
+use crate::rigid::index::Sky;
+use crate::rigid::joint::Shared;
+use crate::rigid::pose::place;
 
 /// Samples kept of each node; beyond, every second one is dropped and only every second taken.
 const SAMPLES: usize = 1024;

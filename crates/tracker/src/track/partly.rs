@@ -7,7 +7,7 @@ use std::collections::VecDeque;
 
 use nalgebra::Vector2;
 
-use super::{Observation, Status};
+use crate::observation::{Observation, Status};
 use crate::store::FrameStamp;
 
 /// Frames that wait for what comes after them, at most.

@@ -4,18 +4,19 @@
 
 use std::collections::VecDeque;
 
-use super::Observation;
-use super::engine::{BodySeen, Engine};
+use super::engine::Engine;
 use super::habits::Habits;
 use super::learn::Lessons;
-use super::mechanism::Mechanism;
-use super::nearest::Sky;
 use super::partly::Partly;
-use super::predict::Motion;
 use super::rows::{Returns, observations, partly};
+use super::seen::BodySeen;
 use crate::detect::Detection;
 use crate::error::Result;
+use crate::observation::{Observation, Status};
 use crate::rig::Rig;
+use crate::rigid::body::Mechanism;
+use crate::rigid::forecast::Motion;
+use crate::rigid::index::Sky;
 use crate::store::{DetectionStore, FrameStamp};
 
 /// What came of a recording.
@@ -77,21 +78,21 @@ pub fn track_recording(store: &DetectionStore, rig: &Rig, sink: &mut Sink<'_>) -
     }
     before.finish();
     while let Some(p) = before.pending.pop_back() {
-        out.write(store, &before.engine.mechanism, p, sink)?;
+        out.write(store, &before.engine.bodies.mechanism, p, sink)?;
     }
     let mut after = Pass::new(store, engine);
     for i in start..store.len() {
         after.step(i);
         while after.decided() > 0 {
             if let Some(p) = after.pending.pop_front() {
-                out.write(store, &after.engine.mechanism, p, sink)?;
+                out.write(store, &after.engine.bodies.mechanism, p, sink)?;
             }
             after.first += 1;
         }
     }
     after.finish();
     while let Some(p) = after.pending.pop_front() {
-        out.write(store, &after.engine.mechanism, p, sink)?;
+        out.write(store, &after.engine.bodies.mechanism, p, sink)?;
     }
     out.hand_out(true, sink)?;
     Ok(out.summary)
@@ -120,7 +121,7 @@ fn learn(
         store.read(i, &mut scratch);
         let sky = Sky::new(&scratch);
         let seen = engine.step(i as f64, &sky, None);
-        lessons.add(&engine.mechanism, &seen, &sky);
+        lessons.add(&engine.bodies.mechanism, &seen, &sky);
     }
     lessons.apply(&mut mechanism, &mut habits);
     (mechanism, habits)
@@ -130,8 +131,8 @@ fn learn(
 fn started(rig: &Rig, start: usize, mechanism: Mechanism, habits: Habits) -> Engine {
     let mut engine = Engine::new(mechanism, habits);
     if rig.reference_frame.is_some() {
-        for b in 0..engine.mechanism.links.len() {
-            engine.motions[b] = Motion::at(start as f64, &engine.mechanism.home_pose(b));
+        for b in 0..engine.bodies.mechanism.links.len() {
+            engine.bodies.motions[b] = Motion::at(start as f64, &engine.bodies.mechanism.home_pose(b));
         }
     }
     engine
@@ -174,7 +175,7 @@ impl Output {
             for (k, o) in row.iter().enumerate() {
                 let seen = o.x_px.is_finite();
                 s.seen[k] += u64::from(seen);
-                s.ambiguous[k] += u64::from(o.status == super::Status::Ambiguous);
+                s.ambiguous[k] += u64::from(o.status == Status::Ambiguous);
                 s.seen_last[k] = seen;
             }
             sink(&stamp, &row)?;
@@ -199,7 +200,7 @@ struct Pass<'a> {
 
 impl<'a> Pass<'a> {
     fn new(store: &'a DetectionStore, engine: Engine) -> Self {
-        let n = engine.mechanism.links.len();
+        let n = engine.bodies.mechanism.links.len();
         Self {
             store,
             engine,
@@ -245,11 +246,11 @@ impl<'a> Pass<'a> {
         let from = start.max(self.first) - self.first;
         let end = self.pending.len() - SETTLED;
         let mut engine = self.engine.clone();
-        engine.motions[b].forget();
+        engine.bodies.motions[b].forget();
         let time = |p: &Pending, store: &DetectionStore| (p.stamp.index - store.stamp(0).index) as f64;
         for p in self.pending.range(end..).rev() {
             if let Some(f) = &p.seen[b].fit {
-                engine.motions[b].add(time(p, self.store), f);
+                engine.bodies.motions[b].add(time(p, self.store), f);
             }
         }
         for k in (from..end).rev() {
@@ -258,7 +259,7 @@ impl<'a> Pass<'a> {
             self.store.read(i as usize, &mut self.scratch);
             if self.scratch.is_empty() || p.seen[b].fit.is_some() {
                 if let Some(f) = &p.seen[b].fit {
-                    engine.motions[b].add(i, f);
+                    engine.bodies.motions[b].add(i, f);
                 }
                 continue;
             }

@@ -4,10 +4,10 @@
 
 use nalgebra::Vector2;
 
-use super::engine::BodySeen;
-use super::mechanism::Mechanism;
-use super::{Observation, Status};
+use super::seen::BodySeen;
 use crate::detect::{Detection, Flags};
+use crate::observation::{Observation, Status};
+use crate::rigid::body::Mechanism;
 
 /// The observations of one frame, in the order of the rig's nodes.
 pub fn observations(mechanism: &Mechanism, seen: &[BodySeen], sky: &[Detection]) -> Vec<Observation> {

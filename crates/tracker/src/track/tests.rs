@@ -2,17 +2,19 @@
 //! of several markers is used twice, every frame has its row.
 
 pub(crate) mod bed;
+mod swing;
 mod worst;
 
 use proptest::collection::vec;
 use proptest::prelude::*;
 
-use super::swing::Swing;
-use super::{Observation, Tracker, track_recording};
+use super::{Tracker, track_recording};
 use crate::detect::{Detection, Flags};
+use crate::observation::Observation;
 use crate::rig::Rig;
 use crate::store::{DetectionStore, FrameStamp};
 use crate::table::{NodeTable, Rows, tests::meta};
+use swing::Swing;
 
 /// What is done to a frame of a true film before the tracker sees it.
 #[derive(Debug, Clone)]

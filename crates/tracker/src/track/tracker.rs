@@ -2,15 +2,15 @@
 //!
 //! Owns: [`Tracker`]. Must not: look ahead.
 
-use super::Observation;
 use super::engine::Engine;
 use super::habits::Habits;
-use super::mechanism::Mechanism;
-use super::nearest::Sky;
 use super::rows::{Returns, observations, partly};
 use crate::detect::Detection;
 use crate::error::{Error, Fault, Result};
+use crate::observation::Observation;
 use crate::rig::Rig;
+use crate::rigid::body::Mechanism;
+use crate::rigid::index::Sky;
 use crate::store::FrameStamp;
 
 /// Follows the nodes of a given rig through a live recording, frame by frame. Nothing is filled in later.
@@ -53,8 +53,8 @@ impl Tracker {
         self.last = Some(*stamp);
         let sky = Sky::new(detections);
         let seen = self.engine.step(stamp.index as f64, &sky, None);
-        let mut row = observations(&self.engine.mechanism, &seen, detections);
-        for (k, partly) in partly(&self.engine.mechanism, &seen).into_iter().enumerate() {
+        let mut row = observations(&self.engine.bodies.mechanism, &seen, detections);
+        for (k, partly) in partly(&self.engine.bodies.mechanism, &seen).into_iter().enumerate() {
             // Live, a part is believed only if the marker was seen in the frame before.
             if partly.is_some() && !self.returns.in_last(k) {
                 row[k] = Observation::MISSING;

@@ -4,10 +4,11 @@
 
 use nalgebra::Vector2;
 
-use super::constellation::{Anchor, Sighting};
-use super::engine::{CHANCE_ANYWHERE, Engine};
-use super::nearest::Sky;
-use super::predict::Motion;
+use super::bodies::Bodies;
+use super::chance::CHANCE_ANYWHERE;
+use crate::rigid::forecast::Motion;
+use crate::rigid::index::Sky;
+use crate::rigid::search::{Anchor, Sighting};
 
 /// Undecided sightings followed at once.
 const TENTATIVE: usize = 8;
@@ -25,73 +26,72 @@ pub(super) struct Tentative {
     missed: u32,
 }
 
-impl Engine {
-    /// Carries on the sightings of a body that nothing decided yet, and begins new ones; the one that stands, if
-    /// now one does.
-    pub(super) fn follow(
-        &mut self,
-        b: usize,
-        time: f64,
-        sky: &Sky<'_>,
-        free: &[bool],
-        anchors: &[Anchor],
-        undecided: Vec<(Sighting, f64)>,
-    ) -> Option<Sighting> {
-        let link = &self.mechanism.links[b];
-        let mut now: Vec<Option<Sighting>> = Vec::new();
-        let mut kept: Vec<Tentative> = Vec::new();
-        for mut t in std::mem::take(&mut self.tentative[b]) {
-            let Some(w) = t.motion.forecast(time, self.habits.floor[b], self.habits.first[b]) else {
-                continue;
-            };
-            let w = anchors.first().map_or(w, |a| w.hung(a.local, a.place));
-            let search = self.search(b, sky, free, anchors, Some(w));
-            let mut open = vec![false; link.nodes.len()];
-            match self.judge(&search, f64::INFINITY, &mut open) {
-                Ok((s, chance)) => {
-                    let chance = chance.min(1.0);
-                    let places = link.places(&s.fit.pose);
-                    let moved = places.iter().zip(&t.proved).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
-                    // The first step only gives the rate: it proves nothing. Nor does what stands still.
-                    if moved > PROOF_PX && t.motion.depth() >= 2 {
-                        t.chance *= chance;
-                        t.proved = places;
-                    }
-                    t.motion.add(time, &s.fit);
-                    t.missed = 0;
-                    kept.push(t);
-                    now.push(Some(s));
+/// Carries on the sightings of a body that nothing decided yet, and begins new ones; the one that stands, if
+/// now one does.
+#[allow(clippy::too_many_arguments, reason = "the bodies, what waits, and one frame's facts")]
+pub(super) fn follow(
+    bodies: &mut Bodies,
+    waiting: &mut Vec<Tentative>,
+    b: usize,
+    time: f64,
+    sky: &Sky<'_>,
+    free: &[bool],
+    anchors: &[Anchor],
+    undecided: Vec<(Sighting, f64)>,
+) -> Option<Sighting> {
+    let link = &bodies.mechanism.links[b];
+    let mut now: Vec<Option<Sighting>> = Vec::new();
+    let mut kept: Vec<Tentative> = Vec::new();
+    for mut t in std::mem::take(waiting) {
+        let Some(w) = t.motion.forecast(time, bodies.habits.floor[b], bodies.habits.first[b]) else {
+            continue;
+        };
+        let w = anchors.first().map_or(w, |a| w.hung(a.local, a.place));
+        let search = bodies.search(b, sky, free, anchors, Some(w));
+        let mut open = vec![false; link.nodes.len()];
+        match bodies.judge(&search, f64::INFINITY, &mut open) {
+            Ok((s, chance)) => {
+                let chance = chance.min(1.0);
+                let places = link.places(&s.fit.pose);
+                let moved = places.iter().zip(&t.proved).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+                // The first step only gives the rate: it proves nothing. Nor does what stands still.
+                if moved > PROOF_PX && t.motion.depth() >= 2 {
+                    t.chance *= chance;
+                    t.proved = places;
                 }
-                Err(_) => {
-                    t.missed += 1;
-                    if t.missed <= 3 {
-                        kept.push(t);
-                        now.push(None);
-                    }
-                }
-            }
-        }
-        for (s, chance) in undecided {
-            let same = now.iter().flatten().any(|o| o.picks == s.picks);
-            if !same && kept.len() < TENTATIVE {
-                let mut motion = Motion::default();
-                motion.add(time, &s.fit);
-                let proved = link.places(&s.fit.pose);
-                kept.push(Tentative { motion, chance: chance.min(1e3), proved, missed: 0 });
+                t.motion.add(time, &s.fit);
+                t.missed = 0;
+                kept.push(t);
                 now.push(Some(s));
             }
+            Err(_) => {
+                t.missed += 1;
+                if t.missed <= 3 {
+                    kept.push(t);
+                    now.push(None);
+                }
+            }
         }
-        let (mut kept, mut now) = apart(kept, now);
-        // One that is beyond chance stands if all others are gone.
-        if matches!((&kept[..], &now[..]), ([t], [Some(_)]) if t.chance < CHANCE_ANYWHERE) {
-            self.motions[b] = kept.swap_remove(0).motion;
-            return now.swap_remove(0);
-        }
-        self.tentative[b] = kept;
-        None
     }
+    for (s, chance) in undecided {
+        let same = now.iter().flatten().any(|o| o.picks == s.picks);
+        if !same && kept.len() < TENTATIVE {
+            let mut motion = Motion::default();
+            motion.add(time, &s.fit);
+            let proved = link.places(&s.fit.pose);
+            kept.push(Tentative { motion, chance: chance.min(1e3), proved, missed: 0 });
+            now.push(Some(s));
+        }
+    }
+    let (mut kept, mut now) = apart(kept, now);
+    // One that is beyond chance stands if all others are gone.
+    if matches!((&kept[..], &now[..]), ([t], [Some(_)]) if t.chance < CHANCE_ANYWHERE) {
+        bodies.motions[b] = kept.swap_remove(0).motion;
+        return now.swap_remove(0);
+    }
+    *waiting = kept;
+    None
 }
-
 /// Without those that came to see the same as another: of each such group the least likely by chance stays.
 fn apart(kept: Vec<Tentative>, now: Vec<Option<Sighting>>) -> (Vec<Tentative>, Vec<Option<Sighting>>) {
     let mut out: Vec<(Tentative, Option<Sighting>)> = Vec::new();

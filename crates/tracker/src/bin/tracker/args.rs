@@ -4,7 +4,7 @@
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 
 use crate::{check, completions, film, info, overlay, score, setup, track};
 
@@ -55,7 +55,7 @@ impl Cli {
             Command::Check(args) => check::run(args),
             Command::Film(args) => film::run(args),
             Command::Score(args) => score::run(args),
-            Command::Completions(args) => completions::run(args),
+            Command::Completions(args) => completions::run(args, Cli::command()),
         }
     }
 }

@@ -3,10 +3,6 @@
 use std::io::Write;
 use std::process::ExitCode;
 
-use clap::CommandFactory;
-
-use crate::args::Cli;
-
 /// Print completions for a shell on standard output
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -14,11 +10,11 @@ pub struct Args {
     shell: clap_complete::Shell,
 }
 
-/// Prints them.
-pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+/// Prints the completions of `command`.
+pub fn run(args: Args, mut command: clap::Command) -> anyhow::Result<ExitCode> {
     // Into memory first: written straight to a pipe whose reader has gone, clap_complete would panic.
     let mut text = Vec::new();
-    clap_complete::generate(args.shell, &mut Cli::command(), "tracker", &mut text);
+    clap_complete::generate(args.shell, &mut command, "tracker", &mut text);
     std::io::stdout().write_all(&text)?;
     Ok(ExitCode::SUCCESS)
 }

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::*;
+use crate::rig::{Lens, Region};
 
 #[test]
 fn the_contour_method_finds_the_same_markers() {

@@ -8,11 +8,12 @@ use crate::detect::{Detection, Flags};
 use crate::discover::{Discovery, discover};
 use crate::film::scene::{Hidden, Link, LinkMotion, Marker};
 use crate::film::{Film, MotionTable, Scene, Truth, preset};
+use crate::observation::Status;
 use crate::rig::Rig;
 use crate::score::{LIMIT_PX, Score, Tracked, score};
 use crate::store::{DetectionStore, FrameStamp};
 use crate::table::Rows;
-use crate::track::{Status, track_recording};
+use crate::track::track_recording;
 
 /// A scene that was filmed and detected.
 pub struct Bed {

@@ -3,7 +3,8 @@
 use super::bed::{Bed, Faults, QUIET, hide, scene, tumble};
 use crate::film::scene::{Distractor, LinkMotion, Marker};
 use crate::film::{MotionTable, Scene, preset};
-use crate::track::{Observation, Status, Tracker};
+use crate::observation::{Observation, Status};
+use crate::track::Tracker;
 
 const PIVOT: [f64; 2] = [360.0, 360.0];
 const SEEDS: std::ops::Range<u64> = 2000..2004;

@@ -78,7 +78,7 @@ impl Shared {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::track::rigid::{place, pose_at};
+    use crate::rigid::pose::{place, pose_at};
 
     #[test]
     fn an_elbow_is_found_from_two_turning_bodies() {

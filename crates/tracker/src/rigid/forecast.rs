@@ -4,7 +4,7 @@
 
 use nalgebra::{Isometry2, Vector2};
 
-use super::rigid::{PoseFit, place, pose_at};
+use super::pose::{PoseFit, place, pose_at};
 
 /// A prediction by one frame errs by no more than so many times the greatest error of the last ones: of some twenty
 /// errors that is two standard deviations, so this is four.

@@ -5,10 +5,11 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal, Poisson};
 
-use super::{Observation, Status, track_recording};
 use crate::detect::{Detection, Flags};
+use crate::observation::{Observation, Status};
 use crate::rig::{Body, Joint, Node, Rig};
 use crate::store::{DetectionStore, FrameStamp};
+use crate::track::track_recording;
 
 /// What is filmed.
 #[derive(Debug, Clone)]

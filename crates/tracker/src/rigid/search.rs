@@ -1,6 +1,6 @@
 //! Looking for a body among detections: poses under which its nodes are seen.
 //!
-//! Owns: [`Anchor`], [`Search`], [`Sighting`]. Must not: decide between sightings (`tracker` does).
+//! Owns: [`Anchor`], [`Search`], [`Sighting`]. Must not: decide between sightings (`track` does).
 //!
 //! A pose follows from two joints, from a joint and one node, or from two nodes. Every pose that follows from
 //! the detections is tested on all nodes of the body and refitted on those that agree.
@@ -9,11 +9,16 @@ use std::f64::consts::PI;
 
 use nalgebra::{Isometry2, Vector2};
 
-use super::beside::LEAST_PART;
-use super::mechanism::Link;
-use super::nearest::Sky;
-use super::predict::{Forecast, hung_at};
-use super::rigid::{Pair, PoseFit, fit_pose, place, pose_at};
+use super::body::{LEAST_PART, Link};
+use super::forecast::{Forecast, hung_at};
+use super::index::Sky;
+use super::pose::{Pair, PoseFit, fit_pose, place, pose_at};
+
+/// Deviations up to which a detection agrees with its node. With nine nodes and 1e5 frames a true one is lost to
+/// chance in one of 1e4 (Rayleigh: exp(-k^2 / 2) = 2.5e-6 at 5.1).
+pub const REACH_SIGMA: f64 = 5.1;
+/// Pairs of nodes from which a free body is sought.
+pub const PAIRS: usize = 60;
 
 /// A point of the body whose place in the image is known from elsewhere: the pivot, a neighbour's joint.
 #[derive(Debug, Clone, Copy)]

@@ -4,8 +4,12 @@
 
 use nalgebra::{Isometry2, Vector2};
 
-use super::rigid::place;
+use super::pose::place;
 use crate::rig::Rig;
+
+/// Part of a marker that must be left of a merged blob for it to be seen in it, and of a cut one for its own centre
+/// to be given.
+pub(crate) const LEAST_PART: f64 = 0.5;
 
 /// A rigid body: its nodes and where they are on it.
 #[derive(Debug, Clone)]

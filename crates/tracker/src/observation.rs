@@ -1,0 +1,68 @@
+//! The observation of a node: its place in one frame, and how certain its name is.
+//!
+//! Owns: [`Observation`], [`Status`]. Must not: know how it was made.
+
+/// What is known of a node in a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[repr(u8)]
+pub enum Status {
+    /// Not seen, or what was seen at its place was not accepted.
+    #[default]
+    Missing = 0,
+    /// Seen, and its name is certain.
+    Seen = 1,
+    /// The first frame in which it is seen again.
+    Reacquired = 2,
+    /// Something is seen that may be it, but another name is possible too; its place is not given.
+    Ambiguous = 3,
+}
+
+impl Status {
+    /// The word in the table.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Status::Missing => "missing",
+            Status::Seen => "seen",
+            Status::Reacquired => "reacquired",
+            Status::Ambiguous => "ambiguous",
+        }
+    }
+
+    /// Whether the place is given.
+    pub fn is_seen(self) -> bool {
+        matches!(self, Status::Seen | Status::Reacquired)
+    }
+
+    /// The status of a number, `None` if there is none.
+    pub fn from_number(number: u8) -> Option<Self> {
+        [Status::Missing, Status::Seen, Status::Reacquired, Status::Ambiguous]
+            .get(usize::from(number))
+            .copied()
+    }
+}
+
+/// One node in one frame. The place is NaN unless its status is seen or reacquired.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Observation {
+    /// Centre, px; x right.
+    pub x_px: f64,
+    /// Centre, px; y down.
+    pub y_px: f64,
+    /// Standard uncertainty of each coordinate, px.
+    pub sigma_px: f32,
+    /// Blob area, px.
+    pub area_px: f32,
+    /// What is known.
+    pub status: Status,
+}
+
+impl Observation {
+    /// A node not seen.
+    pub const MISSING: Self = Self {
+        x_px: f64::NAN,
+        y_px: f64::NAN,
+        sigma_px: f32::NAN,
+        area_px: f32::NAN,
+        status: Status::Missing,
+    };
+}

@@ -1,0 +1,10 @@
+//! Planar rigid bodies: their poses, joints and motion, and how one is found among detections.
+//!
+//! Owns: the modules below. Must not: follow a body through a recording (`track` does), or know of pixels' values.
+
+pub mod body;
+pub mod forecast;
+pub mod index;
+pub mod joint;
+pub mod pose;
+pub mod search;
