@@ -5,21 +5,21 @@
 
 use std::sync::Arc;
 
-use super::centre::{Centre, Window};
-use super::contours::contour_centres;
+use super::centre::contours::contour_centres;
+use super::centre::disc_fit::{DiscFit, Fitted};
+use super::centre::edge_table::EdgeTable;
+use super::centre::normal_equations::DiscModel;
+use super::centre::shape;
+use super::centre::window::{Centre, Window};
 use super::detection::{Detection, Flags};
-use super::edge::EdgeTable;
-use super::fit::{DiscFit, Fitted};
+use super::label::components::{Blob, Labeller};
+use super::label::mask::Spans;
+use super::label::plan::Plan;
 use super::lens::Undistort;
 use super::levels::Levels;
 use super::marker::LARGEST_MISFIT;
-use super::mask::Spans;
-use super::normal::DiscModel;
 use super::pixels::Pixels;
-use super::plan::Plan;
-use super::runs::{Blob, Labeller};
 use super::settings::{Centroid, DetectSettings};
-use super::shape;
 use super::side::Side;
 use crate::error::{Error, Fault, Place, Result};
 use crate::frame::Frame;

@@ -4,7 +4,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::background::Background;
+use super::learn::background::Background;
 use super::marker::Marker;
 use super::noise::Noise;
 use super::side::Side;

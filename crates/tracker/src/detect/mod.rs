@@ -2,39 +2,30 @@
 //!
 //! Owns: [`Detection`], [`DetectSettings`], [`Levels`] (what was learned of the recording) and [`Detector`].
 //! Must not: know of nodes, bodies or other frames.
+//!
+//! `learn` finds the levels in sample frames. In each frame `label` finds the blobs beyond the threshold and `centre`
+//! their centres; `detector` calls both. `simd` holds the vector arithmetic of all of them.
 
-mod background;
-mod candidates;
 mod centre;
-mod contours;
 mod detection;
 mod detector;
-mod edge;
-mod fit;
-mod lanes;
+mod label;
 mod learn;
-mod learn_marker;
 mod lens;
 mod levels;
 mod marker;
-mod mask;
 mod noise;
-mod normal;
 mod pixels;
-mod plan;
 mod quantile;
-mod ring;
-mod runs;
 mod settings;
-mod shape;
 mod side;
-mod skip;
+mod simd;
 #[cfg(test)]
 mod tests;
 
-pub use background::Background;
 pub use detection::{Detection, Flags};
 pub use detector::Detector;
+pub use learn::background::Background;
 pub use levels::Levels;
 pub use marker::Marker;
 pub use noise::Noise;

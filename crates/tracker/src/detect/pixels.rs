@@ -2,7 +2,7 @@
 //!
 //! Owns: [`Pixels`]. Must not: judge a sample.
 
-use super::lanes::{Eight, Job, LANES, work};
+use super::simd::lanes::{Eight, Job, LANES, work};
 use crate::error::{Error, Fault, Place, Result};
 use crate::frame::{Frame, PixelFormat};
 
@@ -179,7 +179,7 @@ impl Job for Floats<'_> {
         for (j, out) in self.out.chunks_exact_mut(self.stride).enumerate() {
             let bytes = &self.bytes[j * self.row_bytes..][..self.stride];
             for (out, eight) in out.as_chunks_mut().0.iter_mut().zip(bytes.as_chunks().0) {
-                *out = V::of_bytes(token, eight).array();
+                *out = V::load_bytes(token, eight).array();
             }
         }
     }

@@ -4,10 +4,10 @@
 //!
 //! Pixels are neighbours along sides and corners (8-connected).
 
-use super::pixels::Pixels;
 use super::plan::{CELL_PX, Plan, Segment};
-use super::side::Side;
-use super::skip::{MANY, Sample, Skip};
+use super::prefilter::{MANY, Sample, Skip};
+use crate::detect::pixels::Pixels;
+use crate::detect::side::Side;
 use crate::frame::PixelFormat;
 
 /// What one pass adds up about a connected set of pixels beyond the threshold.

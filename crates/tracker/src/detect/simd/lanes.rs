@@ -16,27 +16,27 @@ pub(crate) trait Eight:
 {
     type Token: Copy;
     /// These numbers.
-    fn of(token: Self::Token, values: &[f32; LANES]) -> Self;
+    fn load(token: Self::Token, values: &[f32; LANES]) -> Self;
     /// These bytes as numbers.
-    fn of_bytes(token: Self::Token, bytes: &[u8; LANES]) -> Self;
+    fn load_bytes(token: Self::Token, bytes: &[u8; LANES]) -> Self;
     /// The same number eight times.
-    fn all(token: Self::Token, value: f32) -> Self;
+    fn splat(token: Self::Token, value: f32) -> Self;
     /// The first and the second of eight pairs.
     fn pairs(token: Self::Token, entries: [&[f32; 2]; LANES]) -> (Self, Self);
     /// The numbers.
     fn array(self) -> [f32; LANES];
     /// Those numbers, not negative and small, without what is behind the point.
-    fn whole(self) -> [i32; LANES];
+    fn trunc(self) -> [i32; LANES];
     /// Each divided by the other's.
-    fn over(self, other: Self) -> Self;
+    fn div(self, other: Self) -> Self;
     /// Square roots.
-    fn root(self) -> Self;
+    fn sqrt(self) -> Self;
     /// Without signs.
-    fn size(self) -> Self;
+    fn abs(self) -> Self;
     /// The lesser of each two, of which none is NaN.
-    fn least(self, other: Self) -> Self;
+    fn min(self, other: Self) -> Self;
     /// The greater of each two, of which none is NaN.
-    fn most(self, other: Self) -> Self;
+    fn max(self, other: Self) -> Self;
     /// Each where this or the second is below the limit, elsewhere 0.
     fn where_below(self, first: Self, second: Self, limit: Self) -> Self;
 }
@@ -45,15 +45,15 @@ impl Eight for f32x8 {
     type Token = ();
 
     #[inline(always)]
-    fn of((): (), values: &[f32; LANES]) -> Self {
+    fn load((): (), values: &[f32; LANES]) -> Self {
         Self::new(*values)
     }
     #[inline(always)]
-    fn of_bytes((): (), bytes: &[u8; LANES]) -> Self {
+    fn load_bytes((): (), bytes: &[u8; LANES]) -> Self {
         Self::new(bytes.map(f32::from))
     }
     #[inline(always)]
-    fn all((): (), value: f32) -> Self {
+    fn splat((): (), value: f32) -> Self {
         Self::splat(value)
     }
     #[inline(always)]
@@ -65,27 +65,27 @@ impl Eight for f32x8 {
         self.to_array()
     }
     #[inline(always)]
-    fn whole(self) -> [i32; LANES] {
+    fn trunc(self) -> [i32; LANES] {
         self.fast_trunc_int().to_array()
     }
     #[inline(always)]
-    fn over(self, other: Self) -> Self {
+    fn div(self, other: Self) -> Self {
         self / other
     }
     #[inline(always)]
-    fn root(self) -> Self {
+    fn sqrt(self) -> Self {
         self.sqrt()
     }
     #[inline(always)]
-    fn size(self) -> Self {
+    fn abs(self) -> Self {
         self.abs()
     }
     #[inline(always)]
-    fn least(self, other: Self) -> Self {
+    fn min(self, other: Self) -> Self {
         self.fast_min(other)
     }
     #[inline(always)]
-    fn most(self, other: Self) -> Self {
+    fn max(self, other: Self) -> Self {
         self.fast_max(other)
     }
     #[inline(always)]
@@ -167,12 +167,12 @@ mod avx2 {
         type Token = Avx2;
 
         #[inline(always)]
-        fn of(_: Avx2, values: &[f32; LANES]) -> Self {
+        fn load(_: Avx2, values: &[f32; LANES]) -> Self {
             // SAFETY: an `Avx2` is there, so the processor has it; eight numbers are read from an array of eight.
             Self(unsafe { _mm256_loadu_ps(values.as_ptr()) })
         }
         #[inline(always)]
-        fn of_bytes(_: Avx2, bytes: &[u8; LANES]) -> Self {
+        fn load_bytes(_: Avx2, bytes: &[u8; LANES]) -> Self {
             // SAFETY: an `Avx2` is there, so the processor has it; eight bytes, which need not be aligned, are read from
             // an array of eight.
             unsafe {
@@ -181,7 +181,7 @@ mod avx2 {
             }
         }
         #[inline(always)]
-        fn all(_: Avx2, value: f32) -> Self {
+        fn splat(_: Avx2, value: f32) -> Self {
             // SAFETY: an `Avx2` is there, so the processor has it.
             Self(unsafe { _mm256_set1_ps(value) })
         }
@@ -211,7 +211,7 @@ mod avx2 {
             values
         }
         #[inline(always)]
-        fn whole(self) -> [i32; LANES] {
+        fn trunc(self) -> [i32; LANES] {
             let mut values = [0; LANES];
             // SAFETY: a `Register` is there, so the processor has AVX2; eight numbers go into an array of eight, which
             // need not be aligned.
@@ -219,27 +219,27 @@ mod avx2 {
             values
         }
         #[inline(always)]
-        fn over(self, other: Self) -> Self {
+        fn div(self, other: Self) -> Self {
             // SAFETY: a `Register` is there, so the processor has AVX2.
             Self(unsafe { _mm256_div_ps(self.0, other.0) })
         }
         #[inline(always)]
-        fn root(self) -> Self {
+        fn sqrt(self) -> Self {
             // SAFETY: a `Register` is there, so the processor has AVX2.
             Self(unsafe { _mm256_sqrt_ps(self.0) })
         }
         #[inline(always)]
-        fn size(self) -> Self {
+        fn abs(self) -> Self {
             // SAFETY: a `Register` is there, so the processor has AVX2.
             Self(unsafe { _mm256_andnot_ps(_mm256_set1_ps(-0.0), self.0) })
         }
         #[inline(always)]
-        fn least(self, other: Self) -> Self {
+        fn min(self, other: Self) -> Self {
             // SAFETY: a `Register` is there, so the processor has AVX2.
             Self(unsafe { _mm256_min_ps(self.0, other.0) })
         }
         #[inline(always)]
-        fn most(self, other: Self) -> Self {
+        fn max(self, other: Self) -> Self {
             // SAFETY: a `Register` is there, so the processor has AVX2.
             Self(unsafe { _mm256_max_ps(self.0, other.0) })
         }
@@ -271,24 +271,24 @@ mod tests {
         b: &[f32; LANES],
         pairs: &[[f32; 2]; LANES],
     ) -> Vec<u32> {
-        let (x, y) = (V::of(t, a), V::of(t, b));
+        let (x, y) = (V::load(t, a), V::load(t, b));
         let (first, second) = V::pairs(t, pairs.each_ref());
         let mut sum = x;
         sum += y;
-        let whole = x.size().least(V::all(t, 1e6)).whole();
+        let whole = x.abs().min(V::splat(t, 1e6)).trunc();
         let values = [
             x + y,
             x - y,
             x * y,
-            x.over(y),
-            x.size().root(),
-            x.least(y),
-            x.most(y),
-            x.where_below(x, y, V::all(t, 0.5)),
+            x.div(y),
+            x.abs().sqrt(),
+            x.min(y),
+            x.max(y),
+            x.where_below(x, y, V::splat(t, 0.5)),
             first,
             second,
             sum,
-            V::of_bytes(t, &a.map(|v| v.to_bits() as u8)),
+            V::load_bytes(t, &a.map(|v| v.to_bits() as u8)),
         ];
         values.iter().flat_map(|v| v.array()).map(f32::to_bits).chain(whole.map(|v| v as u32)).collect()
     }

@@ -4,16 +4,16 @@
 
 use rayon::prelude::*;
 
-use super::centre::Window;
-use super::edge::EdgeTable;
-use super::fit::{DiscFit, Fitted};
-use super::marker::{LARGEST_MISFIT, Marker};
-use super::noise::Noise;
-use super::normal::DiscModel;
-use super::pixels::Pixels;
-use super::quantile::{quantile, sorted};
-use super::runs::Blob;
-use super::side::Side;
+use crate::detect::centre::disc_fit::{DiscFit, Fitted};
+use crate::detect::centre::edge_table::EdgeTable;
+use crate::detect::centre::normal_equations::DiscModel;
+use crate::detect::centre::window::Window;
+use crate::detect::label::components::Blob;
+use crate::detect::marker::{LARGEST_MISFIT, Marker};
+use crate::detect::noise::Noise;
+use crate::detect::pixels::Pixels;
+use crate::detect::quantile::{quantile, sorted};
+use crate::detect::side::Side;
 
 /// A blob in one of the sample frames.
 pub(crate) struct Sample<'a> {

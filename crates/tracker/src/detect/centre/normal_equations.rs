@@ -4,11 +4,11 @@
 
 use std::array::from_fn;
 
-use super::edge::EdgeTable;
-use super::lanes::{Eight, Job, LANES, work};
-use super::noise::Noise;
-use super::ring::{EdgeLookup, Ring};
-use super::side::Side;
+use super::edge_pixels::{EdgeLookup, Ring};
+use super::edge_table::EdgeTable;
+use crate::detect::noise::Noise;
+use crate::detect::side::Side;
+use crate::detect::simd::lanes::{Eight, Job, LANES, work};
 
 /// Free numbers of a disc that stands still and of one that moves.
 pub(crate) const STILL: usize = 5;
@@ -164,8 +164,8 @@ impl<const N: usize> Job for Equations<'_, N> {
     #[inline(always)]
     fn run<V: Eight>(self, token: V::Token) -> Normal<N> {
         let Self { model, ring, p } = self;
-        let all = |v: f32| V::all(token, v);
-        let of = |v: &[f32; LANES]| V::of(token, v);
+        let all = |v: f32| V::splat(token, v);
+        let of = |v: &[f32; LANES]| V::load(token, v);
         let sign = model.side.sign() as f32;
         let [x, y, r, base, height]: [f32; 5] = from_fn(|i| p[i] as f32);
         let limit = model.saturation.map_or(f32::INFINITY, |l| l as f32 * sign);
@@ -179,10 +179,10 @@ impl<const N: usize> Job for Equations<'_, N> {
         let look = |found: &mut [EdgeLookup], x: f32, y: f32| {
             for ((found, px), py) in found.iter_mut().zip(places_x).zip(places_y) {
                 let (dx, dy) = (of(px) - all(x), of(py) - all(y));
-                let rho = (dx * dx + dy * dy).most(least).root();
-                let inverse = one.over(rho);
+                let rho = (dx * dx + dy * dy).max(least).sqrt();
+                let inverse = one.div(rho);
                 let (c, s) = (dx * inverse, dy * inverse);
-                found.spot = model.table.spot(token, r - rho, c.size().least(s.size()));
+                found.spot = model.table.spot(token, r - rho, c.abs().min(s.abs()));
                 found.normal = [c.array(), s.array()];
             }
         };
@@ -225,10 +225,10 @@ impl<const N: usize> Job for Equations<'_, N> {
             };
             let value = of(value);
             let full = sum[0] * height + base;
-            let model = full.least(limit);
+            let model = full.min(limit);
             // Saturated in the model and in the picture: nothing to learn.
             let known = of(live).where_below(full, value, limit);
-            let w = known.over(read + (model * sign - dark).most(zero) * shot);
+            let w = known.div(read + (model * sign - dark).max(zero) * shot);
             let e = value - model;
             let mut line = [zero; MOVING + 1];
             line[0] = sum[1] * height;

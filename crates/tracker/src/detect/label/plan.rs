@@ -2,9 +2,9 @@
 //!
 //! Owns: [`Plan`], [`Segment`], [`Cell`]. Must not: read a pixel, or know where the threshold comes from.
 
-use super::levels::Levels;
 use super::mask::Spans;
-use super::side::Side;
+use crate::detect::levels::Levels;
+use crate::detect::side::Side;
 
 /// Columns `start..end` of a row with the threshold to apply there, raw units.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

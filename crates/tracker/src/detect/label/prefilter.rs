@@ -9,9 +9,9 @@ use std::marker::PhantomData;
 use multiversion::multiversion;
 use wide::{u8x16, u16x8};
 
-use super::pixels::{Pixels, fetch};
 use super::plan::{CELL_PX, Cell, Plan};
-use super::side::Side;
+use crate::detect::pixels::{Pixels, fetch};
+use crate::detect::side::Side;
 use crate::frame::PixelFormat;
 
 /// Samples whose bits are found together.

@@ -6,7 +6,7 @@ use nalgebra::{SMatrix, SVector};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::quantile::{quantile, sorted};
+use crate::detect::quantile::{quantile, sorted};
 
 /// A smooth surface under the markers: a quadratic in x and y, raw units.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

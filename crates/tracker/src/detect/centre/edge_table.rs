@@ -2,7 +2,7 @@
 //!
 //! Owns: [`EdgeTable`]. Must not: fit anything.
 
-use super::lanes::{Eight, LANES};
+use crate::detect::simd::lanes::{Eight, LANES};
 
 /// Steps of distance per pixel.
 const PER_PX: usize = 32;
@@ -83,15 +83,15 @@ impl EdgeTable {
     #[inline(always)]
     pub fn spot<V: Eight>(&self, token: V::Token, inside_px: V, minor: V) -> Spot {
         // Adding 2^23 rounds to a whole number.
-        let all = |v: f32| V::all(token, v);
+        let all = |v: f32| V::splat(token, v);
         let (whole, zero) = (all(8_388_608.0), all(0.0));
         let (last, columns) = (all(self.last_column), all(self.last_column + 1.0));
-        let t = ((inside_px + all(self.reach_px as f32)) * all(PER_PX as f32)).most(zero).least(last);
+        let t = ((inside_px + all(self.reach_px as f32)) * all(PER_PX as f32)).max(zero).min(last);
         let column = (t + whole) - whole;
         let middle = minor * all(DIRECTIONS as f32 * std::f32::consts::SQRT_2) - all(0.5);
-        let row = (middle.most(zero).least(all(DIRECTIONS as f32 - 1.0)) + whole) - whole;
+        let row = (middle.max(zero).min(all(DIRECTIONS as f32 - 1.0)) + whole) - whole;
         Spot {
-            entry: (row * columns + column).whole(),
+            entry: (row * columns + column).trunc(),
             behind_px: ((t - column) * all(1.0 / PER_PX as f32)).array(),
         }
     }
@@ -100,7 +100,7 @@ impl EdgeTable {
     #[inline(always)]
     pub fn at<V: Eight>(&self, token: V::Token, spot: &Spot) -> (V, V) {
         let (cover, slope) = V::pairs(token, spot.entry.map(|i| &self.rows[i as usize % SIZE]));
-        (cover + slope * V::of(token, &spot.behind_px), slope)
+        (cover + slope * V::load(token, &spot.behind_px), slope)
     }
 }
 

@@ -10,10 +10,10 @@
 
 use std::array::from_fn;
 
-use super::lanes::LANES;
-use super::normal::{DiscModel, Factor, MOVING, Normal, STILL};
-use super::ring::{Patch, Ring};
-use super::side::Side;
+use super::edge_pixels::{Patch, Ring};
+use super::normal_equations::{DiscModel, Factor, MOVING, Normal, STILL};
+use crate::detect::side::Side;
+use crate::detect::simd::lanes::LANES;
 
 /// A fitted disc.
 #[derive(Debug, Clone, Copy, PartialEq)]

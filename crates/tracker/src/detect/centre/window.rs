@@ -2,14 +2,14 @@
 //!
 //! Owns: [`Centre`], [`Window`]. Must not: decide what is a marker.
 
-use super::fit::{DiscFit, Fitted, LEAST_PATH_PX, Start};
-use super::lanes::{Eight, Job, LANES, work};
-use super::levels::Levels;
-use super::mask::Spans;
-use super::pixels::Pixels;
-use super::ring::{Patch, Ring};
-use super::runs::Blob;
-use super::side::Side;
+use super::disc_fit::{DiscFit, Fitted, LEAST_PATH_PX, Start};
+use super::edge_pixels::{Patch, Ring};
+use crate::detect::label::components::Blob;
+use crate::detect::label::mask::Spans;
+use crate::detect::levels::Levels;
+use crate::detect::pixels::Pixels;
+use crate::detect::side::Side;
+use crate::detect::simd::lanes::{Eight, Job, LANES, work};
 
 /// A centre and what was seen on the way to it.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -380,11 +380,11 @@ impl Job for Sums<'_> {
         let mut sums = [0.0; 3];
         // Eight columns after eight.
         for left in (0..self.width).step_by(LANES) {
-            let (mut plain, mut by_row) = (V::all(token, 0.0), V::all(token, 0.0));
-            let (mut j, one) = (V::all(token, 0.0), V::all(token, 1.0));
+            let (mut plain, mut by_row) = (V::splat(token, 0.0), V::splat(token, 0.0));
+            let (mut j, one) = (V::splat(token, 0.0), V::splat(token, 1.0));
             for row in self.values.chunks_exact(self.stride) {
                 if let Some(eight) = row[left..].first_chunk() {
-                    let v = V::of(token, eight);
+                    let v = V::load(token, eight);
                     plain += v;
                     by_row += v * j;
                     j += one;

@@ -5,10 +5,10 @@
 use rayon::prelude::*;
 
 use super::background::Background;
-use super::pixels::Pixels;
-use super::plan::Plan;
-use super::runs::{Blob, Labeller};
-use super::side::Side;
+use crate::detect::label::components::{Blob, Labeller};
+use crate::detect::label::plan::Plan;
+use crate::detect::pixels::Pixels;
+use crate::detect::side::Side;
 use crate::frame::PixelFormat;
 
 /// Sample images and what is known of them.

@@ -2,8 +2,8 @@
 //!
 //! Owns: [`Patch`], [`Ring`]. Must not: judge them.
 
-use super::edge::Spot;
-use super::lanes::{Eight, Job, LANES, work};
+use super::edge_table::Spot;
+use crate::detect::simd::lanes::{Eight, Job, LANES, work};
 
 /// A rectangle of pixels, raw units; behind the last pixel come [`LANES`] more values that mean nothing.
 pub(crate) struct Patch<'a> {
@@ -68,11 +68,11 @@ impl Ring {
     /// overwritten by those that follow.
     #[inline(always)]
     fn push<V: Eight>(&mut self, token: V::Token, x: f32, y: f32, values: &[f32], count: usize) {
-        let (steps, y) = (V::of(token, &STEPS), V::all(token, y).array());
+        let (steps, y) = (V::load(token, &STEPS), V::splat(token, y).array());
         for k in (0..count).step_by(LANES) {
             let (at, first) = (self.used + k, x + k as f32);
             let to = at..at + LANES;
-            self.x[to.clone()].copy_from_slice(&(V::all(token, first) + steps).array());
+            self.x[to.clone()].copy_from_slice(&(V::splat(token, first) + steps).array());
             self.y[to.clone()].copy_from_slice(&y);
             self.value[to].copy_from_slice(&values[k..k + LANES]);
         }
@@ -95,17 +95,17 @@ impl Job for Choose<'_> {
     #[inline(always)]
     fn run<V: Eight>(self, token: V::Token) {
         let Self { patch, centre: [cx, cy], outer, inner, ring } = self;
-        let all = |v: f64| V::all(token, v as f32);
+        let all = |v: f64| V::splat(token, v as f32);
         let (left, above) = (cx - patch.x0, cy - patch.y0);
         let first = (above - outer).max(0.0) as usize;
         let last = ((above + outer).max(0.0) as usize + 1).min(patch.height);
         ring.begin(last.saturating_sub(first) * (patch.width + 2 * LANES));
         let (zero, width) = (all(0.0), all(patch.width as f64));
         // The first pixel behind a place.
-        let behind = |x: V| (x + all(1.0)).most(zero).least(width).whole().map(|i| i as usize);
+        let behind = |x: V| (x + all(1.0)).max(zero).min(width).trunc().map(|i| i as usize);
         for eight in (first..last).step_by(LANES) {
-            let dy = all(eight as f64 - above) + V::of(token, &STEPS);
-            let half = |r: f64| (all(r * r) - dy * dy).most(zero).root();
+            let dy = all(eight as f64 - above) + V::load(token, &STEPS);
+            let half = |r: f64| (all(r * r) - dy * dy).max(zero).sqrt();
             let (far, near, middle) = (half(outer), half(inner), all(left));
             let (a, b) = (behind(middle - far), behind(middle - near));
             let (c, d) = (behind(middle + near), behind(middle + far));

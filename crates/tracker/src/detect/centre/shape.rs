@@ -2,11 +2,11 @@
 //!
 //! Owns: [`judge`], [`two_discs`]. Must not: move a centre.
 
-use super::centre::Centre;
-use super::detection::Flags;
-use super::fit::Fitted;
-use super::levels::Levels;
-use super::runs::Blob;
+use super::disc_fit::Fitted;
+use super::window::Centre;
+use crate::detect::detection::Flags;
+use crate::detect::label::components::Blob;
+use crate::detect::levels::Levels;
 
 /// Mean square of weighted residuals above which a blob is not a whole marker: three times what the worst of
 /// the learned markers have.

@@ -6,13 +6,13 @@ use rayon::prelude::*;
 
 use super::background;
 use super::candidates::{self, Candidate};
-use super::learn_marker::{self, Sample};
-use super::levels::Levels;
-use super::noise::Noise;
-use super::pixels::Pixels;
-use super::quantile::{quantile, sorted};
-use super::settings::{DetectSettings, Polarity, Threshold};
-use super::side::Side;
+use super::marker::{self, Sample};
+use crate::detect::levels::Levels;
+use crate::detect::noise::Noise;
+use crate::detect::pixels::Pixels;
+use crate::detect::quantile::{quantile, sorted};
+use crate::detect::settings::{DetectSettings, Polarity, Threshold};
+use crate::detect::side::Side;
 use crate::error::{Error, Fault, Place, Result};
 use crate::frame::Frame;
 
@@ -117,7 +117,7 @@ impl Levels {
             .filter(|b| b.area >= area_px[0] && b.area <= area_px[1])
             .map(|b| Sample { pixels: planes[b.image], blob: b.blob })
             .collect();
-        let (marker, noise) = match learn_marker::learn(&samples, best.side, noise, saturation) {
+        let (marker, noise) = match marker::learn(&samples, best.side, noise, saturation) {
             Some((marker, noise)) => (Some(marker), noise),
             None => (None, noise),
         };

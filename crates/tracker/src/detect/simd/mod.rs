@@ -1,0 +1,3 @@
+//! Vector arithmetic with the same bits on every processor.
+
+pub(super) mod lanes;
