@@ -79,7 +79,8 @@ RUST_FORBIDDEN = {
     "frame": {"source", "detect", "track", "table", "pipeline", "rig", "store"},
     "source": {"detect", "track", "table", "pipeline", "rig", "store"},
     "detect": {"source", "track", "table", "pipeline", "store", "film"},
-    "track": {"source", "table", "pipeline", "film"},
+    "rigid": {"source", "track", "discover", "table", "pipeline", "film", "store"},
+    "track": {"source", "discover", "table", "pipeline", "film"},
     "table": {"source", "pipeline", "film"},
 }
 

@@ -2,8 +2,8 @@
 //! simulate`. Prints the best of several runs and the energy balance it was had at; best, because other programs
 //! can only make a run longer.
 
+use dynamics::analysis::simulate::{Run, Settings, simulate};
 use dynamics::parameters::{Field, Fixed, Parameters};
-use dynamics::simulate::{Run, Settings, simulate};
 use std::time::Instant;
 
 fn pendulum(damped: bool) -> Parameters<f64> {

@@ -1,7 +1,8 @@
 //! The double pendulum: equations of motion, and everything that integrates them.
 //!
 //! ```text
-//! scalar ──▶ parameters ──▶ terms ──▶ balance ──▶ motion ──▶ (flight ──▶ simulate, shooting)
+//! scalar ──▶ parameters ──▶ terms ──▶ balance ──▶ motion ──▶ friction ──▶ integrate ──▶ analysis
+//!                                                                      └──▶ shooting
 //! ```
 //!
 //! Conventions: SI units and radians. `phi1`, `phi2` are absolute link angles, counter-clockwise positive, zero
@@ -16,23 +17,18 @@
 //! 2 lambda a2 + (zeta + A3 cos d) a1 - A3 sin d w1^2 + kappa sin(phi2) = Q2
 //! ```
 
+pub mod analysis;
 mod balance;
-pub mod contact;
-pub mod dop853;
-pub mod ensemble;
 #[cfg(test)]
 mod fixture;
-pub mod flight;
-pub mod lyapunov;
+pub mod friction;
+pub mod integrate;
 pub mod motion;
 pub mod parameters;
 pub mod scalar;
-pub mod section;
 pub mod shooting;
-pub mod simulate;
 pub mod smoother;
 pub mod state;
-mod tableau;
 pub mod terms;
 
 pub use motion::{accelerations, energies, mass_matrix, normal_forces};

@@ -4,11 +4,11 @@ use std::collections::HashMap;
 
 use dynamics::Contact;
 use dynamics::TERMS;
-use dynamics::contact::Friction;
-use dynamics::ensemble::{Case, ensemble};
-use dynamics::lyapunov::{Growth, growth_rates};
-use dynamics::section::{Section, poincare};
-use dynamics::simulate::{Ending, Failure, Run, Settings};
+use dynamics::analysis::ensemble::{Case, ensemble};
+use dynamics::analysis::lyapunov::{Growth, growth_rates};
+use dynamics::analysis::section::{Section, poincare};
+use dynamics::analysis::simulate::{Ending, Failure, Run, Settings};
+use dynamics::friction::Friction;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -40,7 +40,7 @@ fn table<'py>(py: Python<'py>, flat: &[f64], columns: usize) -> PyResult<Bound<'
 /// One motion as arrays: `state` (T, 4), `a` (T, 2), `normal` (T, 2), `dry` (T, 2), `energy` (T,), `works` (T, terms),
 /// `events` (E, 4: time, joint 0/1, contact before, contact after), `at_rest`, `end_s`, `steps`.
 fn run_dict<'py>(py: Python<'py>, run: &Run) -> PyResult<Bound<'py, PyDict>> {
-    let flat = |f: &dyn Fn(&dynamics::simulate::Sample) -> Vec<f64>| -> Vec<f64> {
+    let flat = |f: &dyn Fn(&dynamics::analysis::simulate::Sample) -> Vec<f64>| -> Vec<f64> {
         run.samples.iter().flat_map(f).collect()
     };
     let out = PyDict::new(py);
@@ -75,7 +75,9 @@ pub fn simulate_motion<'py>(
     let p = parameters(&model)?;
     let times = times_s.as_array().to_vec();
     let ask = settings(tolerance, width_rad_s, pinned);
-    let run = py.detach(|| dynamics::simulate::simulate(&p, state, &times, &ask)).map_err(|e| failed(&e))?;
+    let run = py
+        .detach(|| dynamics::analysis::simulate::simulate(&p, state, &times, &ask))
+        .map_err(|e| failed(&e))?;
     run_dict(py, &run)
 }
 

@@ -2,8 +2,8 @@
 
 use rayon::prelude::*;
 
+use crate::analysis::simulate::{Failure, Run, Settings, simulate};
 use crate::parameters::Parameters;
-use crate::simulate::{Failure, Run, Settings, simulate};
 use crate::state::State;
 
 /// One motion of an ensemble.

@@ -2,9 +2,9 @@
 
 use std::f64::consts::TAU;
 
-use crate::flight::Flight;
+use crate::analysis::simulate::{Failure, Settings};
+use crate::integrate::flight::Flight;
 use crate::parameters::Parameters;
-use crate::simulate::{Failure, Settings};
 use crate::state::State;
 
 /// Points of each step at which the angle is examined.
@@ -24,7 +24,7 @@ pub struct Section {
 /// States on the section, with their times, for `duration_s` from `x`. The angles are as they are, not reduced.
 ///
 /// # Errors
-/// As [`crate::simulate::simulate`].
+/// As [`crate::analysis::simulate::simulate`].
 pub fn poincare(
     p: &Parameters<f64>,
     x: State<f64>,

@@ -1,10 +1,10 @@
 //! The largest Lyapunov exponent, by the growth of an exactly carried tangent vector.
 
-use crate::dop853::{Step, next_factor};
+use crate::analysis::simulate::Failure;
+use crate::integrate::dop853::{Step, next_factor};
 use crate::motion::accelerations;
 use crate::parameters::{Field, Parameters};
 use crate::scalar::Dual;
-use crate::simulate::Failure;
 use crate::state::{Contact, State};
 
 /// What is asked.
@@ -16,7 +16,7 @@ pub struct Growth {
     pub skipped: usize,
     /// Intervals counted.
     pub counted: usize,
-    /// Local error allowed, as in [`crate::simulate::Settings`].
+    /// Local error allowed, as in [`crate::analysis::simulate::Settings`].
     pub tolerance: f64,
 }
 
@@ -134,8 +134,8 @@ mod tests {
         let end = |sign: f64| {
             let tangent = [0.5, -0.4, 0.6, 0.3];
             let y = std::array::from_fn(|i| x[i] + sign * 1e-5 * tangent[i]);
-            let settings = crate::simulate::Settings::default();
-            crate::simulate::simulate(&p, y, &[0.0, 0.3], &settings).unwrap().samples[1].x
+            let settings = crate::analysis::simulate::Settings::default();
+            crate::analysis::simulate::simulate(&p, y, &[0.0, 0.3], &settings).unwrap().samples[1].x
         };
         let (up, down) = (end(1.0), end(-1.0));
         let (_, time) = scales(&p);

@@ -1,12 +1,12 @@
 //! A motion with exact dry friction: DOP853 between located events, energies and works beside the state.
 
-use crate::flight::{Flight, SIZE, state};
+use crate::integrate::flight::{Flight, SIZE, state};
 use crate::motion::{energies, flow};
 use crate::parameters::Parameters;
 use crate::state::{Contact, State};
 use crate::terms::TERMS;
 
-pub use crate::flight::{Event, Failure, Settings};
+pub use crate::integrate::flight::{Event, Failure, Settings};
 
 /// How a simulation ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -117,8 +117,8 @@ pub fn simulate(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::Friction;
     use crate::fixture::{damped, pendulum};
+    use crate::friction::Friction;
     use crate::parameters::Field;
 
     fn drop() -> State<f64> {

@@ -1,8 +1,8 @@
 //! One step of DOP853 (order 8, error estimates of orders 5 and 3) and its dense output (order 7), for autonomous
 //! equations over any [`Real`] scalar.
 
+use crate::integrate::tableau::{A, ALL_STAGES, B, D as DENSE_WEIGHTS, DENSE, E3, E5, STAGES};
 use crate::scalar::Real;
-use crate::tableau::{A, ALL_STAGES, B, D as DENSE_WEIGHTS, DENSE, E3, E5, STAGES};
 
 /// A step that was tried: its two ends and its stages.
 pub struct Step<S, const N: usize> {
@@ -121,8 +121,8 @@ pub fn next_factor(error: f64, rejected_before: bool) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::integrate::tableau::C;
     use crate::scalar::Dual;
-    use crate::tableau::C;
 
     #[test]
     fn rows_sum_to_their_nodes() {

@@ -1,7 +1,7 @@
 //! A pendulum on its way: DOP853 steps between located changes of contact.
 
-use crate::contact::{Friction, Joints, rate};
-use crate::dop853::{Dense, Step, next_factor};
+use crate::friction::{Friction, Joints, rate};
+use crate::integrate::dop853::{Dense, Step, next_factor};
 use crate::motion::{energies, flow};
 use crate::parameters::{Field, Parameters};
 use crate::state::{Contact, State};
