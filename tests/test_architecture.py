@@ -15,7 +15,7 @@ PACKAGE = ROOT / "python" / "pydpend"
 GROUPS: tuple[tuple[str, ...], ...] = (
     ("errors", "crossing", "_tracker", "columns", "series"),
     ("nodes", "tracking", "filming", "scoring", "export", "components", "bearings"),
-    ("coefficients", "model"),
+    ("coefficients", "model", "fit_options"),
     ("angles",),
     ("encoder",),
     ("simulate", "linear", "states"),

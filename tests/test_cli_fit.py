@@ -115,7 +115,10 @@ def test_bad_input_is_refused_in_words(folder: Path, tmp_path: Path) -> None:
         "is not a coefficient": (folder / "21.csv", ["--laws", "mu_x"]),
         "Check the units": (folder / "21.csv", ["--model", str(_thousandfold(tmp_path))]),
         "goes up and down": (folder / "21.csv", ["--model", "published"]),
-        "Use covariance": (folder / "21.csv", ["--method", "energy", "--intervals", "profile"]),
+        "--intervals: is an option": (
+            folder / "21.csv",
+            ["--method", "energy", "--intervals", "profile"],
+        ),
         "not pinned": (folder / "21.csv", ["--pinned"]),
     }
     for words, (path, options) in cases.items():

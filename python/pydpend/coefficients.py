@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from pydpend.errors import FitError, fault
+from pydpend.errors import FitOptionError, Setting, fault
 from pydpend.model import UNITS, Model, constants
 
 PAPER = ("mu_v1", "mu_v2", "mu_q1", "mu_q2", "rmu1", "rmu2")
@@ -46,7 +46,7 @@ JOINT_OF = {name: "lower" if name.endswith("2") or name == "strip_drag" else "up
 def coefficients(laws: str | Sequence[str]) -> tuple[str, ...]:
     """The coefficients of ``laws``: ``"paper"``, ``"full"``, or names (a sequence or comma-separated).
 
-    Raises FitError for a name that is none.
+    Raises FitOptionError for a name that is none.
     """
     if isinstance(laws, str):
         if laws in ("paper", "full"):
@@ -54,9 +54,9 @@ def coefficients(laws: str | Sequence[str]) -> tuple[str, ...]:
         laws = [name.strip() for name in laws.split(",") if name.strip()]
     unknown = [name for name in laws if name not in FULL]
     if unknown or not laws:
-        raise FitError(
+        raise FitOptionError(
             fault(
-                "laws",
+                Setting("laws"),
                 f"{unknown[0]!r} is not a coefficient" if unknown else "there are none",
                 f"Use paper, full, or some of {', '.join(FULL)}",
             )

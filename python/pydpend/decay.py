@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pydpend.angles import LinkAngles
-from pydpend.errors import FitError, fault
+from pydpend.errors import FitError, Setting, fault
 from pydpend.model import Model
 
 Floats = NDArray[np.float64]
@@ -116,7 +116,7 @@ def find_decay(
                 angles.name,
                 f"the free decay lasts {max(end - begin, 0):.3g} s (from {begin:.3g} s to {end:.3g} s); "
                 "a fit needs at least one second",
-                "Record longer, or state the decay with --start and --stop",
+                "Record longer, or state the decay with " + Setting("start_s") + " and " + Setting("stop_s"),
             )
         )
     message = f"free decay from {begin:.3f} s" + (

@@ -2,13 +2,159 @@
 
 A message reads ``subject, place: problem. Advice``, for example
 ``encoder.csv, line 12, column voltage_v: 'n/a' is not a number. Remove the line or leave the field empty``.
+
+The library speaks of settings and steps (`Setting`, `Step`), never of flags:
+``"Leave out " + Setting("pinned", True)``. Whoever shows a message to a person writes them (`FrontEnd`): as keywords
+and functions of Python by default, as flags and commands in the program ``pydpend``.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, replace
+from typing import Protocol, TypeAlias
+
+
+class _Part:
+    """Something that may stand in a message: a sum of parts and texts is a message."""
+
+    def _as_message(self) -> Message:
+        raise NotImplementedError
+
+    def __add__(self, more: Text) -> Message:
+        return Message((*self._as_message().parts, *Message.of(more).parts))
+
+    def __radd__(self, before: str) -> Message:
+        return Message((before, *self._as_message().parts))
+
+
+@dataclass(frozen=True)
+class Setting(_Part):
+    """A keyword argument that a message names, and its value if one is meant: ``Setting("method", "energy")``.
+
+    ``subject``: the message is about it, and begins with it.
+    """
+
+    name: str
+    value: str | bool | float | None = None
+    subject: bool = False
+
+    def _as_message(self) -> Message:
+        return Message((self,))
+
+    def __str__(self) -> str:
+        return front_end().setting(self)
+
+
+@dataclass(frozen=True)
+class Step(_Part):
+    """Something to do with another part of pydpend: what to type, and what to write in Python."""
+
+    command: str
+    call: str
+
+    def _as_message(self) -> Message:
+        return Message((self,))
+
+    def __str__(self) -> str:
+        return front_end().step(self)
+
+
+@dataclass(frozen=True)
+class Message(_Part):
+    """A text that names settings and steps as data. ``str`` is the text as the front end says it."""
+
+    parts: tuple[str | Setting | Step, ...] = ()
+
+    @staticmethod
+    def of(text: Text) -> Message:
+        """A message of one part, or the message itself."""
+        return text if isinstance(text, Message) else Message((text,))
+
+    def _as_message(self) -> Message:
+        return self
+
+    def __str__(self) -> str:
+        return "".join(str(part) for part in self.parts)
+
+    def __bool__(self) -> bool:
+        return any(part != "" for part in self.parts)
+
+
+Text: TypeAlias = "str | Message | Setting | Step"
+"""What a message may be made of."""
+
+
+CHECK = Step("tracker check", "nodes.status")
+"""Sums up what became of each node."""
+CALIBRATE = Step("pydpend calibrate", "dp.calibrate")
+"""Makes the encoder's calibration."""
+FIT = Step("pydpend fit", "dp.fit_damping")
+"""Fits the damping."""
+FILM_TRUTH = Step("tracker film --truth", "dp.film(truth=...)")
+"""Writes the truth of a film that is made."""
+
+
+class FrontEnd(Protocol):
+    """How settings and steps are written for whoever reads them."""
+
+    def setting(self, setting: Setting) -> str:
+        """``--method energy``, ``method='energy'``."""
+
+    def step(self, step: Step) -> str:
+        """What to type, or what to call."""
+
+
+class _Python:
+    """The keywords and functions of the package ``pydpend``, imported as ``dp``."""
+
+    def setting(self, setting: Setting) -> str:
+        if setting.value is None:
+            return setting.name if setting.subject else f"{setting.name}=..."
+        return f"{setting.name}={setting.value!r}"
+
+    def step(self, step: Step) -> str:
+        return step.call
+
+
+PYTHON = _Python()
+"""Whoever calls the package from Python."""
+
+_FRONT_END: ContextVar[FrontEnd] = ContextVar("front_end")
+
+
+def front_end() -> FrontEnd:
+    """The front end whose user reads messages now; Python's unless another one `speaking` says so."""
+    return _FRONT_END.get(PYTHON)
+
+
+@contextmanager
+def speaking(front: FrontEnd) -> Iterator[None]:
+    """Messages are written for the user of ``front`` meanwhile."""
+    before = _FRONT_END.set(front)
+    try:
+        yield
+    finally:
+        _FRONT_END.reset(before)
+
+
+def listed(words: Iterable[str], last: str = "or") -> str:
+    """``a, b or c``."""
+    given = list(words)
+    return given[0] if len(given) == 1 else f"{', '.join(given[:-1])} {last} {given[-1]}"
+
 
 class PydpendError(Exception):
-    """Anything that pydpend refuses or cannot do."""
+    """Anything that pydpend refuses or cannot do. ``message`` is what it says, with settings as data."""
+
+    def __init__(self, message: Text = "") -> None:
+        self.message = Message.of(message)
+        super().__init__(self.message)
+
+    def __str__(self) -> str:
+        return str(self.message)
 
 
 class TrackerError(PydpendError):
@@ -59,7 +205,22 @@ class FitError(PydpendError):
     """A fit that cannot be done on these data or did not converge."""
 
 
-def fault(subject: str, problem: str, advice: str = "", *, place: str = "") -> str:
-    """The text of an error: ``subject, place: problem. Advice``."""
-    where = f"{subject}, {place}" if place else subject
-    return f"{where}: {problem}. {advice}" if advice else f"{where}: {problem}"
+class OptionError(PydpendError, ValueError):
+    """An option that is not known, makes no sense, or is of another method than the one chosen."""
+
+
+class FitOptionError(FitError, OptionError):
+    """An option of a damping fit that is not known, makes no sense, or is of the other method."""
+
+
+def fault(subject: Text, problem: Text, advice: Text = "", *, place: str = "") -> Message:
+    """What an error says: ``subject, place: problem. Advice``."""
+    if isinstance(subject, Setting):
+        subject = replace(subject, subject=True)
+    said = Message.of(subject) + (f", {place}: " if place else ": ") + problem
+    return said + ". " + advice if Message.of(advice) else said
+
+
+def one_of(setting: str, value: object, known: Iterable[str]) -> Message:
+    """What an error says of a setting whose value is none of those known."""
+    return fault(Setting(setting), f"{value!r} is not known", f"Give {listed(known)}")

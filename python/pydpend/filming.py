@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 from pyarrow import csv, parquet
 
 from pydpend import _tracker
-from pydpend.errors import FilmError, fault
+from pydpend.errors import FILM_TRUTH, FilmError, fault
 
 StrPath: TypeAlias = "str | os.PathLike[str]"
 Codec: TypeAlias = Literal["h264", "ffv1", "mjpeg", "raw"]
@@ -182,7 +182,7 @@ def read_truth(path: StrPath) -> Truth:
     wanted = ["frame", "time_s", "node", "body", "x_px", "y_px", "visible", "phi1_rad"]
     missing = [column for column in wanted if column not in table.column_names]
     if missing:
-        advice = "Give the table that `tracker film --truth` wrote"
+        advice = "Give the table that " + FILM_TRUTH + " wrote"
         raise FilmError(fault(name, f"there is no column {missing[0]}", advice, place=missing[0]))
     frame = table["frame"].to_numpy()
     count = int(np.count_nonzero(frame == frame[0])) if len(frame) else 0

@@ -6,11 +6,12 @@ use numpy::{IntoPyArray, PyArray1, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use serde_json::json;
 use tracker::error::Error;
+use tracker::message::Message;
 use tracker::overlay::{self, FilmSettings};
 use tracker::pipeline::{self, Existing, RunSettings};
 use tracker::table::SourceFacts;
 
-use crate::errors::{argument, raise};
+use crate::errors::{argument, raise, to_python};
 use crate::settings::{DetectArguments, OpenArguments, detect_settings, open_options, rig};
 use crate::tables::{Columns, Held, columns, rig_json, table_of};
 use crate::watch::Watch;
@@ -37,6 +38,13 @@ fn settings(
     })
 }
 
+/// Warnings as messages of `pydpend.errors`.
+type Messages<'py> = Vec<Bound<'py, PyAny>>;
+
+fn messages<'py>(py: Python<'py>, warnings: &[Message]) -> PyResult<Messages<'py>> {
+    warnings.iter().map(|w| to_python(py, w)).collect()
+}
+
 /// Follows the markers of a recording. Columns, warnings, and the exception that stopped it, if one did.
 #[pyfunction]
 #[allow(clippy::too_many_arguments)]
@@ -50,7 +58,7 @@ pub fn track<'py>(
     output: Option<PathBuf>,
     existing: &str,
     progress: Option<Py<PyAny>>,
-) -> PyResult<(Columns<'py>, Vec<String>, Option<PyErr>)> {
+) -> PyResult<(Columns<'py>, Messages<'py>, Option<PyErr>)> {
     let mut settings = settings(py, input, rig, frames, &detect, &open)?;
     settings.output = output;
     settings.collect = true;
@@ -64,7 +72,7 @@ pub fn track<'py>(
     let outcome = py.detach(|| pipeline::run(&settings, &mut watch));
     match (outcome, watch.into_error()) {
         (Ok(summary), stopped) => match summary.table {
-            Some(table) => Ok((columns(py, table)?, summary.warnings, stopped)),
+            Some(table) => Ok((columns(py, table)?, messages(py, &summary.warnings)?, stopped)),
             None => Err(argument(py, "track", "the run gave no table", "Please report this")),
         },
         (Err(Error::Interrupted), Some(stopped)) => Err(stopped),
@@ -73,7 +81,7 @@ pub fn track<'py>(
 }
 
 /// A rig as JSON, warnings, and the reference frame with the rig drawn, (H, W, 3).
-type Found<'py> = (String, Vec<String>, Bound<'py, PyArray3<u8>>);
+type Found<'py> = (String, Messages<'py>, Bound<'py, PyArray3<u8>>);
 
 /// Finds the rig of a recording; the picture is also written if a file is given.
 #[pyfunction]
@@ -97,7 +105,7 @@ pub fn setup<'py>(
     });
     let (rig, warnings, samples, [w, h]) = watch.done(py, outcome)?;
     let picture = samples.into_pyarray(py).reshape([h as usize, w as usize, 3])?;
-    Ok((rig, warnings, picture))
+    Ok((rig, messages(py, &warnings)?, picture))
 }
 
 /// Frames and times in s, (K,).

@@ -3,6 +3,9 @@
 //! Owns: [`Error`], [`Fault`], [`Place`]. Must not: print, decide an exit status, or know of any file format.
 
 use std::fmt;
+use std::path::Path;
+
+use crate::message::{FrontEnd, Message, Setting};
 
 /// Where in the input a fault lies.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -36,28 +39,40 @@ impl fmt::Display for Place {
 
 /// What was wrong, where, and what to do about it.
 ///
-/// Reads as `drop.mraw, byte 4096: 12 of 24 bytes of a frame are missing. Copy the file again.`
+/// Reads as `drop.mraw, byte 4096: 12 of 24 bytes of a frame are missing. Copy the file again.` Settings that it
+/// names are data ([`Message`]): a front end writes them with [`Fault::render`].
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Fault {
-    /// The file, argument or array at fault.
-    pub subject: String,
+    /// The file, setting or array at fault.
+    pub subject: Message,
     /// Where in it.
     pub place: Place,
     /// What was expected and what was found, a clause without a full stop.
-    pub problem: String,
+    pub problem: Message,
     /// What the user can do, a sentence without its full stop; empty if there is nothing.
-    pub advice: String,
+    pub advice: Message,
 }
 
 impl Fault {
     /// A fault of `subject` as a whole.
-    pub fn new(subject: impl fmt::Display, problem: impl Into<String>) -> Self {
+    pub fn new(subject: impl fmt::Display, problem: impl Into<Message>) -> Self {
         Self {
-            subject: subject.to_string(),
+            subject: subject.to_string().into(),
             place: Place::Whole,
             problem: problem.into(),
-            advice: String::new(),
+            advice: Message::default(),
         }
+    }
+
+    /// A fault of a setting.
+    pub fn of(setting: Setting, problem: impl Into<Message>) -> Self {
+        Self { subject: setting.into(), ..Self::new("", problem) }
+    }
+
+    /// A file that is there already and was not to be replaced.
+    pub fn exists(path: &Path) -> Self {
+        Self::new(path.display(), "it is there already")
+            .advice("Choose another name, or replace it with " + Setting::Force)
     }
 
     /// The same fault at a place.
@@ -69,19 +84,26 @@ impl Fault {
 
     /// The same fault with what to do about it.
     #[must_use]
-    pub fn advice(mut self, advice: impl Into<String>) -> Self {
+    pub fn advice(mut self, advice: impl Into<Message>) -> Self {
         self.advice = advice.into();
         self
+    }
+
+    /// The whole of it as one message.
+    pub fn message(&self) -> Message {
+        let problem = self.subject.clone() + format!("{}: ", self.place) + self.problem.clone();
+        if self.advice.is_empty() { problem } else { problem + ". " + self.advice.clone() }
+    }
+
+    /// The whole of it as a front end says it.
+    pub fn render(&self, front: &dyn FrontEnd) -> String {
+        self.message().render(front)
     }
 }
 
 impl fmt::Display for Fault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}{}: {}", self.subject, self.place, self.problem)?;
-        if !self.advice.is_empty() {
-            write!(f, ". {}", self.advice)?;
-        }
-        Ok(())
+        self.message().fmt(f)
     }
 }
 
@@ -110,6 +132,21 @@ pub enum Error {
     /// The user asked to stop; what was done is kept.
     #[error("interrupted")]
     Interrupted,
+}
+
+impl Error {
+    /// What it says, with the settings it names as data.
+    pub fn message(&self) -> Message {
+        match self {
+            Self::Source(f)
+            | Self::Detect(f)
+            | Self::Rig(f)
+            | Self::Table(f)
+            | Self::Film(f)
+            | Self::Argument(f) => f.message(),
+            Self::Interrupted => self.to_string().into(),
+        }
+    }
 }
 
 /// The result of everything in the tracker that can fail.

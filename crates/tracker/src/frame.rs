@@ -8,6 +8,7 @@
 use std::fmt;
 
 use crate::error::Result;
+use crate::message::Message;
 
 /// How the samples of one row are stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -147,7 +148,7 @@ pub struct SourceInfo {
     /// What else the recording says, word and value: camera, exposure, trigger frame, range of values.
     pub details: Vec<(String, String)>,
     /// What a user should know: implausible stamps replaced, gaps in numbering, a size that does not match.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Message>,
 }
 
 /// How a recording ended, known once [`FrameSource::next_frame`] gave `None`.

@@ -7,6 +7,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Fault, Place, Result};
+use crate::message::SETUP;
 
 /// Version of the rig file's form; a file with a higher one is refused.
 pub const RIG_SCHEMA: u32 = 1;
@@ -105,7 +106,7 @@ impl Rig {
         let text = std::fs::read_to_string(path).map_err(|e| {
             Error::Rig(
                 Fault::new(&name, format!("the rig file cannot be read ({e})"))
-                    .advice("Give a rig made by `tracker setup`"),
+                    .advice("Give a rig made by " + SETUP),
             )
         })?;
         Self::parse(&text, &name)
@@ -122,7 +123,7 @@ impl Rig {
             Error::Rig(
                 Fault::new(name, e.message().to_string())
                     .at(Place::Line(line))
-                    .advice("The form is the one that `tracker setup` writes"),
+                    .advice("The form is the one that " + SETUP + " writes"),
             )
         })?;
         rig.check(name)?;
@@ -164,11 +165,11 @@ impl Rig {
             );
         }
         if self.nodes.is_empty() {
-            return fault(
-                "node".into(),
-                "the rig has no nodes".into(),
-                "Add [[node]] entries or run `tracker setup`",
-            );
+            return Err(Error::Rig(
+                Fault::new(name, "the rig has no nodes")
+                    .at(Place::Key("node".into()))
+                    .advice("Add [[node]] entries or run " + SETUP),
+            ));
         }
         for (i, b) in self.bodies.iter().enumerate() {
             if b.name.is_empty() || self.bodies[..i].iter().any(|o| o.name == b.name) {

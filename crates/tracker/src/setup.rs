@@ -10,6 +10,7 @@ use crate::detect::{DetectSettings, Detection, Detector, Flags, Levels};
 use crate::discover::advice::advise;
 use crate::error::{Error, Fault, Place, Result};
 use crate::frame::Frame;
+use crate::message::Message;
 use crate::overlay;
 use crate::pipeline::{self, Existing, Observer, RunSettings};
 use crate::rig::Rig;
@@ -22,7 +23,7 @@ pub struct Setup {
     /// Nodes, bodies, joints and the reference frame.
     pub rig: Rig,
     /// What to know of the rig and the recording, a sentence each.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Message>,
     /// The reference frame with the rig and all other detections drawn, 8-bit blue, green, red.
     pub picture: Mat,
 }
@@ -52,7 +53,8 @@ pub fn find(settings: &RunSettings, observer: &mut dyn Observer) -> Result<Setup
     let mut warnings = summary.warnings;
     let rig = summary.meta.rig;
     if let Some(table) = &summary.table {
-        warnings.extend(advise(&rig, &table.rows, summary.meta.source.rate_hz));
+        warnings
+            .extend(advise(&rig, &table.rows, summary.meta.source.rate_hz).into_iter().map(Message::from));
     }
     let index = rig.reference_frame.unwrap_or(0);
     let (frame, detections) = frame_at(&settings.input, &settings.open, &settings.detect, index)?;
@@ -62,7 +64,7 @@ pub fn find(settings: &RunSettings, observer: &mut dyn Observer) -> Result<Setup
             "{saturated} of {} markers are saturated in the reference frame: their centres are less exact. Less \
              light or a shorter exposure helps",
             detections.len()
-        ));
+        ).into());
     }
     let picture = overlay::still(&frame, &rig, &detections)?;
     Ok(Setup { rig, warnings, picture })

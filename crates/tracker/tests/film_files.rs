@@ -237,7 +237,9 @@ fn setup_draws_the_rig_and_tells_what_to_change() {
     scene.links.iter_mut().for_each(|l| l.width_px = 0.0);
     let found = setup(&scene);
     assert_eq!((found.rig.nodes.len(), found.rig.bodies.len(), found.rig.joints.len()), (9, 2, 2));
-    let told = |said: &str| assert!(found.warnings.iter().any(|w| w.contains(said)), "{:?}", found.warnings);
+    let told = |said: &str| {
+        assert!(found.warnings.iter().any(|w| w.to_string().contains(said)), "{:?}", found.warnings)
+    };
     told("markers are saturated");
     told("is not at rest");
     told("merge in the picture when their bodies cross");
@@ -256,11 +258,16 @@ fn setup_draws_the_rig_and_tells_what_to_change() {
     }
     let found = setup(&scene);
     assert_eq!(found.rig.nodes.len(), 4);
-    let told = |said: &str| assert!(found.warnings.iter().any(|w| w.contains(said)), "{:?}", found.warnings);
+    let told = |said: &str| {
+        assert!(found.warnings.iter().any(|w| w.to_string().contains(said)), "{:?}", found.warnings)
+    };
     told("have the same distances to its other nodes");
     told("frames a second would do without");
     assert!(
-        !found.warnings.iter().any(|w| w.contains("saturated") || w.contains("merge")),
+        !found
+            .warnings
+            .iter()
+            .any(|w| w.to_string().contains("saturated") || w.to_string().contains("merge")),
         "{:?}",
         found.warnings
     );

@@ -8,23 +8,17 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from pydpend.coefficients import PAPER, coefficients
-from pydpend.errors import FitError, PydpendError, fault
+from pydpend.errors import OptionError, Setting, Step, fault, one_of
+from pydpend.fit_options import INTERVALS, METHODS, RATIOS, check_fit
 
 CHOICES = {
-    "method": ("trajectory", "energy"),
-    "ratios": ("free", "fixed"),
-    "intervals": ("covariance", "profile"),
+    "method": METHODS,
+    "ratios": RATIOS,
+    "intervals": INTERVALS,
     "estimator": ("rigid", "linkage", "pairwise"),
+    "unit": ("v", "rad", "deg"),
 }
 """Options that are one of a few words."""
-
-FREE = ("added_inertia", "tilt", "offset1", "offset2")
-"""What ``free`` may name."""
-
-
-class OptionsError(PydpendError):
-    """An option that is not known or makes no sense."""
 
 
 @dataclass(frozen=True)
@@ -39,8 +33,14 @@ class Options:
     """Frames per second of recorded time, where a film does not know."""
     encoder: str | None = None
     """Encoder file of the first recording: time_s and voltage_v (or an angle) as CSV, TDMS or NumPy."""
-    encoder_column: str | None = None
-    """Column of the encoder file that holds the signal, where its name does not say."""
+    column: str | None = None
+    """Column or TDMS channel of the encoder file that holds the signal, where its name does not say."""
+    time_column: str | None = None
+    """Column or channel of the encoder file that holds the time, where its name does not say."""
+    rate_hz: float | None = None
+    """Samples per second of the encoder file, where it has no time."""
+    unit: str | None = None
+    """Unit of the encoder's column, ``v``, ``rad`` or ``deg``, where its name does not say."""
     calibration: str | None = None
     """Folder of hold recordings, or an encoder.json made by ``pydpend calibrate``."""
     model: str = "derived"
@@ -49,8 +49,9 @@ class Options:
     """``trajectory`` or ``energy``."""
     laws: str = "full"
     """``full``, ``paper`` or a list of coefficients with commas."""
-    ratios: str = "free"
-    """``free``: the inertial ratios are fitted too; ``fixed``: the model's are believed (trajectory only)."""
+    ratios: str | None = None
+    """``free``: the inertial ratios are fitted too (trajectory only, and its default); ``fixed``: the model's are
+    believed."""
     free: str = ""
     """Further parameters to fit, with commas: added_inertia, tilt, offset1, offset2."""
     pinned: bool = False
@@ -59,10 +60,11 @@ class Options:
     """Also the paper's ten, with a warning; needs ``--method energy --laws paper``."""
     intervals: str = "covariance"
     """``covariance``: standard errors; ``profile``: 95 % intervals by profile likelihood too (takes much longer)."""
-    comparison: bool = True
-    """Leave each term out in turn, to say which the data ask for (trajectory only)."""
-    prediction: bool = True
-    """Predict each recording from the others, or the last part of a single one from the rest (trajectory only)."""
+    comparison: bool | None = None
+    """Leave each term out in turn, to say which the data ask for (trajectory only, and then done if not given)."""
+    prediction: bool | None = None
+    """Predict each recording from the others, or the last part of a single one from the rest (the latter trajectory
+    only). Done if not given, where it can be."""
     start_s: float | None = None
     """Start of the free decay; found if not given."""
     stop_s: float | None = None
@@ -72,6 +74,10 @@ class Options:
     zero: str = "rest"
     """Where the links hang: ``rest`` (found in the recording), ``reference_frame``, degrees of each link in the
     rig's reference frame (``180,180``), or a film or node table of the same rig hanging still."""
+    bodies: str | None = None
+    """Names of the links in node tables from the pivot outwards, with a comma; the rig's order if not given."""
+    mirrored: bool = False
+    """The film is mirror-inverted or taken from behind."""
     link_length_m: float | None = None
     """Pivot to elbow in m, for the scale."""
     estimator: str = "rigid"
@@ -79,7 +85,11 @@ class Options:
     columns: str | None = None
     """Which columns of angles tables are which, e.g. ``time_s=t_s,phi1_rad=theta1_rad,phi2_rad=theta2_rad``."""
     hanging_deg: float = 0.0
-    """What angles tables call hanging down."""
+    """Angle in degrees that angles tables have when the links hang straight down."""
+    clockwise: bool = False
+    """Angles tables count clockwise positive."""
+    unwrap: bool = False
+    """Angles tables keep their angles within one turn; rows are then taken to be less than half a turn apart."""
     overlay: bool = True
     """Draw what was found into the film, for the page. It takes about as long as tracking."""
     threads: int | None = None
@@ -88,59 +98,49 @@ class Options:
     def __post_init__(self) -> None:
         for field, known in CHOICES.items():
             value = getattr(self, field)
-            if value not in known:
-                words = f"{', '.join(known[:-1])} or {known[-1]}"
-                raise OptionsError(fault(flag_of(field), f"{value!r} is not known", f"Give {words}"))
-        unknown = [name for name in self.free.split(",") if name and name not in FREE]
-        if unknown:
-            raise OptionsError(
-                fault("--free", f"{unknown[0]!r} is not known", f"Known are {', '.join(FREE)}")
-            )
-        try:
-            laws = coefficients(self.laws)
-        except FitError as error:
-            raise OptionsError(f"--{error}") from None
-        if self.ten_coefficients and not (self.method == "energy" and laws == PAPER):
-            raise OptionsError(
-                fault(
-                    "--ten-coefficients",
-                    "they are of the energy method with the paper's laws",
-                    "Add --method energy --laws paper",
-                )
-            )
-        if self.method == "energy":
-            for field, plain in (("intervals", "covariance"), ("free", ""), ("angle_maps", False)):
-                if getattr(self, field) != plain:
-                    raise OptionsError(
-                        fault(flag_of(field), "is of the trajectory fit", "Leave it or --method energy out")
-                    )
+            if value is not None and value not in known:
+                raise OptionError(one_of(field, value, known))
+        check_fit(self.method, self.laws, vars(self), single=self.pinned)
         if self.columns is not None and any(
             not (ours.strip() and theirs.strip())
             for ours, _, theirs in (word.partition("=") for word in self.columns.split(","))
         ):
-            raise OptionsError(
+            raise OptionError(
                 fault(
-                    "--columns", f"{self.columns!r} is not OURS=THEIRS,...", "Write time_s=t,phi1_rad=theta1"
+                    Setting("columns"),
+                    f"{self.columns!r} is not OURS=THEIRS,...",
+                    "Write time_s=t,phi1_rad=theta1",
                 )
             )
-        if self.fps is not None and not self.fps > 0:
-            raise OptionsError(fault("--fps", f"{self.fps} is not above 0"))
+        for name in ("fps", "rate_hz", "link_length_m"):
+            value = getattr(self, name)
+            if value is not None and not value > 0:
+                raise OptionError(fault(Setting(name), f"{value:g} is not above 0", "Give a number above 0"))
         if self.threads is not None and self.threads < 1:
-            raise OptionsError(fault("--threads", f"{self.threads} is below 1"))
-        if self.start_s is not None and self.stop_s is not None and not self.start_s < self.stop_s:
-            raise OptionsError(fault("--start", f"{self.start_s} s is not before --stop, {self.stop_s} s"))
+            raise OptionError(fault(Setting("threads"), f"{self.threads} is below 1", "Give 1 or more"))
+        for option in ("calibration", "column", "time_column", "rate_hz", "unit"):
+            if getattr(self, option) is not None and self.encoder is None:
+                raise OptionError(
+                    fault(
+                        Setting(option),
+                        "is of the encoder's file",
+                        "Name the file with " + Setting("encoder"),
+                    )
+                )
 
 
 def check_files(options: Options) -> None:
-    """Whether the files that options name are there. Raises OptionsError, naming the flag, before anything is done."""
+    """Whether the files that options name are there. Raises OptionError, naming the option, before anything is done."""
     for field in ("rig", "encoder", "calibration"):
         name = getattr(options, field)
         if name is not None and not Path(name).exists():
-            raise OptionsError(fault(f"{flag_of(field)} {name}", "there is no such file", "Check the name"))
+            raise OptionError(fault(Setting(field), f"there is no file {name}", "Check the name"))
     if options.model not in ("derived", "published") and not Path(options.model).is_file():
-        raise OptionsError(
+        raise OptionError(
             fault(
-                f"--model {options.model}", "there is no such file", "Give derived, published or a TOML file"
+                Setting("model"),
+                f"there is no file {options.model}",
+                "Give derived, published or a pendulum's TOML file",
             )
         )
     zero = options.zero
@@ -148,10 +148,10 @@ def check_files(options: Options) -> None:
         try:
             [float(word) for word in zero.split(",")]
         except ValueError:
-            raise OptionsError(
+            raise OptionError(
                 fault(
-                    f"--zero {zero}",
-                    "is no file and no degrees",
+                    Setting("zero"),
+                    f"{zero} is no file and no degrees",
                     "Give rest, reference_frame, 180,180, or a film or node table",
                 )
             ) from None
@@ -162,6 +162,10 @@ def flag_of(field: str) -> str:
     return "--" + field.removesuffix("_s").removesuffix("_deg").replace("_", "-")
 
 
+WRITE_CONFIG = Step("pydpend analyse --write-config", "dp.analyse.write_config(dp.Options())")
+"""Prints every option with its default."""
+
+
 def read_config(path: str | Path) -> Options:
     """Options from a TOML file as ``--write-config`` writes it. Unknown keys are errors."""
     name = str(path)
@@ -169,31 +173,33 @@ def read_config(path: str | Path) -> Options:
         with open(path, "rb") as f:
             raw = tomllib.load(f)
     except OSError as error:
-        raise OptionsError(fault(name, f"cannot be read ({error.strerror})")) from None
+        raise OptionError(fault(name, f"cannot be read ({error.strerror})")) from None
     except tomllib.TOMLDecodeError as error:
-        raise OptionsError(fault(name, f"is not TOML ({error})", "Start from --write-config")) from None
+        raise OptionError(
+            fault(name, f"is not TOML ({error})", "Start from what " + WRITE_CONFIG + " prints")
+        ) from None
     known = {f.name: f for f in fields(Options)}
     values: dict[str, Any] = {}
     for key, value in raw.items():
         if key not in known:
-            raise OptionsError(
+            raise OptionError(
                 fault(name, f"{key} is not an option", f"Known are {', '.join(known)}", place=f"key {key}")
             )
         wanted = str(known[key].type)
         if key == "inputs":
             if not (isinstance(value, list) and all(isinstance(v, str) for v in value)):
-                raise OptionsError(fault(name, "a list of file names is expected", place="key inputs"))
+                raise OptionError(fault(name, "a list of file names is expected", place="key inputs"))
             value = tuple(value)
         elif wanted.startswith("bool"):
             if not isinstance(value, bool):
-                raise OptionsError(
+                raise OptionError(
                     fault(name, f"true or false is expected, not {value!r}", place=f"key {key}")
                 )
         elif wanted.startswith(("float", "int")):
             if isinstance(value, bool) or not isinstance(value, (int, float)):
-                raise OptionsError(fault(name, f"a number is expected, not {value!r}", place=f"key {key}"))
+                raise OptionError(fault(name, f"a number is expected, not {value!r}", place=f"key {key}"))
         elif not isinstance(value, str):
-            raise OptionsError(fault(name, f"text is expected, not {value!r}", place=f"key {key}"))
+            raise OptionError(fault(name, f"text is expected, not {value!r}", place=f"key {key}"))
         values[key] = value
     return Options(**values)
 

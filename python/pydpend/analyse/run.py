@@ -18,7 +18,7 @@ from pydpend.analyse import provenance, stages
 from pydpend.analyse.folder import UNFINISHED, Digests, RunFolder, digest, write_whole
 from pydpend.analyse.options import Options, check_files
 from pydpend.analyse.recordings import Recording, recordings
-from pydpend.errors import PydpendError
+from pydpend.errors import OptionError, PydpendError, Setting, fault
 
 Progress = Callable[[int, int, str, str], None]
 """Called as ``progress(stage number from 1, stages, title, what)``, ``what`` being ``start``, how far it is
@@ -100,11 +100,19 @@ def plan(options: Options, folder: Path, digests: Digests | None = None) -> list
         for f in ("model", "method", "laws", "ratios", "free", "pinned", "angle_maps", "start_s", "stop_s")
     ]
     several = len(found) > 1
+    if options.prediction and not several and options.method == "energy":
+        raise OptionError(
+            fault(
+                Setting("prediction"),
+                "the energy fit of one recording leaves no part out to be predicted",
+                "Leave it out, or give " + Setting("method", "trajectory") + " or another recording",
+            )
+        )
     more = [
         options.ten_coefficients,
         options.intervals,
-        options.comparison,
-        options.prediction and not several,
+        options.comparison is not False,
+        options.prediction is not False and not several,
     ]
     add(
         "fit",
@@ -114,7 +122,7 @@ def plan(options: Options, folder: Path, digests: Digests | None = None) -> list
         [*fits, *more],
         lambda into, tell, resume: stages.fit(found, options, folder, into, tell),
     )
-    if several and options.prediction:
+    if several and options.prediction is not False:
         add(
             "prediction",
             "Prediction of each recording from the others",
@@ -175,6 +183,10 @@ def _plan_recording(
             r.digest,
             options.columns,
             options.hanging_deg,
+            options.clockwise,
+            options.unwrap,
+            options.bodies,
+            options.mirrored,
             options.estimator,
             options.zero,
             known.option(options.zero),
@@ -188,7 +200,14 @@ def _plan_recording(
             f"Encoder beside {r.label}",
             (f"{r.name}/angles",),
             r.name,
-            [known.option(options.encoder), known.option(options.calibration), options.encoder_column],
+            [
+                known.option(options.encoder),
+                known.option(options.calibration),
+                options.column,
+                options.time_column,
+                options.rate_hz,
+                options.unit,
+            ],
             lambda into, tell, resume: stages.encoder(r, options, here, into),
         )
 

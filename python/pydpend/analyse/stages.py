@@ -147,17 +147,24 @@ def angles(r: Recording, options: Options, here: Path, into: Path) -> str:
             pairs = [word.partition("=") for word in options.columns.split(",")]
             columns = {ours.strip(): theirs.strip() for ours, _, theirs in pairs}
         found = read_angles(
-            r.path, columns=columns, hanging_rad=math.radians(options.hanging_deg), name=r.name
+            r.path,
+            columns=columns,
+            hanging_rad=math.radians(options.hanging_deg),
+            clockwise=options.clockwise,
+            unwrap=options.unwrap,
+            name=r.name,
         )
     else:
-        method: Any = options.estimator
+        estimator: Any = options.estimator
         nodes = _nodes(here, r)
         if all(nodes.rig.indices(body).size < 2 for body in nodes.rig.bodies):
             raise DoesNotApply("no body has two markers, so there is no link and no angle")
         found = estimate(
             nodes,
-            method,
+            estimator,
             zero=_hanging(r, options, here, into),
+            bodies=options.bodies.split(",") if options.bodies else None,
+            mirrored=options.mirrored,
             link_length_m=options.link_length_m,
             gaps="stop",
             name=r.name,
@@ -216,7 +223,14 @@ def encoder(r: Recording, options: Options, here: Path, into: Path) -> str:
     from pydpend.plots.style import save
 
     film = read_angles(here / "angles.parquet", name=r.name)
-    signal = read_encoder(str(r.encoder), column=options.encoder_column)
+    unit: Any = options.unit
+    signal = read_encoder(
+        str(r.encoder),
+        column=options.column,
+        time_column=options.time_column,
+        rate_hz=options.rate_hz,
+        unit=unit,
+    )
     line = None
     if options.calibration is not None:
         path = Path(options.calibration)
@@ -244,9 +258,9 @@ def fit(found: tuple[Recording, ...], options: Options, folder: Path, into: Path
         recordings,
         model,
         progress=_steps(tell),
-        compare=trajectory and options.comparison,
+        compare=trajectory and options.comparison is not False,
         # Several recordings are predicted in a stage of their own.
-        predict=trajectory and options.prediction and len(recordings) == 1,
+        predict=trajectory and options.prediction is not False and len(recordings) == 1,
         intervals=options.intervals,
         pinned=options.pinned,
         ten_coefficients=options.ten_coefficients,
@@ -279,7 +293,7 @@ def _settings(options: Options) -> dict[str, Any]:
         "laws": options.laws,
         "start_s": options.start_s,
         "stop_s": options.stop_s,
-        "ratios": options.ratios == "free",
+        "ratios": None if options.ratios is None else options.ratios == "free",
         "free": [name for name in options.free.split(",") if name],
         "angle_maps": options.angle_maps,
     }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
@@ -15,17 +15,18 @@ from pydpend.angles.pairwise import pair_angles
 from pydpend.angles.pose import Pose, fit_pose
 from pydpend.angles.table import Floats, LinkAngles
 from pydpend.angles.unwrap import unwrap
-from pydpend.errors import AnglesError, fault
+from pydpend.errors import CHECK, AnglesError, Setting, fault, one_of
 
 if TYPE_CHECKING:
     from pydpend.nodes import Nodes
 
 Method = Literal["rigid", "linkage", "pairwise"]
+ESTIMATORS: tuple[Method, ...] = get_args(Method)
 
 
 def angles(
     nodes: Nodes,
-    method: Method = "rigid",
+    estimator: Method = "rigid",
     *,
     zero: Literal["rest", "reference_frame"] | Sequence[float] | float | Nodes = "rest",
     bodies: Sequence[str] | None = None,
@@ -38,7 +39,7 @@ def angles(
     """Angles of one or two links, in rad: counter-clockwise positive, zero hanging down, unwrapped over
     turns.
 
-    ``method``:
+    ``estimator``:
 
     - ``"rigid"``: weighted least-squares pose of each body by itself, robust against a bad marker.
     - ``"linkage"``: both links and the joints they share fitted together; needs a pivot that stays in place.
@@ -62,7 +63,7 @@ def angles(
     """
     markers = body_markers(nodes, bodies, mirrored)
     label = name if name is not None else _label(nodes)
-    raw = _estimate(markers, method, mirrored, link_length_m, link_length_sigma_m)
+    raw = _estimate(markers, estimator, mirrored, link_length_m, link_length_sigma_m)
     notes: list[str] = list(raw.meta.pop("notes", ()))
     ending = nodes.meta.get("ending")
     if isinstance(ending, dict) and ending.get("kind") != "complete":
@@ -73,7 +74,7 @@ def angles(
     for k in range(phi.shape[1]):
         first = phi[np.flatnonzero(np.isfinite(phi[:, k]))[0], k]
         phi[:, k] -= 2 * np.pi * np.ceil((first - np.pi) / (2 * np.pi))
-    meta = {"method": method, "mirrored": mirrored, **raw.meta, "zero": zero_meta, "notes": notes}
+    meta = {"method": estimator, "mirrored": mirrored, **raw.meta, "zero": zero_meta, "notes": notes}
     source = nodes.meta.get("source")
     if source is not None:
         meta["source"] = source
@@ -96,9 +97,13 @@ def _label(nodes: Nodes) -> str:
 
 
 def _estimate(
-    markers: list[BodyMarkers], method: Method, mirrored: bool, length_m: float | None, length_sigma_m: float
+    markers: list[BodyMarkers],
+    estimator: Method,
+    mirrored: bool,
+    length_m: float | None,
+    length_sigma_m: float,
 ) -> Raw:
-    if method == "pairwise":
+    if estimator == "pairwise":
         pairs = [pair_angles(m) for m in markers]
         scales = [fit_pose(m).sigma_scale for m in markers]
         meta = {
@@ -119,12 +124,12 @@ def _estimate(
         theta = np.stack([p.mean_rad for p in pairs], axis=1)
         sigma = np.stack([p.sigma_rad * s for p, s in zip(pairs, scales, strict=True)], axis=1)
         return Raw(theta, sigma, [m.reference_px for m in markers], None, meta)
-    if method not in ("rigid", "linkage"):
-        raise AnglesError(fault("method", f"{method!r} is not known", "Use rigid, linkage or pairwise"))
+    if estimator not in ("rigid", "linkage"):
+        raise AnglesError(one_of("estimator", estimator, ESTIMATORS))
     poses = [fit_pose(m) for m in markers]
     meta = {"bodies": [_body_meta(p) for p in poses]}
     lower = poses[1] if len(poses) > 1 else None
-    if method == "rigid":
+    if estimator == "rigid":
         theta = np.stack([p.theta_rad for p in poses], axis=1)
         sigma = np.stack([p.sigma_rad for p in poses], axis=1)
         shape = None
@@ -200,7 +205,7 @@ def _unwrapped(
                 fault(
                     label,
                     f"the body {body.name} has no angle in any frame",
-                    "Look at `tracker check` of the table",
+                    "Look at " + CHECK + " of the table",
                 )
             )
         phi[:, k], lost = unwrap(nodes.t_s, theta[:, k])
@@ -215,7 +220,9 @@ def _unwrapped(
         )
         if gaps == "error":
             raise AnglesError(
-                fault(label, problem, "Cut the recording there, or use gaps='stop'", place=place)
+                fault(
+                    label, problem, "Cut the recording there, or use " + Setting("gaps", "stop"), place=place
+                )
             )
         phi[gap.after :, k] = np.nan
         notes.append(f"{place}: {problem}; its angles are left out from there on")

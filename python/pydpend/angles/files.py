@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from pydpend.angles.table import Floats, LinkAngles, check_table
 from pydpend.columns import Columns, read_columns
-from pydpend.errors import AnglesError, fault
+from pydpend.errors import AnglesError, Setting, fault
 
 META_KEY = "pydpend_angles"
 """Key of the JSON that :func:`write_angles` puts into a Parquet file's metadata."""
@@ -80,7 +80,11 @@ def _read_table(path: Path, columns: dict[str, str]) -> _TableParts:
     for key in columns:
         if key not in ours:
             raise AnglesError(
-                fault(str(path), f"columns names {key!r}, which is not ours", f"Ours are {', '.join(ours)}")
+                fault(
+                    str(path),
+                    Setting("columns") + f" names {key!r}, which is not one of pydpend's",
+                    f"pydpend's are {', '.join(ours)}",
+                )
             )
     theirs = {c: columns.get(c, c) for c in ours}
     table = read_columns(
@@ -106,7 +110,8 @@ def _read_table(path: Path, columns: dict[str, str]) -> _TableParts:
             fault(
                 str(path),
                 "there is no column phi1_rad or phi1_deg",
-                f"The columns are {', '.join(table.header)}; say with `columns` which holds the angle",
+                f"The columns are {', '.join(table.header)}; say which holds the angle with "
+                + Setting("columns"),
             )
         )
     phis = [f for f in found if f is not None]

@@ -17,7 +17,7 @@ from pydpend.angles.pose import rotate, solve
 from pydpend.angles.table import Floats, LinkAngles
 from pydpend.angles.unwrap import unwrap
 from pydpend.angles.zero import Rest, find_rest, zero_of
-from pydpend.errors import AnglesError, fault
+from pydpend.errors import AnglesError, Setting, fault
 
 if TYPE_CHECKING:
     from pydpend.nodes import Nodes
@@ -51,7 +51,11 @@ def zero_for(
             return np.zeros(links), {"from": "reference frame"}
         if zero != "rest":
             raise AnglesError(
-                fault("zero", f"{zero!r} is not known", "Use 'rest', 'reference_frame' or numbers")
+                fault(
+                    Setting("zero"),
+                    f"{zero!r} is not known",
+                    "Give rest, reference_frame or the links' angles",
+                )
             )
         rests = find_rest(LinkAngles(nodes.t_s, phi, raw.sigma, name=label))
         kept = [r for r in rests if _hangs(r.phi_rad, _down(raw, nodes, markers, mirrored))]
@@ -65,7 +69,9 @@ def zero_for(
         given = np.atleast_1d(np.asarray(zero, dtype=np.float64))
         if given.shape != (links,) or not np.isfinite(given).all():
             raise AnglesError(
-                fault("zero", f"{zero!r} for {links} link(s)", "Give one finite angle in rad per link")
+                fault(
+                    Setting("zero"), f"{zero!r} for {links} link(s)", "Give one finite angle in rad per link"
+                )
             )
         return -given, {"from": "given", "reference_frame_rad": given.tolist()}
     return _zero_from_reference(zero, raw, markers, bodies, mirrored)

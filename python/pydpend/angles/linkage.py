@@ -18,7 +18,7 @@ from pydpend.angles.markers import BodyMarkers
 from pydpend.angles.pose import Pose, evenly, rotate
 from pydpend.angles.scale import pooled_scale2
 from pydpend.angles.table import Floats
-from pydpend.errors import AnglesError, fault
+from pydpend.errors import AnglesError, Setting, fault
 
 FIT_FRAMES = 4000
 """The shape is fitted to at most this many frames, evenly spread: its error is then far below a marker's."""
@@ -120,7 +120,9 @@ def _least_squares(design: Floats, wanted: Floats, what: str) -> Floats:
             fault(
                 "nodes",
                 f"the links turn too little against each other to find the {what}",
-                "Use method='rigid', or a recording in which they swing by some degrees",
+                "Use "
+                + Setting("estimator", "rigid")
+                + ", or a recording in which they swing by some degrees",
             )
         )
     return np.asarray(found)
@@ -255,7 +257,7 @@ def fit_shape(markers: list[BodyMarkers], shape: Shape, theta: Floats) -> tuple[
             fault(
                 "nodes",
                 f"the pivot is known to {worst:.1f} px only: the links turn too little",
-                "Use method='rigid', or a recording in which they swing more",
+                "Use " + Setting("estimator", "rigid") + ", or a recording in which they swing more",
             )
         )
     length, sigma = float("nan"), float("nan")

@@ -22,6 +22,7 @@ from pydpend.angles.linkage import (
 from pydpend.angles.pose import Pose, evenly, rotate
 from pydpend.angles.scale import hidden_factor, inflation, partly_hidden, pooled_scale2, reject_limit
 from pydpend.angles.table import Floats
+from pydpend.errors import Setting
 
 _STEPS = 6
 """Gauss-Newton steps per frame; from the rigid pose two are enough, from one marker four."""
@@ -96,7 +97,7 @@ def checked_sigma(linked: LinkageAngles, poses: list[Pose]) -> tuple[Floats, lis
             notes.append(
                 f"phi{k + 1} by the linkage is off by {np.degrees(np.sqrt(bias2)):.2g} deg beyond its noise of "
                 f"{np.degrees(before):.2g} deg (the camera moves, a joint has play or the lens distorts); its sigma "
-                "includes that, method='rigid' is free of it"
+                f"includes that, {Setting('estimator', 'rigid')} is free of it"
             )
     return sigma, notes
 

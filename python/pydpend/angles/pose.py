@@ -28,7 +28,7 @@ from pydpend.angles.scale import (
     suspects,
 )
 from pydpend.angles.table import Floats
-from pydpend.errors import AnglesError, fault
+from pydpend.errors import AnglesError, Setting, fault
 
 LEAST_COVERED = 1.5
 """Suspects that miss by less than this factor are no worse than others: errors along the way of motion do as much."""
@@ -157,7 +157,10 @@ def fit_pose(markers: BodyMarkers) -> Pose:
             fault(
                 "nodes",
                 f"the body {markers.name} never shows two of its nodes in one frame",
-                "One marker has no angle of its own: use method='linkage', or give the body two nodes",
+                "One marker has no angle of its own: use "
+                + Setting("estimator", "linkage")
+                + ", or give the body two "
+                "nodes",
             )
         )
     template, scale2 = _template(markers)

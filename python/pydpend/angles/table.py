@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pydpend.errors import AnglesError, fault
+from pydpend.errors import AnglesError, Setting, fault
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -200,7 +200,7 @@ def check_table(
                 fault(
                     name,
                     f"the angle jumps by {step[i - 1]:.4g} rad from one row to the next: it is not unwrapped",
-                    "Read it with unwrap=True",
+                    "Read it with " + Setting("unwrap", True),
                     place=place(i, f"phi{k + 1}_rad"),
                 )
             )

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pydpend.angles.table import Floats, LinkAngles
-from pydpend.errors import AnglesError, fault
+from pydpend.errors import AnglesError, Setting, fault
 from pydpend.series import correlation_time
 
 REST_WITHIN_RAD = np.radians(0.1)
@@ -121,7 +121,9 @@ def zero_of(rests: list[Rest], name: str) -> tuple[Floats, Floats]:
             fault(
                 name,
                 "no stretch of 0.5 s was found in which all links hang at rest, so there is no zero",
-                "Give zero (--zero): the links' angles in the rig's reference frame, or the nodes of a recording "
+                "Give "
+                + Setting("zero")
+                + ": the links' angles in the rig's reference frame, or the nodes of a recording "
                 "at rest",
             )
         )
@@ -134,7 +136,7 @@ def zero_of(rests: list[Rest], name: str) -> tuple[Floats, Floats]:
             fault(
                 name,
                 f"the links rest at angles that differ by {np.degrees(spread.max()):.1f} deg ({times})",
-                "Say which hangs: give zero (--zero), the angles in the rig's reference frame",
+                "Say which hangs: give " + Setting("zero") + ", the angles in the rig's reference frame",
             )
         )
     weight = np.array([r.last - r.first + 1 for r in rests], dtype=np.float64)

@@ -12,8 +12,11 @@ import importlib
 import os
 import signal
 import sys
+from collections.abc import Iterable
+from typing import Any
 
-from pydpend.errors import PydpendError
+from pydpend.cli.words import RENAMED, CommandLine, unknown_command, unknown_option
+from pydpend.errors import PydpendError, listed, speaking
 
 COMMANDS: tuple[str, ...] = (
     "analyse",
@@ -35,14 +38,36 @@ def _version() -> str:
     return _tracker.VERSION
 
 
-def parser() -> argparse.ArgumentParser:
+class Parser(argparse.ArgumentParser):
+    """argparse's, saying what is wrong in one line and taking no option by half its name."""
+
+    def __init__(self, **given: Any) -> None:
+        super().__init__(**given, allow_abbrev=False, exit_on_error=False)
+
+    def error(self, message: str) -> Any:
+        """Ends the program with one line."""
+        self.exit(2, f"{self.prog}: {message}. See `{self.prog} --help`\n")
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        choices: Iterable[Any] | None = action.choices
+        if choices is not None and value not in choices:
+            known = listed(str(choice) for choice in choices)
+            raise argparse.ArgumentError(action, f"{value!r} is not known. Give {known}")
+
+
+def parser() -> Parser:
     """The whole command line. Imports each command's module, which imports nothing heavy at its top."""
-    top = argparse.ArgumentParser(
+    return _parsers()[0]
+
+
+def _parsers() -> tuple[Parser, dict[str, argparse.ArgumentParser]]:
+    """The whole command line, and each command's part of it."""
+    top = Parser(
         prog="pydpend",
         description="From node tables and angles to encoder comparison, damping and a report.",
     )
     top.add_argument("--version", action="version", version=f"pydpend {_version()}")
-    commands = top.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    commands = top.add_subparsers(dest="command", metavar="COMMAND", required=True, parser_class=Parser)
     for name in COMMANDS:
         module = importlib.import_module(f"pydpend.cli.{name}")
         sub = commands.add_parser(
@@ -53,7 +78,44 @@ def parser() -> argparse.ArgumentParser:
         )
         module.add_arguments(sub)
         sub.set_defaults(run=module.run)
-    return top
+    return top, dict(commands.choices)
+
+
+class _Refused(Exception):
+    """A command line that cannot be understood."""
+
+
+def _parse(argv: list[str]) -> tuple[argparse.Namespace, CommandLine]:
+    """The arguments, and the front end of their command. Raises _Refused with one line."""
+    top, commands = _parsers()
+    word = next((w for w in argv if not w.startswith("-")), None)
+    if word is not None and word not in commands:
+        raise _Refused(unknown_command(word, COMMANDS))
+    try:
+        args, rest = top.parse_known_args(_renamed(argv, word))
+    except argparse.ArgumentError as problem:
+        raise _Refused(f"{problem.argument_name}: {problem.message}") from None
+    if rest:
+        if not rest[0].startswith("-"):
+            raise _Refused(f"{rest[0]!r} is one argument too many. See `pydpend {args.command} --help`")
+        raise _Refused(unknown_option(rest[0], args.command, commands))
+    return args, CommandLine(commands, args.command)
+
+
+def _renamed(argv: list[str], command: str | None) -> list[str]:
+    """Old names of options replaced by new ones, saying so. Raises _Refused where more than the name is new."""
+    out = []
+    for word in argv:
+        flag, sign, value = word.partition("=")
+        new = RENAMED.get(command or "", {}).get(flag)
+        if new is None:
+            out.append(word)
+        elif new.also:
+            raise _Refused(f"{flag}: the option is called {new.flag} now, {new.also}")
+        else:
+            print(f"pydpend: note: {flag} is called {new.flag} now", file=sys.stderr)
+            out.append(new.flag + sign + value)
+    return out
 
 
 def _look_up_numpy() -> None:
@@ -74,7 +136,16 @@ def _look_up_numpy() -> None:
 
 def main(argv: list[str] | None = None) -> int:
     """Runs one command and returns its exit status."""
-    args = parser().parse_args(argv)
+    try:
+        args, front = _parse(sys.argv[1:] if argv is None else argv)
+    except _Refused as problem:
+        print(f"pydpend: {problem}", file=sys.stderr)
+        return 2
+    with speaking(front):
+        return _run(args)
+
+
+def _run(args: argparse.Namespace) -> int:
     try:
         _look_up_numpy()
         status: int = args.run(args)

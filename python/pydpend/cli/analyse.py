@@ -38,7 +38,7 @@ def add_arguments(p: argparse.ArgumentParser) -> None:
         flag = flag_of(f.name)
         text = docs[f.name].replace("``", "").replace("%", "%%")
         kind = str(f.type)
-        if kind == "bool":
+        if kind.startswith("bool"):
             p.add_argument(flag, dest=f.name, action=argparse.BooleanOptionalAction, default=None, help=text)
         else:
             number = float if kind.startswith("float") else int if kind.startswith("int") else str

@@ -22,7 +22,7 @@ def add_arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument("nodes", metavar="NODES", help="node table of `tracker track` (.parquet or .csv)")
     p.add_argument("-o", "--output", required=True, metavar="OUT", help="angles table (.parquet or .csv)")
     p.add_argument(
-        "--method",
+        "--estimator",
         choices=("rigid", "linkage", "pairwise"),
         default="rigid",
         help="pose of each body (default), both links through their joints, or the paper's pairs",
@@ -62,7 +62,7 @@ def run(args: argparse.Namespace) -> int:
     nodes = read_nodes(args.nodes)
     found = angles(
         nodes,
-        args.method,
+        args.estimator,
         zero=_zero(args.zero),
         bodies=args.bodies.split(",") if args.bodies else None,
         mirrored=args.mirrored,

@@ -21,10 +21,22 @@ def add_arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument("run_folder", metavar="RUN", help="a folder made by pydpend analyse, with a damping fit")
     p.add_argument("-o", "--output", required=True, metavar="FILM", help=".mp4 or .gif")
     p.add_argument("--recording", metavar="NAME", help="which recording, where there are several")
-    p.add_argument("--start", type=float, metavar="S", help="start of the simulation, s (default: the fit's)")
+    p.add_argument(
+        "--start",
+        dest="start_s",
+        type=float,
+        metavar="S",
+        help="start of the simulation, s (default: the fit's)",
+    )
     p.add_argument("--length", type=float, default=4.0, metavar="S", help="its length, s (default 4)")
     p.add_argument("--speed", type=float, default=0.2, help="film time over real time (default 0.2, slowed)")
-    p.add_argument("--fps", type=float, default=25.0, help="pictures a second (default 25)")
+    p.add_argument(
+        "--play-fps",
+        dest="fps",
+        type=float,
+        default=25.0,
+        help="pictures a second at which it plays (default 25)",
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -33,7 +45,7 @@ def run(args: argparse.Namespace) -> int:
 
     from pydpend.angles import read_angles
     from pydpend.damping.stored import load_fit
-    from pydpend.errors import ArgumentError, fault
+    from pydpend.errors import ArgumentError, Setting, fault
     from pydpend.model import Damping
     from pydpend.plots.beside import Pictures, beside
     from pydpend.plots.folder import chosen
@@ -44,17 +56,17 @@ def run(args: argparse.Namespace) -> int:
     model = stored.model()
     angles = read_angles(r.here / "angles.parquet", name=r.facts["label"])
     fit = json.loads((r.run / "fit" / "fit.json").read_text("utf-8"))
-    start = fit["inputs"][r.index].get("start_s", angles.t_s[0]) if args.start is None else args.start
+    start = fit["inputs"][r.index].get("start_s", angles.t_s[0]) if args.start_s is None else args.start_s
     if not angles.t_s[0] <= start < angles.t_s[-1]:
         raise ArgumentError(
             fault(
-                "--start",
+                Setting("start_s"),
                 f"{start:g} s is not in the recording",
                 f"It goes from {angles.t_s[0]:g} to {angles.t_s[-1]:g} s",
             )
         )
     if not args.length > 0:
-        raise ArgumentError(fault("--length", f"{args.length:g} s is not above 0"))
+        raise ArgumentError(fault(Setting("length"), f"{args.length:g} s is not above 0"))
     until = min(float(angles.t_s[-1]), start + args.length)
     # One state fits a second of a motion well, and more of a chaotic one hardly.
     state = stored.state(angles, start, min(1.0, until - start))

@@ -14,6 +14,7 @@ import sys
 from pathlib import Path
 
 from pydpend.cli.calibrate import add_signal_arguments
+from pydpend.cli.fit import add_table_arguments, read
 
 HELP = "link angles and encoder in, their comparison out"
 
@@ -42,6 +43,7 @@ def add_arguments(p: argparse.ArgumentParser) -> None:
     )
     p.add_argument("--format", choices=("png", "svg", "pdf"), default="png", help="of the figures")
     add_signal_arguments(p)
+    add_table_arguments(p)
     p.add_argument("--json", action="store_true", help="compare.json on stdout too")
 
 
@@ -51,14 +53,13 @@ def run(args: argparse.Namespace) -> int:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    from pydpend.angles import read_angles
     from pydpend.encoder import calibrate, compare, encoder_angles, read_calibration, read_encoder, read_holds
     from pydpend.errors import EncoderError, fault
     from pydpend.plots.angles import angles_figure
     from pydpend.plots.encoder import calibration_figure, comparison_figure
     from pydpend.plots.style import save
 
-    video = read_angles(args.angles)
+    video = read(args.angles, args)
     signal = read_encoder(
         args.encoder, column=args.column, time_column=args.time_column, rate_hz=args.rate_hz, unit=args.unit
     )

@@ -12,11 +12,14 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from pydpend.fit_options import FREE, INTERVALS, METHODS, RATIOS, check_fit, free_names
 
 if TYPE_CHECKING:
     from pydpend.angles import LinkAngles
@@ -32,7 +35,12 @@ def add_arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument(
         "--model", default="derived", help="derived (default), published, or a pendulum's TOML file"
     )
-    p.add_argument("--method", choices=("trajectory", "energy"), default="trajectory")
+    p.add_argument(
+        "--method",
+        choices=METHODS,
+        default="trajectory",
+        help="trajectory: fit the equations of motion (default); energy: the paper's energy profile",
+    )
     p.add_argument(
         "--laws",
         default="full",
@@ -40,11 +48,15 @@ def add_arguments(p: argparse.ArgumentParser) -> None:
     )
     p.add_argument(
         "--ratios",
-        choices=("free", "fixed"),
-        default="free",
-        help="whether the inertial ratios are fitted too (default) or the model's are believed",
+        choices=RATIOS,
+        help="whether the inertial ratios are fitted too (trajectory only, and its default) or the model's believed",
     )
-    p.add_argument("--free", default="", help="further parameters: added_inertia, offset1, offset2")
+    p.add_argument(
+        "--free",
+        default="",
+        metavar="NAMES",
+        help=f"further parameters to fit, with commas: {', '.join(FREE)}",
+    )
     p.add_argument(
         "--angle-maps", action="store_true", help="learn repeatable angle-dependent bias of the tracking"
     )
@@ -56,20 +68,22 @@ def add_arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument("--pinned", action="store_true", help="the elbow is pinned: a single pendulum")
     p.add_argument(
         "--intervals",
-        choices=("covariance", "profile"),
+        choices=INTERVALS,
         default="covariance",
         help="standard errors (default), or 95 %% intervals by profile likelihood too: everything else fitted "
         "again at a few values of each coefficient",
     )
     p.add_argument(
-        "--no-prediction", action="store_true", help="do not fit again without each part to predict it"
+        "--prediction",
+        action=argparse.BooleanOptionalAction,
+        help="fit again without each part to predict it (trajectory only, and then done if not given)",
     )
     p.add_argument(
-        "--no-comparison",
-        action="store_true",
-        help="do not leave each term out in turn to see if the data ask for it",
+        "--comparison",
+        action=argparse.BooleanOptionalAction,
+        help="leave each term out in turn to see if the data ask for it (trajectory only, and then done if not given)",
     )
-    p.add_argument("--no-figures", action="store_true")
+    p.add_argument("--no-figures", action="store_true", help="write no figures")
     add_output_arguments(p)
 
 
@@ -81,15 +95,35 @@ def add_angles_arguments(p: argparse.ArgumentParser, *, many: bool) -> None:
         nargs="+" if many else None,
         help="angles table (Parquet, CSV) or a folder of the paper's authors' form (DPmean_data_RB0.npy ...)",
     )
-    p.add_argument("--start", type=float, metavar="S", help="start of the free decay, s (default: found)")
-    p.add_argument("--stop", type=float, metavar="S", help="its end, s (default: found)")
+    p.add_argument(
+        "--start", dest="start_s", type=float, metavar="S", help="start of the free decay, s (default: found)"
+    )
+    p.add_argument("--stop", dest="stop_s", type=float, metavar="S", help="its end, s (default: found)")
+    add_table_arguments(p)
+
+
+def add_table_arguments(p: argparse.ArgumentParser) -> None:
+    """How an angles table is to be understood; of every command that reads one."""
     p.add_argument(
         "--columns",
         default="",
         metavar="OURS=THEIRS,...",
-        help="the file's columns: time_s=t,phi1_rad=theta1",
+        help="the angles table's columns: time_s=t,phi1_rad=theta1",
     )
-    p.add_argument("--hanging-rad", type=float, default=0.0, help="what the file's angles read when hanging")
+    p.add_argument(
+        "--hanging",
+        dest="hanging_deg",
+        type=float,
+        default=0.0,
+        metavar="DEG",
+        help="angle in degrees that the angles table has when the links hang straight down (default 0)",
+    )
+    p.add_argument("--clockwise", action="store_true", help="the angles table counts clockwise positive")
+    p.add_argument(
+        "--unwrap",
+        action="store_true",
+        help="the angles table keeps its angles within one turn; rows are taken to be less than half a turn apart",
+    )
 
 
 def add_output_arguments(p: argparse.ArgumentParser) -> None:
@@ -102,14 +136,20 @@ def add_output_arguments(p: argparse.ArgumentParser) -> None:
 def read(path: str, args: argparse.Namespace) -> LinkAngles:
     """Angles as the arguments say."""
     from pydpend.angles import read_angles
-    from pydpend.errors import AnglesError, fault
+    from pydpend.errors import OptionError, Setting, fault
 
     pairs = [item.split("=", 1) for item in args.columns.split(",") if item]
     if any(len(pair) != 2 for pair in pairs):
-        raise AnglesError(
-            fault("--columns", f"{args.columns!r} is not OURS=THEIRS,...", "Write time_s=t,...")
+        raise OptionError(
+            fault(Setting("columns"), f"{args.columns!r} is not OURS=THEIRS,...", "Write time_s=t,...")
         )
-    return read_angles(path, columns=dict(pairs) or None, hanging_rad=args.hanging_rad)
+    return read_angles(
+        path,
+        columns=dict(pairs) or None,
+        hanging_rad=math.radians(args.hanging_deg),
+        clockwise=args.clockwise,
+        unwrap=args.unwrap,
+    )
 
 
 def load_model(name: str) -> Model:
@@ -145,6 +185,7 @@ def run(args: argparse.Namespace) -> int:
     from pydpend.damping import fit_damping
     from pydpend.damping.stored import write_fit, write_json
 
+    check_fit(args.method, args.laws, vars(args), single=args.pinned)
     recordings = [read(path, args) for path in args.angles]
     with warnings.catch_warnings():
         # The published constants' warning is one of the reasons in the refusal that follows.
@@ -153,20 +194,21 @@ def run(args: argparse.Namespace) -> int:
     options = {
         "method": args.method,
         "laws": args.laws,
-        "start_s": args.start,
-        "stop_s": args.stop,
-        "ratios": args.ratios == "free",
-        "free": [name for name in args.free.split(",") if name],
+        "start_s": args.start_s,
+        "stop_s": args.stop_s,
+        "ratios": None if args.ratios is None else args.ratios == "free",
+        "free": free_names(args.free),
         "angle_maps": args.angle_maps,
         "pinned": args.pinned,
         "ten_coefficients": args.ten_coefficients,
     }
+    trajectory = args.method == "trajectory"
     report = progress("fit", args.quiet)
     fit = fit_damping(
         recordings,
         model,
-        predict=args.method == "trajectory" and not args.no_prediction,
-        compare=args.method == "trajectory" and not args.no_comparison,
+        predict=trajectory if args.prediction is None else args.prediction,
+        compare=trajectory if args.comparison is None else args.comparison,
         intervals=args.intervals,
         progress=report,
         **options,

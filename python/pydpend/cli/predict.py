@@ -40,7 +40,7 @@ def run(args: argparse.Namespace) -> int:
         windows = []
     if not windows or min(windows) <= 0:
         raise FitError(fault("--windows", f"{args.windows!r} is no list of lengths in s", "Write 0.5,1,2"))
-    result = stored.predict(read(args.angles, args), windows, start_s=args.start, stop_s=args.stop)
+    result = stored.predict(read(args.angles, args), windows, start_s=args.start_s, stop_s=args.stop_s)
     args.output.mkdir(parents=True, exist_ok=True)
     write_json(args.output / "predict.json", result.to_json())
     links = next(iter(result.rows.values())).shape[1] - 1

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pydpend.angles import LinkAngles
-from pydpend.coefficients import JOINT_OF, PAPER, RATIOS, coefficients, parameters, ratios_of
+from pydpend.coefficients import RATIOS, parameters, ratios_of
 from pydpend.damping import shooting
 from pydpend.damping.compare import compare_terms
 from pydpend.damping.plausible import modes_hz
@@ -24,6 +24,7 @@ from pydpend.damping.ten import fit_ten
 from pydpend.damping.trajectory import fit_trajectory, plausible_or_raise
 from pydpend.damping.uncertainty import identifiability
 from pydpend.errors import FitError, fault
+from pydpend.fit_options import check_fit, free_names
 from pydpend.model import Model
 
 Floats = NDArray[np.float64]
@@ -37,7 +38,7 @@ def fit_damping(
     *,
     start_s: float | None = None,
     stop_s: float | None = None,
-    ratios: bool = True,
+    ratios: bool | None = None,
     free: Sequence[str] = (),
     clock: bool = False,
     angle_maps: bool = False,
@@ -53,8 +54,8 @@ def fit_damping(
     ``angles``: one recording or several (fitted jointly). ``method``: ``"trajectory"`` fits the equations
     of motion to the angles (docs/damping.md); ``"energy"`` is the paper's energy profile. ``laws``:
     ``"full"``, ``"paper"`` or names of coefficients. ``ratios``: whether lambda, sigma, kappa and a3 over
-    psi are free too (trajectory only; the energy method uses the model's). ``free``: further parameters
-    (``added_inertia``, ``tilt``, ``offset1``, ``offset2``); ``clock``: the camera clock's scale.
+    psi are free too, as they are by default (trajectory only; the energy method uses the model's). ``free``: further
+    parameters (``added_inertia``, ``tilt``, ``offset1``, ``offset2``); ``clock``: the camera clock's scale.
     ``pinned``: the elbow is pinned, and the pendulum a single one; angles of one link are a single pendulum's too,
     and need a one-link ``model``.
     ``ten_coefficients``: also the paper's ten, which the data do not determine (energy with the paper's laws only).
@@ -64,52 +65,47 @@ def fit_damping(
     profile likelihood too (`DampingFit.intervals`; trajectory only), beside the covariance's standard errors. The
     free decay is found unless ``start_s`` and ``stop_s`` state it.
 
-    Raises FitError for recordings without a free decay and models the recordings refute.
+    Raises FitOptionError for an option that is wrong or of the other method, FitError for recordings without a free
+    decay and models the recordings refute.
     """
-    names = coefficients(laws)
-    if intervals not in ("covariance", "profile") or (intervals == "profile" and method == "energy"):
-        raise FitError(
-            fault(
-                "fit",
-                f"intervals {intervals!r} of the {method} fit are not known",
-                "Use covariance, or profile with the trajectory fit",
-            )
-        )
     given = [angles] if isinstance(angles, LinkAngles) else list(angles)
     if not given:
         raise FitError(fault("fit", "there is no recording", "Give at least one"))
-    if pinned or model.links == 1 or any(a.links == 1 for a in given):
+    single = pinned or model.links == 1 or any(a.links == 1 for a in given)
+    options = {
+        "ratios": ratios,
+        "free": free,
+        "clock": clock,
+        "angle_maps": angle_maps,
+        "intervals": intervals,
+        "predict": predict,
+        "compare": compare,
+        "ten_coefficients": ten_coefficients,
+        "start_s": start_s,
+        "stop_s": stop_s,
+    }
+    names = check_fit(method, laws, options, single=single)
+    if single:
         given, model = reduced(given, model, pinned)
-        names = tuple(name for name in names if JOINT_OF[name] == "upper")
-        if not names or angle_maps:
+        if not names:
             raise FitError(
                 fault(
                     "fit",
-                    "angle maps are of two links" if names else "no law of the upper joint is asked for",
-                    "A single pendulum has mu_v1, mu_q1, rmu1 and tau_c1, and no maps",
+                    "no law of the upper joint is asked for",
+                    "A single pendulum has mu_v1, mu_q1, rmu1 and tau_c1",
                 )
             )
-    if ten_coefficients and not (method == "energy" and names == PAPER):
-        raise FitError(
-            fault(
-                "ten coefficients",
-                "they are of the energy method with the paper's six laws of two links",
-                "Add --method energy --laws paper",
-            )
-        )
     recordings = [prepare(a, model, start_s, stop_s) for a in given]
     if method == "energy":
         return _energy(recordings, model, names, ten_coefficients, progress)
-    if method != "trajectory":
-        raise FitError(fault("fit", f"method {method!r} is not known", "Use trajectory or energy"))
 
     def run(some: Sequence[Recording], quiet: bool = False, profile: bool = False) -> DampingFit:
         return fit_trajectory(
             some,
             model,
             names,
-            ratios=ratios,
-            free=free,
+            ratios=ratios is not False,
+            free=free_names(free),
             clock=clock,
             angle_maps=angle_maps,
             profile=profile,
@@ -122,7 +118,7 @@ def fit_damping(
         fit = replace(fit, prediction=prediction, notes=(*fit.notes, note))
     if compare:
         try:
-            terms = compare_terms(recordings, model, names, ratios=ratios, progress=progress)
+            terms = compare_terms(recordings, model, names, ratios=ratios is not False, progress=progress)
         except FitError as problem:
             return replace(fit, notes=(*fit.notes, f"the terms were not compared: {problem}"))
         fit = replace(fit, terms=terms)

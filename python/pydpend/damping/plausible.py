@@ -7,7 +7,7 @@ import scipy
 from numpy.typing import NDArray
 
 from pydpend.damping.shooting import Track
-from pydpend.errors import FitError, fault
+from pydpend.errors import FitError, Step, fault
 from pydpend.model import Model
 
 Floats = NDArray[np.float64]
@@ -113,11 +113,15 @@ def check_model(track: Track, span: tuple[float, float], model: Model, name: str
                 f"{100 * rise:.0f} %) although nothing drives it"
                 f"{words} "
                 f"(its small oscillations would be at {swings} Hz)",
-                f"Use constants derived from the parts{' (--model derived)' if model.links == 2 else ''} or your own; "
-                "no damping fitted with these would mean anything",
+                "Use constants derived from the parts"
+                + (" (" + DERIVED + ")" if model.links == 2 else "")
+                + " or your own; no damping fitted with these would mean anything",
             )
         )
 
+
+DERIVED = Step("--model derived", "dp.derived('A')")
+"""The constants of the paper's pendulum, derived from its parts."""
 
 TAIL_S = 8.0
 """Length of the end of the motion in which its small oscillations are looked at, s."""

@@ -19,7 +19,7 @@ from pydpend.damping.maps import Maps, corrected
 from pydpend.damping.recording import Recording
 from pydpend.damping.result import DampingFit, clean
 from pydpend.damping.shooting import Segments, Track
-from pydpend.errors import FitError, fault
+from pydpend.errors import FitError, Setting, fault
 
 Floats = NDArray[np.float64]
 
@@ -167,7 +167,9 @@ def initial_state(track: Track, parameters: dict[str, float], start_s: float, le
         or chain.times_s[-1, 1] < start_s + 0.5 * length_s
     ):
         raise FitError(
-            fault("--start", f"{length_s:g} s from {start_s:g} s on have a gap", "Choose another start")
+            fault(
+                Setting("start_s"), f"{length_s:g} s from {start_s:g} s on have a gap", "Choose another start"
+            )
         )
     loose = shooting.solve([track], chain, parameters, np.zeros((1, 2)), slack=LOOSE, learned=False)
     tied = shooting.solve(

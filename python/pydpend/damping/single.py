@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pydpend.angles import LinkAngles
-from pydpend.errors import FitError, fault
+from pydpend.errors import FitError, Setting, fault
 from pydpend.model import Model
 
 Floats = NDArray[np.float64]
@@ -92,7 +92,10 @@ def same_links(recordings: Sequence[LinkAngles], model: Model) -> None:
                 fault(
                     a.name,
                     f"angles of one link, but the model {model.name!r} has two",
-                    "Give a one-link model (docs/model.md), or --pinned if the elbow of the two is pinned straight",
+                    "Give a one-link model (docs/model.md), or "
+                    + Setting("pinned", True)
+                    + " if the elbow of the two is "
+                    "pinned straight",
                 )
             )
         if a.links == 2 and model.links == 1:
@@ -112,7 +115,11 @@ def reduced(recordings: list[LinkAngles], model: Model, elbow_pinned: bool) -> t
     """
     if model.links == 1 and elbow_pinned:
         raise FitError(
-            fault("fit", f"model {model.name!r} has one link and no elbow to pin", "Leave --pinned out")
+            fault(
+                "fit",
+                f"model {model.name!r} has one link and no elbow to pin",
+                "Leave " + Setting("pinned", True) + " out",
+            )
         )
     if not elbow_pinned:
         same_links(recordings, model)

@@ -15,7 +15,7 @@ from pydpend.damping.maps import Maps, corrected
 from pydpend.damping.prediction import WINDOWS_S, Prediction, initial_state, predict
 from pydpend.damping.recording import prepare
 from pydpend.damping.result import DampingFit
-from pydpend.errors import FitError, fault
+from pydpend.errors import FIT, FitError, Setting, fault
 from pydpend.model import Model
 
 Floats = NDArray[np.float64]
@@ -63,11 +63,19 @@ class StoredFit:
         """Predicts a recording's free decay. Raises FitError when it has none, or other links than the fit."""
         model = self.model()
         if angles.links > model.links:
-            advice = "Give a table of one link (time_s, phi1_rad; zero where the body hangs), or a fit without --pinned"
+            advice = (
+                "Give a table of one link (time_s, phi1_rad; zero where the body hangs), or a fit without "
+                + Setting("pinned", True)
+            )
             raise FitError(fault(angles.name, "angles of two links, but the fit is of one", advice))
         if angles.links < model.links:
-            advice = "Give a table of both links, or a fit of a one-link model"
-            raise FitError(fault(angles.name, "angles of one link, but the fit is of two", advice))
+            raise FitError(
+                fault(
+                    angles.name,
+                    "angles of one link, but the fit is of two",
+                    "Give a table of both links, or a fit of a one-link model",
+                )
+            )
         recording = prepare(angles, model, start_s, stop_s)
         return predict(recording, self.parameters, windows_s, self.maps)
 
@@ -92,14 +100,14 @@ def load_fit(path: str | Path) -> StoredFit:
         stored.model()
     except OSError as problem:
         raise FitError(
-            fault(str(path), f"cannot be read ({problem.strerror})", "Give the folder that pydpend fit wrote")
+            fault(str(path), f"cannot be read ({problem.strerror})", "Give the folder that " + FIT + " wrote")
         ) from problem
     except (ValueError, KeyError, TypeError, AttributeError) as problem:
         raise FitError(
             fault(
                 str(path),
                 f"is not a fit.json of pydpend ({problem!r})",
-                "Give the folder that pydpend fit wrote",
+                "Give the folder that " + FIT + " wrote",
             )
         ) from problem
     return stored

@@ -19,7 +19,7 @@ import scipy
 from numpy.typing import NDArray
 
 from pydpend.encoder.holds import Hold
-from pydpend.errors import EncoderError, fault
+from pydpend.errors import CALIBRATE, EncoderError, fault
 
 Floats = NDArray[np.float64]
 
@@ -160,7 +160,7 @@ def read_calibration(path: str | Path) -> Calibration:
         ) from problem
     except (ValueError, KeyError, TypeError) as problem:
         raise EncoderError(
-            fault(str(path), f"it is not a calibration ({problem})", "Make one with `pydpend calibrate`")
+            fault(str(path), f"it is not a calibration ({problem})", "Make one with " + CALIBRATE)
         ) from problem
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pydpend.angles import read_angles
 from pydpend.damping.maps import Maps
 from pydpend.encoder import read_calibration
-from pydpend.errors import PydpendError, fault
+from pydpend.errors import PydpendError, Setting, fault
 from pydpend.nodes import read_nodes
 from pydpend.plots.angles import angles_figure
 from pydpend.plots.damping import (
@@ -221,12 +221,12 @@ def chosen(run: str | Path, recording: str | None) -> Stored:
     names = ", ".join(r.facts["name"] for r in found)
     if recording is None:
         if len(found) > 1:
-            raise FigureError(fault("--recording", f"{run} has several", f"Give one of {names}"))
+            raise FigureError(fault(Setting("recording"), f"{run} has several", f"Give one of {names}"))
         return found[0]
     for r in found:
         if recording in (r.facts["name"], r.facts["label"]):
             return r
-    raise FigureError(fault("--recording", f"{run} has no {recording!r}", f"Give one of {names}"))
+    raise FigureError(fault(Setting("recording"), f"{run} has no {recording!r}", f"Give one of {names}"))
 
 
 def available(r: Stored) -> list[str]:

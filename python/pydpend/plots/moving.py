@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
 
-from pydpend.errors import SimulationError, fault
+from pydpend.errors import Setting, SimulationError, fault
 
 ENDINGS = (".gif", ".mp4")
 """What `write_film` writes."""
@@ -29,8 +29,9 @@ def check_film(path: Path, fps: float, speed: float) -> None:
         raise SimulationError(
             fault(str(path), f"{path.suffix or 'no ending'} is not a film", "Use .gif or .mp4")
         )
-    if not (fps > 0 and speed > 0):
-        raise SimulationError(fault("--fps, --speed", f"{fps} and {speed}", "Both must be above 0"))
+    for name, value in (("fps", fps), ("speed", speed)):
+        if not value > 0:
+            raise SimulationError(fault(Setting(name), f"{value:g} is not above 0", "Give a number above 0"))
 
 
 def pictures_of(

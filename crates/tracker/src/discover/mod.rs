@@ -15,6 +15,7 @@ use nalgebra::Vector2;
 use rayon::prelude::*;
 
 use crate::error::{Error, Fault, Result};
+use crate::message::{Message, SETUP, Setting};
 use crate::rig::Rig;
 use crate::rigid::body::Link;
 use crate::rigid::pose::place;
@@ -30,7 +31,7 @@ pub struct Discovery {
     /// Places that stand still and belong to no body: a ruler, a screw. px.
     pub standing: Vec<[f64; 2]>,
     /// What a user should know, a sentence each.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Message>,
 }
 
 /// Finds the rig of a recording of `image_px` (width, height) pixels.
@@ -42,14 +43,14 @@ pub fn discover(store: &DetectionStore, image_px: [u32; 2]) -> Result<Discovery>
     if sample.frames.is_empty() {
         return Err(Error::Rig(
             Fault::new("recording", "no markers are seen in any frame")
-                .advice("Look at a frame and set --threshold or --polarity"),
+                .advice("Look at a frame and set " + Setting::Threshold + " or " + Setting::Polarity),
         ));
     }
     let mut warnings = Vec::new();
     if sample.at_rest {
         return Err(Error::Rig(
             Fault::new("recording", "nothing moves, so bodies cannot be told apart")
-                .advice("Give a rig with --rig, or a longer recording"),
+                .advice("Give a rig with " + Setting::Rig + ", or a longer recording"),
         ));
     }
     let mut sample = sample;
@@ -63,7 +64,7 @@ pub fn discover(store: &DetectionStore, image_px: [u32; 2]) -> Result<Discovery>
     if found.is_empty() {
         return Err(Error::Rig(
             Fault::new("recording", "no marker can be followed")
-                .advice("Look at the picture of `tracker setup`, or give a rig with --rig"),
+                .advice("Look at the picture of " + SETUP + ", or give a rig with " + Setting::Rig),
         ));
     }
     if let Some((a, b)) = bodies::alike(&links) {
@@ -73,26 +74,30 @@ pub fn discover(store: &DetectionStore, image_px: [u32; 2]) -> Result<Discovery>
                 "recording",
                 format!("two bodies have their markers alike, {a} and {b}: they cannot be told apart"),
             )
-            .advice("Move a marker of one of them by some pixels, or say which is which with --rig"),
+            .advice(
+                "Move a marker of one of them by some pixels, or say which is which with " + Setting::Rig,
+            ),
         ));
     }
     let (reference, whole) = reference(&sample, &found, image_px);
     if !whole {
-        warnings.push(
-            "no frame shows every marker: their places are put together from several frames".to_string(),
-        );
+        warnings
+            .push("no frame shows every marker: their places are put together from several frames".into());
     }
     let index = store.stamp(sample.frames[reference]).index;
     let rig = arrange::arrange(&found, reference, Some(index), image_px);
     rig.check("discovered rig")?;
     if !standing.is_empty() {
         let n = standing.len();
-        warnings.push(format!(
-            "{n} bright place{} stand{} still and belong{} to no body",
-            if n == 1 { "" } else { "s" },
-            if n == 1 { "s" } else { "" },
-            if n == 1 { "s" } else { "" },
-        ));
+        warnings.push(
+            format!(
+                "{n} bright place{} stand{} still and belong{} to no body",
+                if n == 1 { "" } else { "s" },
+                if n == 1 { "s" } else { "" },
+                if n == 1 { "s" } else { "" },
+            )
+            .into(),
+        );
     }
     Ok(Discovery { rig, standing: standing.iter().map(|p| [p.x, p.y]).collect(), warnings })
 }

@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Fault, Place, Result};
 use crate::frame::TimeBase;
+use crate::message::PRINT_SCENE;
 
 /// Version of the scene's form; a file with a higher one is refused.
 pub const SCENE_SCHEMA: u32 = 1;
@@ -326,9 +327,10 @@ impl Scene {
     pub fn read(path: &Path) -> Result<Self> {
         let name = path.display().to_string();
         let text = std::fs::read_to_string(path).map_err(|e| {
-            Error::Film(Fault::new(&name, format!("the scene cannot be read ({e})")).advice(
-                "Give a scene in TOML, e.g. one that `tracker film --preset clean --print-scene` prints",
-            ))
+            Error::Film(
+                Fault::new(&name, format!("the scene cannot be read ({e})"))
+                    .advice("Give a scene in TOML, e.g. one that " + PRINT_SCENE + " prints"),
+            )
         })?;
         let mut scene = Self::parse(&text, &name)?;
         if let (Some(motion), Some(folder)) = (&mut scene.motion, path.parent()) {
@@ -348,7 +350,7 @@ impl Scene {
             Error::Film(
                 Fault::new(name, e.message().replace('\n', " "))
                     .at(Place::Line(line))
-                    .advice("`tracker film --preset clean --print-scene` prints a scene with every part"),
+                    .advice(PRINT_SCENE + " prints a scene with every part"),
             )
         })?;
         scene.check(name)?;

@@ -4,6 +4,7 @@
 
 use super::scene::{LinkMotion, SCENE_SCHEMA, Scene};
 use crate::error::{Error, Fault, Place, Result};
+use crate::message::Message;
 
 impl Scene {
     /// Checks that names are known and numbers make sense.
@@ -22,7 +23,7 @@ struct Checker<'a> {
 }
 
 impl Checker<'_> {
-    fn fault(&self, key: impl Into<String>, problem: impl Into<String>, advice: &str) -> Result<()> {
+    fn fault(&self, key: impl Into<String>, problem: impl Into<Message>, advice: &str) -> Result<()> {
         Err(Error::Film(Fault::new(self.name, problem).at(Place::Key(key.into())).advice(advice)))
     }
 

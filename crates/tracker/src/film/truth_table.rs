@@ -28,6 +28,7 @@ use parquet::file::properties::WriterProperties;
 use super::Film;
 use super::truth::FrameTruth;
 use crate::error::{Error, Fault, Place, Result};
+use crate::message::FILM_TRUTH;
 
 /// Frames per record batch.
 const BATCH_FRAMES: usize = 2000;
@@ -219,7 +220,7 @@ impl Truth {
             _ => {
                 return Err(Error::Film(
                     Fault::new(&name, "the truth is read from .parquet or .csv")
-                        .advice("Give the table that `tracker film --truth` wrote"),
+                        .advice("Give the table that " + FILM_TRUTH + " wrote"),
                 ));
             }
         };
@@ -289,7 +290,7 @@ fn missing(name: &str, column: &str) -> Error {
     Error::Film(
         Fault::new(name, format!("there is no column {column}"))
             .at(Place::Key(column.into()))
-            .advice("Give the table that `tracker film --truth` wrote"),
+            .advice("Give the table that " + FILM_TRUTH + " wrote"),
     )
 }
 

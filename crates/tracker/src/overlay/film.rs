@@ -12,6 +12,7 @@ use super::{Overlay, failed};
 use crate::error::{Error, Fault, Result};
 use crate::film::encode::{Codec, VideoSettings, VideoWriter};
 use crate::frame::TimeBase;
+use crate::message::Setting;
 use crate::observation::Observation;
 use crate::pipeline::{self, Observer, Stage};
 use crate::source::OpenOptions;
@@ -41,23 +42,20 @@ impl Default for FilmSettings {
 impl FilmSettings {
     fn check(&self, output: &Path) -> Result<()> {
         let wrong = [
-            ("play_fps", self.play_fps == 0 || self.play_fps > 1000, "Give 1 to 1000 frames a second"),
-            ("quality", self.quality > 51, "Give x264's rate factor, 0 (best) to 51"),
-            ("every", self.every == 0, "Give 1 for all frames, n for each n-th"),
+            (Setting::PlayFps, self.play_fps == 0 || self.play_fps > 1000, "Give 1 to 1000 frames a second"),
+            (Setting::Quality, self.quality > 51, "Give x264's rate factor, 0 (best) to 51"),
+            (Setting::Every, self.every == 0, "Give 1 for all frames, n for each n-th"),
             (
-                "width",
+                Setting::Width,
                 self.width.is_some_and(|w| !(64..=8192).contains(&w) || w % 2 == 1),
                 "Give an even number of 64 to 8192 px",
             ),
         ];
         if let Some((name, _, advice)) = wrong.iter().find(|(_, wrong, _)| *wrong) {
-            return Err(Error::Argument(Fault::new(*name, "it is out of range").advice(*advice)));
+            return Err(Error::Argument(Fault::of(*name, "it is out of range").advice(*advice)));
         }
         if output.exists() && !self.replace {
-            return Err(Error::Film(
-                Fault::new(output.display(), "it is there already")
-                    .advice("Choose another name, or replace it with --force"),
-            ));
+            return Err(Error::Film(Fault::exists(output)));
         }
         Ok(())
     }

@@ -15,6 +15,7 @@ use super::ahead::{Ahead, Batch};
 use crate::detect::{DetectSettings, Detection, Detector, Levels};
 use crate::error::{Error, Fault, Place, Result};
 use crate::frame::{Ending, FrameSource};
+use crate::message::Setting;
 use crate::source::cores;
 use crate::store::{DetectionStore, FrameStamp};
 use crate::table::SourceFacts;
@@ -140,7 +141,7 @@ pub fn detect_all(
             if let Err(e) = started {
                 stop.store(true, Ordering::Relaxed);
                 return Err(Error::Argument(
-                    Fault::new("threads", format!("thread {i} could not be started ({e})"))
+                    Fault::of(Setting::Threads, format!("thread {i} could not be started ({e})"))
                         .advice("Ask for fewer"),
                 ));
             }
@@ -207,7 +208,7 @@ impl Inbox<'_> {
                 return Err(Error::Source(
                     Fault::new(self.recording, "the recording is not the one that the earlier run read")
                         .at(Place::Frame(stamp.index))
-                        .advice("Begin anew with --force"),
+                        .advice(super::state::anew()),
                 ));
             }
             self.done += 1;
@@ -225,7 +226,7 @@ fn forward(stamp: &FrameStamp, newest: &mut Option<(u64, i64)>, recording: &str)
         return Err(Error::Source(
             Fault::new(recording, format!("tick {} comes after tick {ticks} of frame {index}", stamp.ticks))
                 .at(Place::Frame(stamp.index))
-                .advice("Give the rate with --fps, which replaces the time stamps"),
+                .advice("Give the rate with " + Setting::Fps + ", which replaces the time stamps"),
         ));
     }
     *newest = Some((stamp.index, stamp.ticks));

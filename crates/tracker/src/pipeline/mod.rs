@@ -23,6 +23,7 @@ use crate::detect::{DetectSettings, Levels};
 use crate::discover::{Discovery, discover};
 use crate::error::{Error, Fault, Result};
 use crate::frame::{Ending, FrameSource, SourceInfo};
+use crate::message::{Message, SETUP, Setting};
 use crate::rig::Rig;
 use crate::source::OpenOptions;
 use crate::store::DetectionStore;
@@ -86,7 +87,7 @@ pub struct RunSummary {
     /// What became of each node.
     pub nodes: Vec<NodeSummary>,
     /// What a user should know, a sentence each.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Message>,
     /// The table, if it was asked for.
     pub table: Option<NodeTable>,
 }
@@ -135,8 +136,8 @@ fn check(settings: &RunSettings) -> Result<()> {
         && frames.is_empty()
     {
         return Err(Error::Argument(
-            Fault::new("frames", format!("{}..{} holds no frame", frames.start, frames.end))
-                .advice("Give the first frame and one past the last, for example 0..1000"),
+            Fault::of(Setting::Frames, format!("{}..{} holds no frame", frames.start, frames.end))
+                .advice("Give the first frame and one past the last"),
         ));
     }
     let Some(output) = &settings.output else { return Ok(()) };
@@ -144,21 +145,18 @@ fn check(settings: &RunSettings) -> Result<()> {
     let resume = settings.existing == Existing::Resume;
     if resume && settings.input == "-" {
         return Err(Error::Argument(
-            Fault::new("--resume", "standard input cannot be read again").advice("Give a file"),
+            Fault::of(Setting::Resume, "standard input cannot be read again").advice("Give a file"),
         ));
     }
     if settings.existing == Existing::Refuse {
         if output.exists() {
-            return Err(Error::Table(
-                Fault::new(output.display(), "it is there already")
-                    .advice("Choose another name, or replace it with --force"),
-            ));
+            return Err(Error::Table(Fault::exists(output)));
         }
         let partial = partial_path(output);
         if partial.exists() {
             return Err(Error::Table(
                 Fault::new(partial.display(), "an earlier run was stopped and can go on")
-                    .advice("Go on with --resume, or begin anew with --force"),
+                    .advice("Go on with " + Setting::Resume + ", or begin anew with " + Setting::Force),
             ));
         }
     }
@@ -200,7 +198,7 @@ fn already_done(settings: &RunSettings, request: &Request) -> Result<Option<RunS
                 output.display(),
                 format!("its run was stopped, but its state {} is gone", partial.display()),
             )
-            .advice("Begin anew with --force"),
+            .advice(state::anew()),
         ));
     }
     request.state.made(&table.meta, output)?;
@@ -208,14 +206,14 @@ fn already_done(settings: &RunSettings, request: &Request) -> Result<Option<RunS
     if rig != settings.rig.as_ref() {
         return Err(Error::Table(
             Fault::new(output.display(), "its run is complete and had another rig")
-                .advice("Give --rig as it was then, or begin anew with --force"),
+                .advice("Give " + Setting::Rig + " as it was then, or begin anew with " + Setting::Force),
         ));
     }
     Ok(Some(RunSummary {
         frames: table.frames() as u64,
         resumed: table.frames() as u64,
         nodes: table.summary(),
-        warnings: vec![format!("{} was complete already", output.display())],
+        warnings: vec![format!("{} was complete already", output.display()).into()],
         meta: table.meta.clone(),
         table: settings.collect.then_some(table),
     }))
@@ -231,7 +229,7 @@ struct Run<'a> {
     resumed: u64,
     /// How the recording ended, if an earlier run read all of it.
     finished: Option<Ending>,
-    warnings: Vec<String>,
+    warnings: Vec<Message>,
 }
 
 impl<'a> Run<'a> {
@@ -452,7 +450,7 @@ fn fits(rig: &Rig, facts: &SourceFacts) -> Result<()> {
                     image_px[0], image_px[1]
                 ),
             )
-            .advice("Make one for this recording with `tracker setup`"),
+            .advice("Make one for this recording with " + SETUP),
         ));
     }
     Ok(())

@@ -10,6 +10,7 @@ use rayon::ThreadPoolBuilder;
 use super::Observer;
 use crate::error::{Error, Fault, Result};
 use crate::frame::{Frame, FrameSource};
+use crate::message::Setting;
 use crate::source::{self, OpenOptions, cores};
 
 /// How long to wait before looking whether the user wants to stop.
@@ -38,7 +39,7 @@ pub(super) fn on_threads<T: Send>(threads: usize, work: impl FnOnce() -> Result<
     let pool = ThreadPoolBuilder::new()
         .num_threads(cores(threads))
         .build()
-        .map_err(|e| Error::Argument(Fault::new("threads", e.to_string()).advice("Ask for fewer")))?;
+        .map_err(|e| Error::Argument(Fault::of(Setting::Threads, e.to_string()).advice("Ask for fewer")))?;
     pool.install(work)
 }
 

@@ -12,6 +12,7 @@ use super::RunSettings;
 use crate::detect::{DetectSettings, Levels};
 use crate::error::{Error, Fault, Place, Result};
 use crate::frame::Ending;
+use crate::message::{Message, Setting};
 use crate::store::{Finished, Spool};
 use crate::table::{SourceFacts, TableMeta};
 
@@ -47,9 +48,9 @@ impl State {
             "program": TableMeta::this_tool(),
             "recording": facts,
             "detection settings": detect,
-            "--decoder": settings.open.decoder,
-            "--fps": settings.open.fps,
-            "--frames": settings.frames_json(),
+            "decoder": settings.open.decoder,
+            "fps": settings.open.fps,
+            "frames": settings.frames_json(),
         });
         Self { identity }
     }
@@ -60,9 +61,9 @@ impl State {
             "program": meta.tool,
             "recording": meta.source,
             "detection settings": meta.settings["detect"],
-            "--decoder": meta.settings["decoder"],
-            "--fps": meta.settings["fps"],
-            "--frames": meta.settings["frames"],
+            "decoder": meta.settings["decoder"],
+            "fps": meta.settings["fps"],
+            "frames": meta.settings["frames"],
         });
         self.same(&before, output, "its run is complete and had another")
     }
@@ -73,9 +74,9 @@ impl State {
         match object.iter().find(|&(key, value)| before.get(key) != Some(value)) {
             None => Ok(()),
             Some((key, value)) => Err(Error::Table(
-                Fault::new(path.display(), format!("{what} {key}"))
+                Fault::new(path.display(), Message::from(format!("{what} ")) + named(key))
                     .at(Place::Key(difference(before.get(key), value)))
-                    .advice("Run with what it had, or begin anew with --force"),
+                    .advice("Run with what it had, or begin anew with " + Setting::Force),
             )),
         }
     }
@@ -95,16 +96,25 @@ impl State {
             return Ok(None);
         }
         let (spool, text) = Spool::resume(&path)?;
-        let advice = "Begin anew with --force";
         let header: Header = serde_json::from_str(&text).map_err(|e| {
             Error::Table(
-                Fault::new(path.display(), format!("its header is of another program ({e})")).advice(advice),
+                Fault::new(path.display(), format!("its header is of another program ({e})")).advice(anew()),
             )
         })?;
         self.same(&header.identity, &path, "the earlier run had another")?;
         let ending = spool.finished().map(|f| read_ending(&f.ending, &path)).transpose()?;
         Ok(Some(Earlier { spool, levels: header.levels, ending }))
     }
+}
+
+/// What to do where an earlier run is of no use.
+pub fn anew() -> Message {
+    "Begin anew with " + Setting::Force
+}
+
+/// A key of what a state remembers; most are settings.
+fn named(key: &str) -> Message {
+    Setting::ALL.into_iter().find(|s| s.name() == key).map_or_else(|| key.into(), Message::from)
 }
 
 /// What differs, in few words.
@@ -138,8 +148,7 @@ pub fn finished(ending: &Ending) -> Result<Finished> {
 fn read_ending(text: &str, path: &Path) -> Result<Ending> {
     let text: EndingText = serde_json::from_str(text).map_err(|e| {
         Error::Table(
-            Fault::new(path.display(), format!("its last record is of another program ({e})"))
-                .advice("Begin anew with --force"),
+            Fault::new(path.display(), format!("its last record is of another program ({e})")).advice(anew()),
         )
     })?;
     Ok(match text.early {

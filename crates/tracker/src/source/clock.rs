@@ -4,6 +4,7 @@
 
 use crate::error::{Error, Fault, Result};
 use crate::frame::TimeBase;
+use crate::message::Setting;
 
 /// Greatest rate that is believed, frames per second.
 const MAX_RATE_HZ: f64 = 1e9;
@@ -17,7 +18,7 @@ const MAX_DENOMINATOR: u64 = 1_000_000;
 pub fn time_base(fps: f64) -> Result<TimeBase> {
     if !(fps.is_finite() && fps > 0.0 && fps <= MAX_RATE_HZ) {
         return Err(Error::Argument(
-            Fault::new("--fps", format!("{fps} is not a rate")).advice("Give frames per second, above 0"),
+            Fault::of(Setting::Fps, format!("{fps} is not a rate")).advice("Give frames per second, above 0"),
         ));
     }
     let (numerator, denominator) = rational(fps);

@@ -16,6 +16,7 @@ use std::io::Read;
 use std::path::Path;
 
 use crate::error::{Error, Fault, Result};
+use crate::message::Setting;
 pub(crate) use options::cores;
 pub use options::{Decoder, OpenOptions};
 
@@ -51,11 +52,11 @@ impl Input {
         if options.allow_protocol && !kind.is_dir() {
             return Ok(Input::Address(name.into()));
         }
-        Err(Error::Source(
-            Fault::new(name, "not a file but a folder or a device").advice(
-                "Give a recording; for a device add `--allow-protocol`, for pictures a folder with PNG, TIFF or BMP files",
-            ),
-        ))
+        Err(Error::Source(Fault::new(name, "not a file but a folder or a device").advice(
+            "Give a recording; for a device add "
+                + Setting::AllowProtocol
+                + ", for pictures a folder with PNG, TIFF or BMP files",
+        )))
     }
 
     fn address(name: &str, options: &OpenOptions) -> Result<Self> {
@@ -69,7 +70,7 @@ impl Input {
         if !options.allow_protocol {
             return Err(Error::Source(
                 Fault::new(name, format!("an address ({scheme}:), and these are not opened unasked"))
-                    .advice("Add `--allow-protocol` if you trust it"),
+                    .advice("Add " + Setting::AllowProtocol + " if you trust it"),
             ));
         }
         Ok(Input::Address(name.into()))
@@ -102,7 +103,7 @@ pub fn open(name: &str, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
             return match options.decoder {
                 Decoder::Opencv => Err(Error::Source(
                     Fault::new(name, format!("OpenCV does not read {}", source.info().container))
-                        .advice("Leave out `--decoder opencv`"),
+                        .advice("Leave out " + Setting::Decoder.set_to("opencv")),
                 )),
                 _ => Ok(source),
             };
@@ -116,7 +117,8 @@ pub fn open(name: &str, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
     match input {
         Input::File(_) => Ok(Box::new(opencv::OpencvSource::open(name, &input, source.info(), options)?)),
         _ => Err(Error::Source(
-            Fault::new(name, "OpenCV's decoder reads files only").advice("Leave out `--decoder opencv`"),
+            Fault::new(name, "OpenCV's decoder reads files only")
+                .advice("Leave out " + Setting::Decoder.set_to("opencv")),
         )),
     }
 }

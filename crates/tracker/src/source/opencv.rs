@@ -13,6 +13,7 @@ use super::ffmpeg::display_times;
 use super::{Input, OpenOptions};
 use crate::error::{Error, Fault, Result};
 use crate::frame::{Ending, Frame, FrameSource, PixelFormat, SourceInfo};
+use crate::message::Setting;
 
 /// A recording read through OpenCV.
 pub struct OpencvSource {
@@ -37,7 +38,7 @@ impl OpencvSource {
                     name,
                     format!("{} bits per pixel, and OpenCV's decoder keeps 8", known.depth_bits),
                 )
-                .advice("Leave out `--decoder opencv`"),
+                .advice("Leave out " + Setting::Decoder.set_to("opencv")),
             ));
         }
         let capture = open(name)?;
@@ -57,7 +58,8 @@ impl OpencvSource {
 fn open(name: &str) -> Result<VideoCapture> {
     let failed = |why: String| {
         Error::Source(
-            Fault::new(name, format!("OpenCV does not open it{why}")).advice("Leave out `--decoder opencv`"),
+            Fault::new(name, format!("OpenCV does not open it{why}"))
+                .advice("Leave out " + Setting::Decoder.set_to("opencv")),
         )
     };
     let capture = VideoCapture::from_file(name, videoio::CAP_FFMPEG)
@@ -108,7 +110,7 @@ impl FrameSource for OpencvSource {
             if self.next == 0 {
                 return Err(Error::Source(
                     Fault::new(&self.info.name, "OpenCV decodes no frame of it")
-                        .advice("Leave out `--decoder opencv`"),
+                        .advice("Leave out " + Setting::Decoder.set_to("opencv")),
                 ));
             }
             if let Some(declared) = self.info.declared_frames.filter(|n| *n > self.next) {

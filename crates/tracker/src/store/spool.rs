@@ -12,6 +12,7 @@ use std::path::{Path, PathBuf};
 
 use super::block::{BLOCK_FRAMES, Block};
 use crate::error::{Error, Fault, Place, Result};
+use crate::message::Setting;
 
 const MAGIC: &[u8; 8] = b"PDSPOOL1";
 const HEAD: [u8; 4] = *b"HEAD";
@@ -104,7 +105,7 @@ impl Spool {
         let file = OpenOptions::new().read(true).write(true).open(path).map_err(|e| {
             Error::Table(
                 Fault::new(&name, format!("the state of the earlier run cannot be read ({e})"))
-                    .advice("Run without --resume"),
+                    .advice("Run without " + Setting::Resume),
             )
         })?;
         lock(&file, &name)?;
@@ -121,7 +122,7 @@ impl Spool {
         let damaged = |name: &str| {
             Error::Table(
                 Fault::new(name, "its beginning is damaged, so nothing of the earlier run can be kept")
-                    .advice("Run without --resume"),
+                    .advice("Run without " + Setting::Resume),
             )
         };
         let mut magic = [0; 8];
@@ -243,7 +244,7 @@ impl Spool {
             Error::Table(
                 Fault::new(&self.name, "a block of detections has changed on disk")
                     .at(Place::Byte(start))
-                    .advice("Run again without --resume"),
+                    .advice("Run again without " + Setting::Resume),
             )
         })
     }
@@ -253,7 +254,7 @@ impl Spool {
             u32::try_from(payload.len()).ok().filter(|&n| n <= LONGEST_PAYLOAD).ok_or_else(|| {
                 Error::Detect(
                     Fault::new(&self.name, format!("{} frames hold too many detections", BLOCK_FRAMES))
-                        .advice("Set a higher --threshold or a least area"),
+                        .advice("Set a higher " + Setting::Threshold),
                 )
             })?;
         let mut head = [0; RECORD_HEAD_BYTES];
@@ -343,9 +344,9 @@ fn read_fault(name: &str, e: &std::io::Error, at: u64) -> Error {
 fn write_fault(name: &str, e: &std::io::Error) -> Error {
     let advice = match e.kind() {
         ErrorKind::StorageFull | ErrorKind::QuotaExceeded => {
-            "Free some space and go on with --resume; what was done is kept"
+            "Free some space and go on with " + Setting::Resume + "; what was done is kept"
         }
-        _ => "Choose a folder that can be written",
+        _ => "Choose a folder that can be written".into(),
     };
     Error::Table(Fault::new(name, format!("it cannot be written ({e})")).advice(advice))
 }

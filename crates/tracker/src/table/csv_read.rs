@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use super::file::{json_beside, read_fault};
 use super::{COLUMNS, NodeTable, Rows, STATUS_WORDS, TableMeta};
 use crate::error::{Error, Fault, Place, Result};
+use crate::message::{Message, TRACK};
 
 pub(super) fn read_meta(path: &Path) -> Result<TableMeta> {
     let json = json_beside(path);
@@ -40,7 +41,7 @@ pub(super) fn read(path: &Path) -> Result<NodeTable> {
         line: String::new(),
     };
     if !lines.next()? {
-        return Err(lines.fault("the file is empty", "Run `tracker track` again"));
+        return Err(lines.fault("the file is empty", "Run " + TRACK + " again"));
     }
     let columns = columns_of(&lines)?;
     let mut rows = Rows::default();
@@ -57,7 +58,7 @@ pub(super) fn read(path: &Path) -> Result<NodeTable> {
                 Some(&end) => Ok(&unquoted[if at == 0 { 0 } else { ends[at - 1] }..end]),
                 None => Err(lines.fault(
                     format!("the row has {} fields, column {} is missing", ends.len(), COLUMNS[column]),
-                    "The table may be cut off here: copy it again, or run `tracker track` again",
+                    "The table may be cut off here: copy it again, or run " + TRACK + " again",
                 )),
             }
         };
@@ -99,7 +100,7 @@ pub(super) fn read(path: &Path) -> Result<NodeTable> {
     if n != 0 {
         return Err(lines.fault(
             format!("the last frame has rows for {n} of {nodes} nodes"),
-            "The table is cut off: copy it again, or run `tracker track` again",
+            "The table is cut off: copy it again, or run " + TRACK + " again",
         ));
     }
     Ok(NodeTable { meta, rows })
@@ -118,7 +119,7 @@ fn columns_of(lines: &Lines) -> Result<[usize; COLUMNS.len()]> {
                     format!("there is no column {name}, only {}", header.join(", ")),
                 )
                 .at(Place::Line(1))
-                .advice("Give a node table written by `tracker track`"),
+                .advice("Give a node table written by " + TRACK),
             )
         })?;
     }
@@ -150,7 +151,7 @@ impl Lines {
         Ok(true)
     }
 
-    fn fault(&self, problem: impl Into<String>, advice: &str) -> Error {
+    fn fault(&self, problem: impl Into<Message>, advice: impl Into<Message>) -> Error {
         Error::Table(Fault::new(self.path.display(), problem).at(Place::Line(self.number)).advice(advice))
     }
 

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 
 use super::{NodeTable, Rows, TableMeta, csv, csv_read, parquet, parquet_read};
 use crate::error::{Error, Fault, Result};
+use crate::message::{Setting, TRACK};
 use crate::observation::Observation;
 use crate::rig::Rig;
 
@@ -177,14 +178,16 @@ pub fn read_meta(path: &Path) -> Result<TableMeta> {
 pub(super) fn read_fault(path: &Path, e: &std::io::Error) -> Error {
     Error::Table(
         Fault::new(path.display(), format!("it cannot be read ({e})"))
-            .advice("Give a table written by `tracker track`"),
+            .advice("Give a table written by " + TRACK),
     )
 }
 
 pub(super) fn write_fault(path: &Path, e: &std::io::Error) -> Error {
     let advice = match e.kind() {
-        ErrorKind::StorageFull | ErrorKind::QuotaExceeded => "Free some space and run again with --resume",
-        _ => "Choose a folder that can be written",
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded => {
+            "Free some space and run again with " + Setting::Resume
+        }
+        _ => "Choose a folder that can be written".into(),
     };
     Error::Table(Fault::new(path.display(), format!("it cannot be written ({e})")).advice(advice))
 }

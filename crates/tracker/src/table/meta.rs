@@ -12,6 +12,7 @@ use sha2::{Digest, Sha256};
 
 use crate::error::{Error, Fault, Place, Result};
 use crate::frame::{RateOrigin, SourceInfo, TimeBase};
+use crate::message::TRACK;
 use crate::rig::Rig;
 
 /// Version of the table's form. A file with a higher one is refused.
@@ -69,7 +70,7 @@ impl SourceFacts {
             size_bytes: info.size_bytes,
             sha256_first_mib: first_mib(path),
             // Messages name the file as the user did; the table is the same from any folder.
-            warnings: info.warnings.iter().map(|w| w.replace(&info.name, &base)).collect(),
+            warnings: info.warnings.iter().map(|w| w.replace(&info.name, &base).to_string()).collect(),
             name: base,
         }
     }
@@ -153,7 +154,7 @@ impl TableMeta {
             Error::Table(
                 Fault::new(name, format!("it is not JSON ({e})"))
                     .at(Place::Line(e.line() as u64))
-                    .advice("Run `tracker track` again"),
+                    .advice("Run " + TRACK + " again"),
             )
         })?;
         Self::from_value(value, name)
@@ -183,7 +184,7 @@ impl TableMeta {
                         "there is no schema_version: it is no node table, or who wrote it again left its metadata out",
                     )
                     .advice(
-                        "Give the table that `tracker track` wrote; with pyarrow, keep its schema.metadata",
+                        "Give the table that " + TRACK + " wrote; with pyarrow, keep its schema.metadata",
                     ),
                 ));
             }
@@ -191,7 +192,7 @@ impl TableMeta {
         let meta: Self = serde_json::from_value(value).map_err(|e| {
             Error::Table(
                 Fault::new(name, format!("its metadata are not those of a node table ({e})"))
-                    .advice("Run `tracker track` again"),
+                    .advice("Run " + TRACK + " again"),
             )
         })?;
         meta.rig.check(name)?;
@@ -226,7 +227,7 @@ impl TableMeta {
                     Error::Table(
                         Fault::new(name, format!("its metadata are damaged ({e})"))
                             .at(Place::Key(format!("pydpend.{key}")))
-                            .advice("Run `tracker track` again"),
+                            .advice("Run " + TRACK + " again"),
                     )
                 })?
             };

@@ -25,6 +25,7 @@ use super::file::read_fault;
 use super::parquet::KEY_PREFIX;
 use super::{COLUMNS, NodeTable, Rows, STATUS_WORDS, TableMeta, row_fault};
 use crate::error::{Error, Fault, Place, Result};
+use crate::message::TRACK;
 
 pub(super) fn read_meta(path: &Path) -> Result<TableMeta> {
     Ok(open(path)?.2)
@@ -81,7 +82,7 @@ fn open(path: &Path) -> Result<(Shared, ArrowReaderMetadata, TableMeta)> {
     let metadata = ArrowReaderMetadata::load(&file, ArrowReaderOptions::new()).map_err(|e| {
         Error::Table(
             Fault::new(path.display(), format!("it is not a whole Parquet file ({e})"))
-                .advice("It may be cut off: copy it again, or run `tracker track` again"),
+                .advice("It may be cut off: copy it again, or run " + TRACK + " again"),
         )
     })?;
     let name = path.display().to_string();
@@ -96,7 +97,7 @@ fn open(path: &Path) -> Result<(Shared, ArrowReaderMetadata, TableMeta)> {
             let there: Vec<&str> = metadata.schema().fields().iter().map(|f| f.name().as_str()).collect();
             return Err(Error::Table(
                 Fault::new(&name, format!("there is no column {column}, only {}", there.join(", ")))
-                    .advice("Give a node table written by `tracker track`"),
+                    .advice("Give a node table written by " + TRACK),
             ));
         }
     }
@@ -140,7 +141,7 @@ pub(super) fn read(path: &Path) -> Result<NodeTable> {
             Error::Table(
                 Fault::new(&name, format!("row group {g} cannot be read ({e})"))
                     .at(Place::Row(first_rows[g] as u64))
-                    .advice("It is damaged: copy it again, or run `tracker track` again"),
+                    .advice("It is damaged: copy it again, or run " + TRACK + " again"),
             )
         };
         let reader = ParquetRecordBatchReaderBuilder::new_with_metadata(file.clone(), metadata.clone())

@@ -126,7 +126,7 @@ fn variable_rates_and_turns_are_kept() {
         let truth = std::fs::read(&raw).unwrap();
         let mut source = open(turned.to_str().unwrap(), &OpenOptions::default()).unwrap();
         assert_eq!((source.info().width as usize, source.info().height as usize), size);
-        assert!(source.info().warnings.iter().any(|w| w.starts_with("turned")));
+        assert!(source.info().warnings.iter().any(|w| w.to_string().starts_with("turned")));
         let frames = read_all(&mut *source);
         assert_eq!(frames.len(), 10);
         // Luma comes first in each of the program's pictures; what follows is no concern of ours.

@@ -45,6 +45,20 @@ enum Command {
 }
 
 impl Cli {
+    /// The name of the subcommand.
+    pub fn subcommand(&self) -> &'static str {
+        match self.command {
+            Command::Info(_) => "info",
+            Command::Setup(_) => "setup",
+            Command::Track(_) => "track",
+            Command::Overlay(_) => "overlay",
+            Command::Check(_) => "check",
+            Command::Film(_) => "film",
+            Command::Score(_) => "score",
+            Command::Completions(_) => "completions",
+        }
+    }
+
     /// Runs the subcommand.
     pub fn run(self) -> anyhow::Result<ExitCode> {
         match self.command {

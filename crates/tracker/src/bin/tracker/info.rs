@@ -7,7 +7,10 @@ use rayon::prelude::*;
 use serde_json::{Value, json};
 use tracker::brightest::brightest;
 use tracker::frame::{Ending, Frame, FrameSource, PixelFormat, RateOrigin};
-use tracker::source::{Decoder, OpenOptions, open};
+use tracker::source::{OpenOptions, open};
+
+use crate::reading::DecodeArgs;
+use crate::words::CommandLine;
 
 /// Frames whose time stamps are shown.
 const FIRST: usize = 5;
@@ -25,15 +28,11 @@ pub struct Args {
     /// Decode all frames, count them and look for the brightest pixel
     #[arg(long)]
     count: bool,
-    /// Frames per second of recorded time; replaces what the recording says
-    #[arg(long)]
+    /// Frames a second of recorded time, instead of what the recording claims
+    #[arg(long, value_name = "F")]
     fps: Option<f64>,
-    /// Decoder of compressed film
-    #[arg(long, default_value = "auto", value_parser = ["auto", "ffmpeg", "opencv"])]
-    decoder: String,
-    /// Open network addresses and devices too
-    #[arg(long)]
-    allow_protocol: bool,
+    #[command(flatten)]
+    decode: DecodeArgs,
 }
 
 /// What reading some or all frames told.
@@ -48,13 +47,7 @@ struct Seen {
 
 /// Runs the subcommand.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let decoder = match args.decoder.as_str() {
-        "ffmpeg" => Decoder::Ffmpeg,
-        "opencv" => Decoder::Opencv,
-        _ => Decoder::Auto,
-    };
-    let options =
-        OpenOptions { fps: args.fps, decoder, allow_protocol: args.allow_protocol, ..OpenOptions::default() };
+    let options = args.decode.options(args.fps, OpenOptions::default().threads);
     let mut source = open(&args.input, &options)?;
     let seen = look(&mut *source, args.count)?;
     let text = if args.json { format!("{:#}\n", as_json(&*source, &seen)) } else { as_text(&*source, &seen) };
@@ -177,7 +170,7 @@ fn as_text(source: &dyn FrameSource, seen: &Seen) -> String {
         row("end", ending_words(ending));
     }
     for warning in &info.warnings {
-        row("warning", warning.clone());
+        row("warning", CommandLine::of("info").say(warning));
     }
     rows.iter().map(|(word, value)| format!("{word:<14} {value}\n")).collect()
 }
@@ -212,7 +205,7 @@ fn as_json(source: &dyn FrameSource, seen: &Seen) -> Value {
         "first_times_s": seen.times_s,
         "size_bytes": info.size_bytes,
         "details": details,
-        "warnings": info.warnings,
+        "warnings": info.warnings.iter().map(|w| CommandLine::of("info").say(w)).collect::<Vec<_>>(),
         "ending": ending,
     })
 }

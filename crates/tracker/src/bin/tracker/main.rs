@@ -8,23 +8,30 @@ mod completions;
 mod film;
 mod info;
 mod overlay;
+mod reading;
 mod score;
 mod setup;
 mod track;
 mod watch;
+mod words;
 
 use std::process::ExitCode;
 
 use clap::Parser;
+use tracker::error::Error;
 
 fn main() -> ExitCode {
-    match args::Cli::parse().run() {
+    let cli = args::Cli::parse();
+    let front = words::CommandLine::of(cli.subcommand());
+    match cli.run() {
         Ok(status) => status,
         // Whoever reads our output may stop reading it.
         Err(error) if error.downcast_ref().is_some_and(is_closed) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("tracker: {error:#}");
-            let interrupted = matches!(error.downcast_ref(), Some(tracker::error::Error::Interrupted));
+            let known: Option<&Error> = error.downcast_ref();
+            let said = known.map_or_else(|| format!("{error:#}"), |known| front.say(&known.message()));
+            eprintln!("tracker: {said}");
+            let interrupted = matches!(known, Some(Error::Interrupted));
             ExitCode::from(if interrupted { 130 } else { 2 })
         }
     }

@@ -9,6 +9,7 @@ use tracker::overlay::{self, FilmSettings};
 use tracker::source::OpenOptions;
 use tracker::table::read_table;
 
+use crate::reading::DecodeArgs;
 use crate::watch::Watch;
 
 /// Draw nodes, names, bodies, trails and gaps into the recording
@@ -33,6 +34,8 @@ pub struct Args {
     /// Width of the film, even; the recording's if not given
     #[arg(long, value_name = "PX")]
     width: Option<u32>,
+    #[command(flatten)]
+    decode: DecodeArgs,
     /// Replace the film if it is there already
     #[arg(long)]
     force: bool,
@@ -52,7 +55,14 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         width: args.width,
         replace: args.force,
     };
-    overlay::film(&args.input, &OpenOptions::default(), &table, &args.output, &settings, &mut watch)?;
+    overlay::film(
+        &args.input,
+        &args.decode.options(None, OpenOptions::default().threads),
+        &table,
+        &args.output,
+        &settings,
+        &mut watch,
+    )?;
     watch.finish();
     Ok(ExitCode::SUCCESS)
 }

@@ -8,10 +8,11 @@ use std::process::ExitCode;
 
 use tracker::error::{Error, Fault};
 use tracker::pipeline::RunSettings;
-use tracker::source::OpenOptions;
 use tracker::{overlay, setup};
 
+use crate::reading::FollowArgs;
 use crate::watch::Watch;
+use crate::words::CommandLine;
 
 /// Find markers, bodies and joints of a recording and write them as a rig file to be edited
 #[derive(Debug, clap::Args)]
@@ -24,9 +25,8 @@ pub struct Args {
     /// The reference frame with all that was found drawn into it; beside the rig file if not given
     #[arg(long, value_name = "PICTURE.png")]
     picture: Option<PathBuf>,
-    /// Frames a second of recorded time, instead of what the recording claims
-    #[arg(long, value_name = "F")]
-    fps: Option<f64>,
+    #[command(flatten)]
+    follow: FollowArgs,
     /// Replace files that are there already
     #[arg(long)]
     force: bool,
@@ -40,16 +40,15 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let picture = args.picture.clone().unwrap_or_else(|| args.output.with_extension("png"));
     for path in [&args.output, &picture] {
         if path.exists() && !args.force {
-            return Err(Error::Rig(
-                Fault::new(path.display(), "it is there already")
-                    .advice("Choose another name, or replace it with --force"),
-            )
-            .into());
+            return Err(Error::Rig(Fault::exists(path)).into());
         }
     }
     let settings = RunSettings {
         input: args.input,
-        open: OpenOptions { fps: args.fps, ..OpenOptions::default() },
+        open: args.follow.open(),
+        frames: args.follow.frames.clone(),
+        detect: args.follow.detect(),
+        threads: args.follow.threads,
         ..RunSettings::default()
     };
     let mut watch = Watch::new(args.quiet)?;
@@ -61,7 +60,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         Error::Rig(Fault::new(args.output.display(), format!("the rig file cannot be written ({e})")))
     })?;
     for warning in &found.warnings {
-        eprintln!("tracker: note: {warning}");
+        eprintln!("tracker: note: {}", CommandLine::of("setup").say(warning));
     }
     if !args.quiet {
         let mut out = std::io::stdout();

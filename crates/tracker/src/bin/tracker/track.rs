@@ -3,17 +3,17 @@
 //! Owns: its arguments, what is said of the result. Must not: do any of the work; `pipeline::run` does.
 
 use std::io::Write;
-use std::ops::Range;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use tracker::detect::{Centroid, DetectSettings, Polarity, Threshold};
+use tracker::detect::{Centroid, DetectSettings};
 use tracker::pipeline::{Existing, RunSettings, RunSummary, run as run_pipeline};
 use tracker::rig::Rig;
-use tracker::source::{Decoder, OpenOptions};
 use tracker::table::RunEnding;
 
+use crate::reading::FollowArgs;
 use crate::watch::Watch;
+use crate::words::CommandLine;
 
 /// Follow the markers of a recording and write a node table
 #[derive(Debug, clap::Args)]
@@ -26,30 +26,11 @@ pub struct Args {
     /// Nodes, bodies and joints, as `tracker setup` writes them; found in the recording if not given
     #[arg(long, value_name = "RIG.toml")]
     rig: Option<PathBuf>,
-    /// Frames a second of recorded time, instead of what the recording claims
-    #[arg(long, value_name = "F")]
-    fps: Option<f64>,
-    /// Frames to follow, from A up to but not B; either may be left out
-    #[arg(long, value_name = "A..B", value_parser = frames)]
-    frames: Option<Range<u64>>,
-    /// Threshold in the recording's units, or `auto`
-    #[arg(long, default_value = "auto", value_name = "auto|N", value_parser = threshold, allow_hyphen_values = true)]
-    threshold: Threshold,
-    /// Whether markers are brighter or darker than what is around them
-    #[arg(long, default_value = "auto", value_enum)]
-    polarity: PolarityArg,
     /// How a centre is taken: by intensity, or by OpenCV's contours as in the paper
     #[arg(long, default_value = "weighted", value_enum)]
     centroid: CentroidArg,
-    /// What reads compressed film
-    #[arg(long, default_value = "auto", value_enum)]
-    decoder: DecoderArg,
-    /// Open network addresses and devices too
-    #[arg(long)]
-    allow_protocol: bool,
-    /// Threads; 0 is one for each core. The table is the same for any number
-    #[arg(long, default_value_t = 0, value_name = "N")]
-    threads: usize,
+    #[command(flatten)]
+    follow: FollowArgs,
     /// Go on where an earlier run stopped
     #[arg(long, conflicts_with = "force")]
     resume: bool,
@@ -65,43 +46,9 @@ pub struct Args {
 }
 
 #[derive(Debug, Clone, Copy, clap::ValueEnum)]
-enum PolarityArg {
-    Auto,
-    Bright,
-    Dark,
-}
-
-#[derive(Debug, Clone, Copy, clap::ValueEnum)]
 enum CentroidArg {
     Weighted,
     Contour,
-}
-
-#[derive(Debug, Clone, Copy, clap::ValueEnum)]
-enum DecoderArg {
-    Auto,
-    Ffmpeg,
-    Opencv,
-}
-
-/// `A..B`, `A..` or `..B`.
-fn frames(text: &str) -> Result<Range<u64>, String> {
-    let form = "expected A..B, for example 0..1000";
-    let (start, end) = text.split_once("..").ok_or(form)?;
-    let number = |t: &str, none: u64| {
-        if t.is_empty() { Ok(none) } else { t.parse().map_err(|_| format!("{t:?} is not a frame; {form}")) }
-    };
-    Ok(number(start, 0)?..number(end, u64::MAX)?)
-}
-
-fn threshold(text: &str) -> Result<Threshold, String> {
-    if text == "auto" {
-        return Ok(Threshold::Auto);
-    }
-    match text.parse::<f64>() {
-        Ok(value) if value.is_finite() => Ok(Threshold::Raw(value)),
-        _ => Err("expected auto or a number in the recording's units".into()),
-    }
 }
 
 impl Args {
@@ -116,31 +63,16 @@ impl Args {
             },
             collect: false,
             rig: self.rig.as_deref().map(Rig::read).transpose()?,
-            open: OpenOptions {
-                fps: self.fps,
-                decoder: match self.decoder {
-                    DecoderArg::Auto => Decoder::Auto,
-                    DecoderArg::Ffmpeg => Decoder::Ffmpeg,
-                    DecoderArg::Opencv => Decoder::Opencv,
-                },
-                allow_protocol: self.allow_protocol,
-                threads: self.threads,
-            },
-            frames: self.frames.clone(),
+            open: self.follow.open(),
+            frames: self.follow.frames.clone(),
             detect: DetectSettings {
-                threshold: self.threshold,
-                polarity: match self.polarity {
-                    PolarityArg::Auto => Polarity::Auto,
-                    PolarityArg::Bright => Polarity::Bright,
-                    PolarityArg::Dark => Polarity::Dark,
-                },
                 centroid: match self.centroid {
                     CentroidArg::Weighted => Centroid::Weighted,
                     CentroidArg::Contour => Centroid::Contour,
                 },
-                ..DetectSettings::default()
+                ..self.follow.detect()
             },
-            threads: self.threads,
+            threads: self.follow.threads,
         })
     }
 }
@@ -150,9 +82,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let mut watch = Watch::new(args.quiet)?;
     let summary = run_pipeline(&args.settings()?, &mut watch)?;
     watch.finish();
+    let front = CommandLine::of("track");
     if !args.quiet {
         for warning in &summary.warnings {
-            eprintln!("tracker: note: {warning}");
+            eprintln!("tracker: note: {}", front.say(warning));
         }
     }
     let lost = summary.lost();
@@ -197,7 +130,7 @@ fn print_json(args: &Args, summary: &RunSummary, status: u8) -> anyhow::Result<(
         "resumed_frames": summary.resumed,
         "lost": summary.lost(),
         "nodes": summary.nodes,
-        "warnings": summary.warnings,
+        "warnings": summary.warnings.iter().map(|w| CommandLine::of("track").say(w)).collect::<Vec<_>>(),
         "source": summary.meta.source,
     });
     ignore_closed(writeln!(std::io::stdout(), "{}", serde_json::to_string_pretty(&value)?))

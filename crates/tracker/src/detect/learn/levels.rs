@@ -15,6 +15,7 @@ use crate::detect::settings::{DetectSettings, Polarity, Threshold};
 use crate::detect::side::Side;
 use crate::error::{Error, Fault, Place, Result};
 use crate::frame::Frame;
+use crate::message::{INFO, Setting};
 
 /// Frames that are looked at; more would change nothing.
 const MOST_FRAMES: usize = 12;
@@ -51,7 +52,7 @@ impl Levels {
         let Some(known) = first else {
             return Err(Error::Detect(
                 Fault::new("recording", "none of its sample frames could be decoded")
-                    .advice("Look at it with `tracker info`"),
+                    .advice("Look at it with " + INFO),
             ));
         };
         let (width, height) = (known.width as usize, known.height as usize);
@@ -70,7 +71,7 @@ impl Levels {
             && !(t > 0.0 && t <= top)
         {
             return Err(Error::Detect(
-                Fault::new("threshold", format!("{t} is outside the recording's range, 1 to {top}"))
+                Fault::of(Setting::Threshold, format!("{t} is outside the recording's range, 1 to {top}"))
                     .advice("It is in raw units of the recording"),
             ));
         }

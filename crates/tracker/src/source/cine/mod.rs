@@ -12,6 +12,7 @@ use super::ffmpeg::FfmpegSource;
 use super::{Input, OpenOptions};
 use crate::error::{Error, Fault, Result};
 use crate::frame::{Ending, Frame, FrameSource, RateOrigin, SourceInfo, TimeBase};
+use crate::message::Setting;
 use header::{Header, TICKS_PER_S};
 
 /// A Phantom recording.
@@ -55,16 +56,19 @@ impl CineSource {
                 if let Some(header_rate) = header.rate_hz.filter(|h| (h / rate - 1.0).abs() > 0.01) {
                     info.warnings.push(format!(
                         "the header says {header_rate} frames per second, the time stamps {rate:.1}: frames were skipped when it was saved; the stamps are used"
-                    ));
+                    ).into());
                 }
                 if !stamps.replaced.is_empty() {
                     let some: Vec<String> = stamps.replaced.iter().take(5).map(u64::to_string).collect();
-                    info.warnings.push(format!(
-                        "{} time stamps make no sense and were replaced (frames {}{})",
-                        stamps.replaced.len(),
-                        some.join(", "),
-                        if stamps.replaced.len() > some.len() { ", ..." } else { "" }
-                    ));
+                    info.warnings.push(
+                        format!(
+                            "{} time stamps make no sense and were replaced (frames {}{})",
+                            stamps.replaced.len(),
+                            some.join(", "),
+                            if stamps.replaced.len() > some.len() { ", ..." } else { "" }
+                        )
+                        .into(),
+                    );
                 }
                 Some((stamps.ticks, stamps.step))
             }
@@ -77,7 +81,7 @@ impl CineSource {
                     None => {
                         info.time_base = TimeBase { numerator: 1, denominator: 1 };
                         info.rate_origin = RateOrigin::Unknown;
-                        info.warnings.push("the header gives no rate; give it with --fps".to_owned());
+                        info.warnings.push("the header gives no rate; give it with " + Setting::Fps);
                     }
                 }
                 info.rate_hz = header.rate_hz;
@@ -86,8 +90,7 @@ impl CineSource {
         };
         if header.compression == 256 {
             info.warnings.push(
-                "10-bit packed samples are the camera's compressed scale, not proportional to light"
-                    .to_owned(),
+                "10-bit packed samples are the camera's compressed scale, not proportional to light".into(),
             );
         }
         let mut say = |word: &str, value: Option<String>| {

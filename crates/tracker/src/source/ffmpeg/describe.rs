@@ -9,6 +9,7 @@ use super::demux::Demuxer;
 use super::layout::{Layout, Orientation};
 use crate::error::{Error, Fault, Result};
 use crate::frame::{RateOrigin, SourceInfo, TimeBase};
+use crate::message::Message;
 use crate::source::{OpenOptions, clock};
 
 /// What is known of a recording before any of it is decoded, and how its pictures are to be turned.
@@ -97,7 +98,7 @@ fn size(parameters: &ffi::AVCodecParameters, name: &str) -> Result<(u32, u32)> {
 }
 
 /// How the container says that pictures are to be turned.
-fn turn(demuxer: &Demuxer, warnings: &mut Vec<String>) -> Orientation {
+fn turn(demuxer: &Demuxer, warnings: &mut Vec<Message>) -> Orientation {
     let mut size = 0usize;
     // SAFETY: the stream is valid, and the data it gives lives as long as the stream.
     let data = unsafe {
@@ -116,13 +117,12 @@ fn turn(demuxer: &Demuxer, warnings: &mut Vec<String>) -> Orientation {
     match orientation {
         Some(o) => {
             if let Some(words) = o.words() {
-                warnings.push(format!("turned as the file says: {words}"));
+                warnings.push(format!("turned as the file says: {words}").into());
             }
             o
         }
         None => {
-            warnings
-                .push("the file asks for a turn that is not by a right angle; it is not turned".to_owned());
+            warnings.push("the file asks for a turn that is not by a right angle; it is not turned".into());
             Orientation::default()
         }
     }

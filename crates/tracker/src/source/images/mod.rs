@@ -14,6 +14,7 @@ use rayon::prelude::*;
 use super::{OpenOptions, clock};
 use crate::error::{Error, Fault, Result};
 use crate::frame::{Ending, Frame, FrameSource, PixelFormat, RateOrigin, SourceInfo, TimeBase};
+use crate::message::{Message, Setting};
 use picture::Picture;
 pub use stack::StackSource;
 
@@ -32,11 +33,11 @@ pub struct SequenceSource {
 }
 
 /// Time base, rate and its origin for pictures, which have no times of their own.
-fn rate(options: &OpenOptions, warnings: &mut Vec<String>) -> Result<(TimeBase, Option<f64>, RateOrigin)> {
+fn rate(options: &OpenOptions, warnings: &mut Vec<Message>) -> Result<(TimeBase, Option<f64>, RateOrigin)> {
     match options.fps {
         Some(fps) => Ok((clock::time_base(fps)?, Some(fps), RateOrigin::User)),
         None => {
-            warnings.push("pictures have no rate; times are frame numbers. Give it with --fps".to_owned());
+            warnings.push("pictures have no rate; times are frame numbers. Give it with " + Setting::Fps);
             Ok((TimeBase { numerator: 1, denominator: 1 }, None, RateOrigin::Unknown))
         }
     }

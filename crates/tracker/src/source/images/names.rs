@@ -7,6 +7,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Fault, Result};
+use crate::message::Message;
 
 /// Endings of files that are taken for pictures.
 const ENDINGS: [&str; 7] = ["png", "tif", "tiff", "bmp", "pgm", "jpg", "jpeg"];
@@ -17,7 +18,7 @@ pub struct Numbered {
     /// Files, and gaps between them.
     pub files: Vec<Option<PathBuf>>,
     /// What is odd about the numbering.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Message>,
 }
 
 /// Whether a name is a pattern: a glob, or printf's `%d`.
@@ -117,14 +118,14 @@ fn gaps(names: &[String]) -> Numbered {
         Numbered { files: names.iter().map(|n| Some(PathBuf::from(n))).collect(), warnings: vec![] };
     let Some(numbers) = names.iter().map(number).collect::<Option<Vec<u64>>>() else {
         if names.len() > 1 {
-            out.warnings.push("some names hold no number; pictures are in order of their names".to_owned());
+            out.warnings.push("some names hold no number; pictures are in order of their names".into());
         }
         return out;
     };
     let steps: Vec<u64> = numbers.windows(2).map(|w| w[1].saturating_sub(w[0])).collect();
     let Some(step) = steps.iter().copied().min() else { return out };
     if step == 0 {
-        out.warnings.push("numbers in the names do not rise; gaps cannot be seen".to_owned());
+        out.warnings.push("numbers in the names do not rise; gaps cannot be seen".into());
         return out;
     }
     let left_out: u64 = steps.iter().map(|s| s.div_ceil(step) - 1).fold(0, u64::saturating_add);
@@ -136,12 +137,13 @@ fn gaps(names: &[String]) -> Numbered {
     if left_out > names.len() as u64 || steps.iter().any(|s| s % step != 0) {
         out.warnings.push(format!(
             "numbers in the names are not evenly spaced ({place}); pictures are taken as evenly spaced in time"
-        ));
+        ).into());
         return out;
     }
-    out.warnings.push(format!(
-        "{left_out} pictures are missing by their numbers, {place}; their frames are kept empty"
-    ));
+    out.warnings.push(
+        format!("{left_out} pictures are missing by their numbers, {place}; their frames are kept empty")
+            .into(),
+    );
     out.files.clear();
     for (i, name) in names.iter().enumerate() {
         let gap = if i == 0 { 0 } else { steps[i - 1] / step - 1 };
@@ -238,7 +240,7 @@ mod tests {
             gap.files.iter().map(Option::is_some).collect::<Vec<_>>(),
             [true, true, false, false, true]
         );
-        assert!(gap.warnings[0].contains("2 pictures are missing"), "{:?}", gap.warnings);
+        assert!(gap.warnings[0].to_string().contains("2 pictures are missing"), "{:?}", gap.warnings);
         let tens = gaps(&names(&["f0.png", "f10.png", "f20.png"]));
         assert_eq!((tens.files.len(), tens.warnings.len()), (3, 0));
         let times = gaps(&names(&["f1.png", "f2.png", "f1000000000.png"]));

@@ -50,7 +50,7 @@ pub fn parse(bytes: &[u8], name: &str) -> Result<Header> {
     let body = &bytes[begin..];
     let mut warnings = Vec::new();
     let end = find(body, CLOSE).map(|e| e + CLOSE.len()).unwrap_or_else(|| {
-        warnings.push("the header has no end; what it holds up to there is used".to_owned());
+        warnings.push("the header has no end; what it holds up to there is used".into());
         body.len()
     });
     let values = elements(&String::from_utf8_lossy(&body[..end]));

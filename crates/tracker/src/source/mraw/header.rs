@@ -6,6 +6,7 @@ use super::super::clock;
 use super::{cih, cihx};
 use crate::error::{Error, Fault, Place, Result};
 use crate::frame::{PixelFormat, TimeBase};
+use crate::message::Message;
 
 /// Where the significant bits of a sample lie in its 16 bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -53,7 +54,7 @@ pub struct Header {
     /// The user's comment.
     pub comment: Option<String>,
     /// Entries that make no sense and were not used.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Message>,
 }
 
 /// How frames lie in the pixel file.
@@ -111,7 +112,7 @@ impl Header {
     pub(super) fn of<'a>(
         names: &Names,
         get: impl Fn(&str) -> Option<&'a str>,
-        mut warnings: Vec<String>,
+        mut warnings: Vec<Message>,
         name: &str,
     ) -> Result<Self> {
         let get = |key: &str| get(key).map(str::trim).filter(|v| !v.is_empty());
@@ -134,7 +135,7 @@ impl Header {
         };
         let save_step = step.unwrap_or(1);
         if save_step < 1 {
-            warnings.push(format!("{}: {save_step} makes no sense; taken as 1", names.save_step));
+            warnings.push(format!("{}: {save_step} makes no sense; taken as 1", names.save_step).into());
         }
         let higher = get(names.side).is_some_and(|s| s.eq_ignore_ascii_case("higher"));
         let recorded = names.recorded.into_iter().filter_map(get).collect::<Vec<_>>().join(" ");
@@ -246,7 +247,7 @@ impl Header {
 }
 
 /// A whole number of a header, which may be written `75.0`, or a note that it is none.
-fn number(key: &str, text: &str, warnings: &mut Vec<String>) -> Option<i64> {
+fn number(key: &str, text: &str, warnings: &mut Vec<Message>) -> Option<i64> {
     let whole = text.parse::<i128>().ok().or_else(|| {
         // Above 2^53 a float no longer counts in ones.
         let value = text.parse::<f64>().ok()?;
@@ -254,20 +255,20 @@ fn number(key: &str, text: &str, warnings: &mut Vec<String>) -> Option<i64> {
     });
     let value = whole.and_then(|v| i64::try_from(v).ok());
     if value.is_none() {
-        warnings.push(format!("{key}: {text:?} is not a number that makes sense; not used"));
+        warnings.push(format!("{key}: {text:?} is not a number that makes sense; not used").into());
     }
     value
 }
 
 /// A number that may be a fraction such as `1/15371`.
-fn fraction(key: &str, text: &str, warnings: &mut Vec<String>) -> Option<f64> {
+fn fraction(key: &str, text: &str, warnings: &mut Vec<Message>) -> Option<f64> {
     let value = match text.split_once('/') {
         Some((a, b)) => a.trim().parse::<f64>().ok().zip(b.trim().parse::<f64>().ok()).map(|(a, b)| a / b),
         None => text.parse::<f64>().ok(),
     };
     let value = value.filter(|v| v.is_finite() && *v > 0.0);
     if value.is_none() {
-        warnings.push(format!("{key}: {text:?} is not a number above 0; not used"));
+        warnings.push(format!("{key}: {text:?} is not a number above 0; not used").into());
     }
     value
 }

@@ -18,6 +18,7 @@ use memmap2::{Advice, Mmap, MmapOptions};
 use super::{OpenOptions, clock};
 use crate::error::{Error, Fault, Result};
 use crate::frame::{Bytes, Ending, Frame, FrameSource, PixelFormat, RateOrigin, SourceInfo, TimeBase};
+use crate::message::Setting;
 use header::{Header, Packing};
 
 /// Bytes mapped at a time: what was read is given back, so memory does not grow with the recording.
@@ -126,15 +127,21 @@ impl MrawSource {
         let mut info = info(name, &header, &packing, options)?;
         info.size_bytes = Some(size);
         match header.total_frames {
-            Some(n) if n > there => info.warnings.push(format!(
-                "the header declares {n} frames ({} bytes), the file holds {there} ({size} bytes)",
-                u128::from(n) * u128::from(packing.frame_bytes)
-            )),
-            Some(_) if size > frames * packing.frame_bytes => info.warnings.push(format!(
-                "the file has {} bytes more than the frames that its header declares; they are not read",
-                size - frames * packing.frame_bytes
-            )),
-            None => info.warnings.push("the header does not say how many frames there are".to_owned()),
+            Some(n) if n > there => info.warnings.push(
+                format!(
+                    "the header declares {n} frames ({} bytes), the file holds {there} ({size} bytes)",
+                    u128::from(n) * u128::from(packing.frame_bytes)
+                )
+                .into(),
+            ),
+            Some(_) if size > frames * packing.frame_bytes => info.warnings.push(
+                format!(
+                    "the file has {} bytes more than the frames that its header declares; they are not read",
+                    size - frames * packing.frame_bytes
+                )
+                .into(),
+            ),
+            None => info.warnings.push("the header does not say how many frames there are".into()),
             Some(_) => {}
         }
         Ok(Self { info, file, packing, frames, next: 0, window: None, ending: Ending::Complete })
@@ -209,12 +216,12 @@ fn info(name: &str, header: &Header, packing: &Packing, options: &OpenOptions) -
         (Some(fps), _) => (clock::time_base(fps)?, RateOrigin::User),
         (None, Some(base)) => (base, RateOrigin::CameraHeader),
         (None, None) => {
-            warnings.push("the header gives no rate; give it with --fps".to_owned());
+            warnings.push("the header gives no rate; give it with " + Setting::Fps);
             (TimeBase { numerator: 1, denominator: 1 }, RateOrigin::Unknown)
         }
     };
     if header.color_type.as_deref().is_some_and(|c| c.eq_ignore_ascii_case("bayer")) {
-        warnings.push("the sensor has a colour mosaic; its samples are taken as brightness".to_owned());
+        warnings.push("the sensor has a colour mosaic; its samples are taken as brightness".into());
     }
     let mut details: Vec<(String, String)> = Vec::new();
     let mut say = |word: &str, value: Option<String>| details.extend(value.map(|v| (word.to_owned(), v)));

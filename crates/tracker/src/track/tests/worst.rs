@@ -298,12 +298,12 @@ fn a_rig_is_put_together_where_no_frame_shows_all() {
             "{seed}"
         );
         assert!(
-            found.warnings.iter().any(|w| w.contains("no frame shows every marker")),
+            found.warnings.iter().any(|w| w.to_string().contains("no frame shows every marker")),
             "{:?}",
             found.warnings
         );
         assert!(
-            found.warnings.iter().any(|w| w.contains("6 bright places stand still")),
+            found.warnings.iter().any(|w| w.to_string().contains("6 bright places stand still")),
             "{:?}",
             found.warnings
         );

@@ -1,0 +1,115 @@
+"""What the library says, in the words of the command line: settings are flags, steps are commands to type.
+
+Also what is said of words on the command line that are not known: the nearest that are, and new names of old options.
+"""
+
+from __future__ import annotations
+
+import argparse
+import difflib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from pydpend.errors import Setting, Step, listed
+
+FLAGS = {"predict": "prediction", "compare": "comparison"}
+"""Keywords of Python whose flag has another name."""
+
+VALUES: Mapping[tuple[str, object], str] = {("ratios", True): "free", ("ratios", False): "fixed"}
+"""Values that are words on the command line and truth values in Python."""
+
+UNITS = ("_s", "_deg", "_rad")
+"""Units that a keyword ends in and its flag may not."""
+
+
+def flags_of(keyword: str) -> tuple[str, ...]:
+    """The flags that a keyword may have: ``start_s`` has ``--start-s`` or ``--start``."""
+    name = FLAGS.get(keyword, keyword)
+    bare = next((name.removesuffix(unit) for unit in UNITS if name.endswith(unit)), name)
+    return tuple(dict.fromkeys(f"--{n.replace('_', '-')}" for n in (name, bare)))
+
+
+class CommandLine:
+    """The program ``pydpend`` at a command. A setting that the command has not is named with one that has it."""
+
+    def __init__(self, commands: Mapping[str, argparse.ArgumentParser], command: str) -> None:
+        self._commands = {command: commands[command], **commands}
+        self._command = command
+
+    def setting(self, setting: Setting) -> str:
+        """``--method energy``."""
+        owner, flag = self._owner(setting.name)
+        if isinstance(setting.value, bool) and (setting.name, setting.value) not in VALUES:
+            said = flag if setting.value else f"--no-{flag.removeprefix('--')}"
+        elif setting.value is None:
+            said = flag
+        else:
+            said = f"{flag} {VALUES.get((setting.name, setting.value), setting.value)}"
+        return said if owner == f"pydpend {self._command}" else f"{said} (of `{owner}`)"
+
+    def step(self, step: Step) -> str:
+        """What to type."""
+        return f"`{step.command}`"
+
+    def _owner(self, keyword: str) -> tuple[str, str]:
+        """The command that has the flag of a keyword, this one if it can be, and the flag."""
+        for command, parser in self._commands.items():
+            named = [a.option_strings[-1] for a in parser._actions if a.dest == keyword and a.option_strings]
+            for flag in (*named, *flags_of(keyword)):
+                if flag in options_of(parser):
+                    return f"pydpend {command}", flag
+        return "tracker track", flags_of(keyword)[0]
+
+
+def options_of(parser: argparse.ArgumentParser) -> list[str]:
+    """All flags of a command."""
+    return [flag for action in parser._actions for flag in action.option_strings]
+
+
+@dataclass(frozen=True)
+class Renamed:
+    """An option's new name, and what else is new about it; then the old one is refused and not taken."""
+
+    flag: str
+    also: str = ""
+
+
+RENAMED: Mapping[str, Mapping[str, Renamed]] = {
+    "angles": {"--method": Renamed("--estimator")},
+    "analyse": {"--encoder-column": Renamed("--column")},
+    "fit": {"--hanging-rad": Renamed("--hanging", "in degrees")},
+    "predict": {"--hanging-rad": Renamed("--hanging", "in degrees")},
+    "animate": {"--fps": Renamed("--play-fps")},
+}
+"""Old names of options, by command."""
+
+ELSEWHERE = {
+    name: f"tracker {name}" for name in ("info", "setup", "track", "overlay", "check", "film", "score")
+}
+"""Commands of the other program."""
+
+
+def unknown_command(word: str, known: Iterable[str]) -> str:
+    """What to say of a command that is none."""
+    if word in ELSEWHERE:
+        return f"{word!r} is a command of the program tracker. Type `{ELSEWHERE[word]}`"
+    near = difflib.get_close_matches(word.lower(), list(known), 1, 0.6)
+    advice = f"Did you mean {near[0]}?" if near else f"Give {listed(known)}"
+    return f"{word!r} is not a command. {advice}"
+
+
+def unknown_option(word: str, command: str, commands: Mapping[str, argparse.ArgumentParser]) -> str:
+    """What to say of an option that a command has not."""
+    flag = word.partition("=")[0]
+    flags = options_of(commands[command])
+    near = difflib.get_close_matches(flag.lower(), flags, 1, 0.7) or [
+        f for f in flags if len(flag) > 3 and f.startswith(flag)
+    ]
+    others = [name for name, parser in commands.items() if flag in options_of(parser)]
+    if others:
+        there = listed(f"`pydpend {name}`" for name in others)
+        near_words = f"; did you mean {near[0]}?" if near else ""
+        return f"{flag}: is not an option of `pydpend {command}` but of {there}{near_words}"
+    if near:
+        return f"{flag}: is not an option of `pydpend {command}`. Did you mean {near[0]}?"
+    return f"{flag}: is not an option of `pydpend {command}`. See `pydpend {command} --help`"
