@@ -70,7 +70,7 @@ def test_wrapped_angles_are_refused_and_unwrapped_on_request(tmp_path: Path) -> 
         ("time_s,angle\n0,1\n", "no column phi1_rad"),
         ("seconds,phi1_rad\n0,1\n", "no column time_s.*The columns are seconds, phi1_rad"),
         ("time_s,phi1_rad\n0,1\n1,oops\n", "line 3, column phi1_rad: 'oops' is not a number"),
-        ("time_s,phi1_rad\n0,1\n1\n", "line 3: there are 1 fields"),
+        ("time_s,phi1_rad\n0,1\n1\n", "line 3: 1 fields parted by commas, the header in line 1 has 2"),
         ("time_s,phi1_rad\n0,1\n2,1\n1,1\n", "line 4, column time_s.*does not come after"),
         ("time_s,phi1_rad\n0,1\n,1\n", "line 3, column time_s.*not a number"),
         ("time_s,phi1_rad\n0,inf\n", "line 2, column phi1_rad.*infinite"),

@@ -202,7 +202,7 @@ def replaced(
         (
             lambda lines: [*lines[:100], "0.2", *lines[101:]],
             2,
-            "daq.csv, line 101: there are 1 fields, the header has 2",
+            "daq.csv, line 101: 1 fields parted by commas, the header in line 1 has 2",
         ),
     ],
 )

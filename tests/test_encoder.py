@@ -100,7 +100,7 @@ def test_calibration_there_and_back(tmp_path: Path) -> None:
     assert again.to_json() == found.to_json()
     assert json.loads(found.to_json())["volts_per_turn"] == pytest.approx(0.65, rel=1e-4)
     (tmp_path / "bad.json").write_text('{"offset_v": 5}')
-    with pytest.raises(EncoderError, match=r"bad.json: it is not a calibration"):
+    with pytest.raises(EncoderError, match=r"bad.json: there is no key holds. Make one with"):
         read_calibration(tmp_path / "bad.json")
     with pytest.raises(EncoderError, match="cannot be read"):
         read_calibration(tmp_path / "none.json")
@@ -262,7 +262,7 @@ def test_other_files_say_the_same(tmp_path: Path) -> None:
         read_encoder(tmp_path / "e.tdms", column="trigger")
     with pytest.raises(EncoderError, match="0 channels are called 'volts'"):
         read_encoder(tmp_path / "e.tdms", column="volts")
-    with pytest.raises(EncoderError, match="does not hold numbers"):
+    with pytest.raises(EncoderError, match="holds text, not numbers"):
         read_encoder(tmp_path / "e.tdms", column="label", rate_hz=1.0)
     with TdmsWriter(tmp_path / "h.tdms") as writer:
         writer.write_segment([ChannelObject("DAQ", "voltage_v", signal.value, {"wf_increment": 0.002})])

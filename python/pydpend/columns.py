@@ -1,13 +1,11 @@
 """Named columns of numbers out of a CSV or Parquet file, with errors that name file, line and column.
 
-Owns: finding the header, the delimiter and the wanted columns, turning text into numbers. Knows nothing of
-what the numbers mean: :mod:`pydpend.angles` and :mod:`pydpend.encoder` do.
+Owns: reading the named columns of a table, Parquet or text, into float64. Knows nothing of what the numbers mean:
+:mod:`pydpend.angles` and :mod:`pydpend.encoder` do. How text is taken apart is :mod:`pydpend.delimited`'s.
 """
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,13 +15,16 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from pydpend.errors import PydpendError, fault
+from pydpend.delimited import Cells, Numbers, names_on_first_line, take_apart
+from pydpend.documents import read_bytes, unreadable
+from pydpend.errors import Message, PydpendError, fault
+from pydpend.instants import NotInstants, is_instant, seconds_of_arrow, seconds_of_text
 
-_EMPTY = frozenset({"", "nan", "na", "n/a", "null", "none"})
-"""Fields (lower case, stripped) that mean "no value"."""
+PARQUET_FAULTS = (pa.ArrowException, OSError, UnicodeDecodeError, KeyError, MemoryError, OverflowError)
+"""What pyarrow raises for a Parquet file that is damaged."""
 
-_HEADER_WITHIN = 200
-"""A header is looked for in this many lines: loggers write some lines of notes before it."""
+_FIRST_LINE_BYTES = 1 << 16
+"""More than the names of any table's columns."""
 
 
 @dataclass(frozen=True)
@@ -32,6 +33,7 @@ class Columns:
 
     ``values[name]`` is a float64 array of shape (R,), NaN where the file has no value. ``lines`` (R,) is each
     row's line in the text file, from 1, or ``None`` for Parquet. ``header`` is every column name of the file.
+    ``first_stamp`` is the date and time from which the seconds of a column of dates are counted, "" without one.
     """
 
     source: str
@@ -39,6 +41,7 @@ class Columns:
     values: dict[str, NDArray[np.float64]]
     lines: NDArray[np.int64] | None
     metadata: dict[str, str]
+    first_stamp: str = ""
 
     def place(self, row: int, column: str = "") -> str:
         """Where a row is, for a message: ``line 12, column voltage_v`` or ``row 11, column voltage_v``."""
@@ -54,52 +57,114 @@ class Columns:
 def read_columns(
     path: Path,
     required: Sequence[str],
-    optional: Sequence[str] = (),
+    optional: Sequence[str] | None = (),
     *,
     error: type[PydpendError],
+    time: str | None = None,
 ) -> Columns:
     """Reads the named columns of a Parquet file (by its first four bytes) or else of a delimited text file.
 
-    In text the header is the first line that holds every required name, so notes above it do no harm, nor does a
-    line of units below it. The delimiter is comma, semicolon or tab, with a decimal comma allowed between
-    semicolons or tabs. An empty field, ``nan``, ``null`` or ``n/a`` is NaN.
+    ``optional`` columns may be missing; ``None`` takes every column there is. The column ``time`` may hold dates, times
+    of day or durations: dates become seconds from the first, the others seconds.
 
-    Raises ``error`` naming file, line and column: no such file, no header with these names, a name twice, a
-    line with too few fields, a field that is not a number.
+    In text the header is the first line that holds every required name, so notes above it do no harm, nor does a
+    line of units below it, nor lines that begin with ``#``, ``%`` or ``//``. Fields are parted by commas, semicolons,
+    tabs or, where none of these part the header, by spaces. A decimal comma is read where it cannot be anything else.
+    An empty field, ``nan``, ``null`` or ``n/a`` is NaN.
+
+    Raises ``error`` naming file, line and column: no such file, no header with these names, a name twice, a line with
+    another number of fields than the header, a field that is not a number or may be two different ones.
     """
-    name = str(path)
-    try:
-        data = path.read_bytes()
-    except OSError as problem:
-        raise error(
-            fault(name, f"the file cannot be read ({problem.strerror})", "Check the path")
-        ) from problem
+    data = read_bytes(path, error)
     if data[:4] == b"PAR1":
-        return _parquet(name, data, required, optional, error)
-    return _text(name, data, required, optional, error)
+        return _parquet(str(path), data, required, optional, error, time)
+    return _text(str(path), data, required, optional, error, time)
+
+
+def column_names(path: Path, error: type[PydpendError]) -> list[str]:
+    """Names of a Parquet file's columns, or those on the first line of a text. Raises ``error`` naming the file."""
+    try:
+        with path.open("rb") as file:
+            if file.read(4) != b"PAR1":
+                file.seek(0)
+                return names_on_first_line(file.read(_FIRST_LINE_BYTES))
+            file.seek(0)
+            return list(pq.read_schema(file).names)
+    except PARQUET_FAULTS as problem:
+        if isinstance(problem, OSError) and problem.errno is not None:
+            raise error(unreadable(path, problem)) from problem
+        raise error(damaged_parquet(str(path), problem)) from problem
+
+
+def damaged_parquet(name: str, problem: BaseException) -> Message:
+    """The message for what pyarrow says of a damaged file, on one line."""
+    said = next(iter(str(problem).splitlines()), type(problem).__name__)
+    return fault(name, f"the Parquet file is damaged ({said})", "Write or copy the file again")
+
+
+def _wanted(
+    name: str,
+    header: Sequence[str],
+    required: Sequence[str],
+    optional: Sequence[str] | None,
+    error: type[PydpendError],
+    place: str = "",
+) -> list[str]:
+    """The names that are read, each once in the header."""
+    missing = [c for c in required if c not in header]
+    if missing:
+        raise error(
+            fault(
+                name,
+                f"there is no column {', '.join(missing)}",
+                f"The columns are {', '.join(header) or '(none)'}; name the right one",
+            )
+        )
+    more = header if optional is None else [c for c in optional if c in header]
+    wanted = list(dict.fromkeys([*required, *more]))
+    for column in wanted:
+        if header.count(column) > 1:
+            raise error(
+                fault(
+                    name,
+                    f"the column {column} is there {header.count(column)} times",
+                    "Rename all but one",
+                    place=place,
+                )
+            )
+    return wanted
 
 
 def _parquet(
-    name: str, data: bytes, required: Sequence[str], optional: Sequence[str], error: type[PydpendError]
+    name: str,
+    data: bytes,
+    required: Sequence[str],
+    optional: Sequence[str] | None,
+    error: type[PydpendError],
+    time: str | None,
 ) -> Columns:
     try:
         file = pq.ParquetFile(pa.BufferReader(data))
         header = tuple(file.schema_arrow.names)
-        _need(name, header, required, error)
-        wanted = [*required, *(c for c in optional if c in header)]
+    except PARQUET_FAULTS as problem:
+        raise error(damaged_parquet(name, problem)) from problem
+    wanted = _wanted(name, header, required, optional, error)
+    try:
         table = file.read(columns=wanted)
         metadata = {
             k.decode("utf-8", "replace"): v.decode("utf-8", "replace")
             for k, v in (file.schema_arrow.metadata or {}).items()
         }
-    except pa.ArrowException as problem:
-        text = str(problem).splitlines()[0]
-        raise error(
-            fault(name, f"the Parquet file is damaged ({text})", "Write or copy the file again")
-        ) from problem
+    except PARQUET_FAULTS as problem:
+        raise error(damaged_parquet(name, problem)) from problem
     values: dict[str, NDArray[np.float64]] = {}
+    first_stamp = ""
     for column in wanted:
         array = table.column(column)
+        instants = seconds_of_arrow(array) if column == time else None
+        if instants is not None:
+            values[column], first_stamp = instants
+            continue
         try:
             values[column] = np.asarray(
                 array.cast(pa.float64()).to_numpy(zero_copy_only=False), dtype=np.float64
@@ -113,132 +178,41 @@ def _parquet(
                     place=f"column {column}",
                 )
             ) from problem
-    return Columns(name, header, values, None, metadata)
-
-
-def _need(name: str, header: Sequence[str], required: Sequence[str], error: type[PydpendError]) -> None:
-    missing = [c for c in required if c not in header]
-    if missing:
-        raise error(
-            fault(
-                name,
-                f"there is no column {', '.join(missing)}",
-                f"The columns are {', '.join(header) or '(none)'}; name the right one",
-            )
-        )
+    return Columns(name, header, values, None, metadata, first_stamp)
 
 
 def _text(
-    name: str, data: bytes, required: Sequence[str], optional: Sequence[str], error: type[PydpendError]
+    name: str,
+    data: bytes,
+    required: Sequence[str],
+    optional: Sequence[str] | None,
+    error: type[PydpendError],
+    time: str | None,
 ) -> Columns:
+    cells = take_apart(name, data, required, error)
+    place = f"line {cells.header_line}"
+    wanted = _wanted(name, cells.header, required, optional, error, place)
+    fields, lines = cells.fields(wanted)
+    values: dict[str, NDArray[np.float64]] = {}
+    first_stamp = ""
+    if time in fields and is_instant(next((f for f in fields[time] if f), "")):
+        values[time], first_stamp = _instants(cells, time, fields.pop(time), lines)
+    numbers = Numbers(cells, fields, lines)
+    values |= {c: numbers.column(c) for c in wanted if c in fields}
+    return Columns(name, cells.header, values, np.asarray(lines, dtype=np.int64), {}, first_stamp)
+
+
+def _instants(
+    cells: Cells, column: str, fields: list[str], lines: list[int]
+) -> tuple[NDArray[np.float64], str]:
     try:
-        text = data.decode("utf-16" if data[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")
-    except UnicodeDecodeError:
-        text = data.decode("latin-1")
-    if "\0" in text[:4096]:
-        raise error(
+        return seconds_of_text(fields)
+    except NotInstants as problem:
+        raise cells.error(
             fault(
-                name, "the file is neither Parquet nor text", "Give a CSV or Parquet file with named columns"
+                cells.name,
+                str(problem),
+                "Write every time alike, as 2024-05-01T12:00:00.250+02:00, or as seconds",
+                place=f"line {lines[problem.row]}, column {column}",
             )
-        )
-    if not text.strip():
-        raise error(fault(name, "the file is empty", "Give a CSV file with a header line and rows"))
-    header, header_line, delimiter = _find_header(name, text, required, error)
-    wanted = [*required, *(c for c in optional if c in header)]
-    for column in wanted:
-        if header.count(column) > 1:
-            raise error(
-                fault(
-                    name,
-                    f"the column {column} is there {header.count(column)} times",
-                    "Rename all but one",
-                    place=f"line {header_line}",
-                )
-            )
-    index = [header.index(c) for c in wanted]
-    reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter)
-    lines: list[int] = []
-    units: bool | None = None
-    fields: list[list[str]] = [[] for _ in wanted]
-    try:
-        for row in reader:
-            line = reader.line_num
-            if line <= header_line or not any(f.strip() for f in row) or row[0].startswith("#"):
-                continue
-            if len(row) <= max(index):
-                raise error(
-                    fault(
-                        name,
-                        f"there are {len(row)} fields, the header has {len(header)}",
-                        "Repair or remove the line",
-                        place=f"line {line}",
-                    )
-                )
-            if not lines and units is None:
-                units = all(_is_word(row[i]) for i in index)
-                if units:
-                    continue
-            lines.append(line)
-            for texts, i in zip(fields, index, strict=True):
-                texts.append(row[i])
-    except csv.Error as problem:
-        raise error(
-            fault(name, str(problem), "Repair or remove the line", place=f"line {reader.line_num}")
         ) from problem
-    comma = delimiter in ";\t"
-    values = {c: _numbers(name, c, f, lines, comma, error) for c, f in zip(wanted, fields, strict=True)}
-    return Columns(name, tuple(header), values, np.asarray(lines, dtype=np.int64), {})
-
-
-def _is_word(field: str) -> bool:
-    """Whether a field is neither a number nor empty, as the units under a header are."""
-    bare = field.strip().lower()
-    return bare not in _EMPTY and not any(c.isdigit() for c in bare)
-
-
-def _find_header(
-    name: str, text: str, required: Sequence[str], error: type[PydpendError]
-) -> tuple[list[str], int, str]:
-    """Column names, the header's line (from 1) and the delimiter."""
-    first: list[str] | None = None
-    for number, line in enumerate(io.StringIO(text), start=1):
-        if number > _HEADER_WITHIN:
-            break
-        bare = line.strip().lstrip("#").strip()
-        if not bare:
-            continue
-        for delimiter in ",;\t":
-            names = [f.strip() for f in next(csv.reader([bare], delimiter=delimiter), [])]
-            if first is None and (len(names) > 1 or delimiter == "\t"):
-                first = names
-            if all(c in names for c in required):
-                return names, number, delimiter
-    _need(name, first or [], required, error)
-    raise error(fault(name, f"no line holds the names {', '.join(required)}", "Give the file a header line"))
-
-
-def _numbers(
-    name: str, column: str, fields: list[str], lines: list[int], comma: bool, error: type[PydpendError]
-) -> NDArray[np.float64]:
-    try:
-        return np.array(fields, dtype=np.float64)
-    except ValueError:
-        pass  # gaps, decimal commas or a fault: one by one
-    out = np.empty(len(fields))
-    for i, field in enumerate(fields):
-        bare = field.strip()
-        if bare.lower() in _EMPTY:
-            out[i] = np.nan
-            continue
-        try:
-            out[i] = float(bare.replace(",", ".") if comma else bare)
-        except ValueError as problem:
-            raise error(
-                fault(
-                    name,
-                    f"{bare!r} is not a number",
-                    "Remove the line or leave the field empty",
-                    place=f"line {lines[i]}, column {column}",
-                )
-            ) from problem
-    return out

@@ -1,7 +1,8 @@
 """A run folder: which stages are done, from what, and whether they still hold.
 
 A stage holds if the hash of what it was made from (inputs, options, the program's version, the stages before it)
-is the same and the files that it wrote are there unchanged in size. ``run.json`` is written whole and renamed.
+is the same and the files that it wrote are there unchanged, by their SHA-256. ``run.json`` is written whole and
+renamed. A folder may come from anyone: what ``run.json`` names is deleted only if it is a file that the stage makes.
 A stage writes into `UNFINISHED`; what it made is moved to its place when it is whole.
 """
 
@@ -14,9 +15,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from pydpend.analyse.contents import made_by
+from pydpend.documents import Table, read_json
 from pydpend.errors import PydpendError, fault
 
-RUN_SCHEMA = 2
+RUN_SCHEMA = 3
 """A folder of an older schema is done again, one of a newer is refused."""
 
 UNFINISHED = "unfinished"
@@ -47,12 +50,7 @@ class Digests:
         name, state = str(path.absolute()), path.stat()
         known = self.known.get(name)
         if known is None or known[:2] != [state.st_size, state.st_mtime_ns]:
-            with path.open("rb") as f:
-                known = [
-                    state.st_size,
-                    state.st_mtime_ns,
-                    hashlib.file_digest(f, "sha256").hexdigest(),
-                ]
+            known = [state.st_size, state.st_mtime_ns, _sha256(path)]
             self.known[name] = known
         return str(known[2])
 
@@ -67,8 +65,34 @@ class Digests:
 def write_whole(path: Path, text: str) -> None:
     """Writes a file so that it is there whole or not at all."""
     temporary = path.with_name(path.name + ".new")
-    temporary.write_text(text, encoding="utf-8")
+    # A link of that name would lead elsewhere.
+    temporary.unlink(missing_ok=True)
+    with temporary.open("x", encoding="utf-8") as file:
+        file.write(text)
     os.replace(temporary, path)
+
+
+def _sha256(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _stages(table: Table) -> dict[str, dict[str, Any]]:
+    """What ``run.json`` says of each stage, checked: its files are later taken away by these names."""
+    out = {}
+    for stage in table:
+        done = table.table(stage)
+        files = done.table("files")
+        for name in files:
+            if not made_by(stage, name):
+                files.refuse(name, f"{name!r} is no file that this stage makes")
+        out[stage] = {
+            "key": done.text("key"),
+            "files": {name: files.text(name) for name in files},
+            "message": done.text("message"),
+            "seconds": done.number("seconds"),
+        }
+    return out
 
 
 @dataclass
@@ -95,23 +119,40 @@ class RunFolder:
             except OSError as error:
                 raise RunFolderError(fault(str(path), f"cannot be made ({error.strerror})")) from None
             return cls(path)
-        try:
-            raw = json.loads(record.read_text("utf-8"))
-            if raw["schema"] > RUN_SCHEMA:
+        raw = read_json(record, RunFolderError, "Use a new folder")
+        schema = raw.whole("schema")
+        if schema > RUN_SCHEMA:
+            raw.refuse("schema", f"schema {schema} is not known")
+        for inside in path.iterdir():
+            # What a stage writes or deletes through it would be elsewhere.
+            if inside.is_symlink() and inside.is_dir():
                 raise RunFolderError(
-                    fault(str(record), f"schema {raw['schema']} is not known", "Use a new folder")
+                    fault(str(inside), "a folder of a run is a link to another place", "Use a new folder")
                 )
-            if raw["schema"] < RUN_SCHEMA:
-                return cls(path)
-            return cls(path, stages=dict(raw["stages"]), facts=dict(raw["facts"]), begun=dict(raw["begun"]))
-        except (OSError, ValueError, KeyError, TypeError) as error:
-            raise RunFolderError(
-                fault(
-                    str(record),
-                    f"cannot be read ({error})",
-                    "Use a new folder",
-                )
-            ) from None
+        if schema < RUN_SCHEMA:
+            return cls(path)
+        begun = raw.table("begun")
+        return cls(
+            path,
+            stages=_stages(raw.table("stages")),
+            facts=raw.table("facts").values,
+            begun={stage: begun.text(stage) for stage in begun},
+        )
+
+    def digests(self) -> Digests:
+        """The digests of inputs that are known from the run before."""
+        facts = Table(self.facts, str(self.path / "run.json"), RunFolderError, "facts", "Use a new folder")
+        if "digests" not in facts:
+            return Digests()
+        table = facts.table("digests")
+        known: dict[str, list[Any]] = {}
+        for name in table:
+            entry = table.items(name)
+            whole = all(isinstance(number, int) for number in entry[:2])
+            if len(entry) != 3 or not whole or not isinstance(entry[2], str):
+                table.refuse(name, "size, time of change and SHA-256 are expected")
+            known[name] = entry
+        return Digests(known)
 
     def save(self) -> None:
         """Writes ``run.json``."""
@@ -133,8 +174,8 @@ class RunFolder:
         if done is None or done["key"] != key:
             return False
         return all(
-            (self.path / name).is_file() and (self.path / name).stat().st_size == size
-            for name, size in done["files"].items()
+            (self.path / name).is_file() and _sha256(self.path / name) == known
+            for name, known in done["files"].items()
         )
 
     def begin(self, stage: str, key: str) -> bool:
@@ -161,10 +202,9 @@ class RunFolder:
 
     def done(self, stage: str, key: str, files: list[str], message: str, seconds: float) -> None:
         """Records a stage and saves."""
-        sizes = {name: (self.path / name).stat().st_size for name in files}
         self.stages[stage] = {
             "key": key,
-            "files": sizes,
+            "files": {name: _sha256(self.path / name) for name in files},
             "message": message,
             "seconds": round(seconds, 2),
         }

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-import tomllib
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
+from pydpend.documents import read_toml
 from pydpend.errors import OptionError, Setting, Step, fault, one_of
 from pydpend.fit_options import INTERVALS, METHODS, RATIOS, check_fit
 
@@ -168,39 +168,23 @@ WRITE_CONFIG = Step("pydpend analyse --write-config", "dp.analyse.write_config(d
 
 def read_config(path: str | Path) -> Options:
     """Options from a TOML file as ``--write-config`` writes it. Unknown keys are errors."""
-    name = str(path)
-    try:
-        with open(path, "rb") as f:
-            raw = tomllib.load(f)
-    except OSError as error:
-        raise OptionError(fault(name, f"cannot be read ({error.strerror})")) from None
-    except tomllib.TOMLDecodeError as error:
-        raise OptionError(
-            fault(name, f"is not TOML ({error})", "Start from what " + WRITE_CONFIG + " prints")
-        ) from None
+    raw = read_toml(Path(path), OptionError, "Start from what " + WRITE_CONFIG + " prints")
     known = {f.name: f for f in fields(Options)}
     values: dict[str, Any] = {}
-    for key, value in raw.items():
+    for key in raw:
         if key not in known:
-            raise OptionError(
-                fault(name, f"{key} is not an option", f"Known are {', '.join(known)}", place=f"key {key}")
-            )
+            raw.refuse(key, f"{key} is not an option", f"Known are {', '.join(known)}")
         wanted = str(known[key].type)
         if key == "inputs":
-            if not (isinstance(value, list) and all(isinstance(v, str) for v in value)):
-                raise OptionError(fault(name, "a list of file names is expected", place="key inputs"))
-            value = tuple(value)
+            values[key] = raw.texts(key)
         elif wanted.startswith("bool"):
-            if not isinstance(value, bool):
-                raise OptionError(
-                    fault(name, f"true or false is expected, not {value!r}", place=f"key {key}")
-                )
-        elif wanted.startswith(("float", "int")):
-            if isinstance(value, bool) or not isinstance(value, (int, float)):
-                raise OptionError(fault(name, f"a number is expected, not {value!r}", place=f"key {key}"))
-        elif not isinstance(value, str):
-            raise OptionError(fault(name, f"text is expected, not {value!r}", place=f"key {key}"))
-        values[key] = value
+            values[key] = raw.flag(key)
+        elif wanted.startswith("int"):
+            values[key] = raw.whole(key, -(2**31), 2**31 - 1)
+        elif wanted.startswith("float"):
+            values[key] = raw.number(key)
+        else:
+            values[key] = raw.text(key)
     return Options(**values)
 
 

@@ -9,6 +9,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from pydpend.analyse.contents import about
 from pydpend.analyse.folder import Digests, RunFolder
 from pydpend.analyse.options import Options, flag_of
 
@@ -56,45 +57,6 @@ def command(options: Options, folder: Path) -> str:
         else:
             words += [flag, str(value)]
     return shlex.join(words)
-
-
-ABOUT = {
-    "nodes.parquet": "node table: where each marker is in each frame",
-    "residuals.parquet": "distance of each marker from where its rigid body puts it, px",
-    "markers.json": "each marker summed up: seen, gaps, residual",
-    "angles.parquet": "angles of the links and their standard uncertainties, rad",
-    "angles.json": "how the angles were had: bodies, joints, scale, zero",
-    "zero.parquet": "node table of the film that hangs still",
-    "zero_rig.toml": "the rig it was tracked with",
-    "encoder.json": "calibration of the encoder",
-    "calibration.svg": "calibration line and its residuals (Fig. 10)",
-    "comparison.json": "film against encoder, numbers",
-    "comparison.parquet": "film and encoder at the encoder's times, rad",
-    "comparison.png": "film against encoder (Fig. 15)",
-    "overlay.mp4": "the film with nodes, names and bodies drawn in",
-    "overlay.json": "times of its frames in the recording",
-    "fit.json": "damping coefficients, uncertainties, shares, identifiability",
-    "model.json": "constants of the model that the fit began from, with their standard uncertainties, SI",
-    "coefficients.csv": "the coefficients as a table",
-    "shares.png": "where the energy goes",
-    "trials.json": "the coefficients of each recording and their mean",
-    "trials.png": "the same, drawn (Fig. 20)",
-    "maps.png": "angle-dependent bias of the tracking",
-    "windows.csv": "error of each predicted window, degrees",
-    "prediction.json": "each recording predicted from the others",
-}
-
-
-def about(name: str) -> str:
-    """What a file of a run folder is."""
-    last = name.rsplit("/", 1)[-1]
-    if last.startswith("energy"):
-        return "energy of the motion and what each law takes out" + (
-            " (Fig. 19)" if last.endswith(".png") else ", J"
-        )
-    if last.startswith("residuals") and last.endswith(".csv"):
-        return "measured minus fitted angle of each link, and its standard deviation, rad"
-    return ABOUT.get(last, "")
 
 
 def readme(run: RunFolder) -> str:

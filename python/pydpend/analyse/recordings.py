@@ -7,11 +7,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-import pyarrow.parquet as pq
-from pyarrow import ArrowException
-
 from pydpend.analyse.folder import UNFINISHED, Digests
 from pydpend.analyse.options import Options
+from pydpend.columns import column_names
 from pydpend.errors import PydpendError, fault
 
 
@@ -69,18 +67,7 @@ def kind_of(path: Path) -> str:
     if path.is_dir():
         return "angles" if any(path.glob("DPmean_data_RB*.npy")) else "film"
     ending = path.suffix.lower()
-    columns: list[str] = []
-    if ending == ".parquet":
-        try:
-            columns = pq.read_schema(path).names
-        except (ArrowException, OSError) as error:
-            raise PydpendError(fault(str(path), f"is not a whole Parquet file ({error})")) from None
-    elif ending in (".csv", ".txt"):
-        try:
-            with path.open(encoding="utf-8") as f:
-                columns = [c.strip().strip('"') for c in f.readline().split(",")]
-        except UnicodeDecodeError:
-            raise PydpendError(fault(str(path), "is not UTF-8 text", place="line 1")) from None
-    else:
+    if ending not in (".parquet", ".csv", ".txt"):
         return "film"
+    columns = column_names(path, PydpendError)
     return "nodes" if {"node", "x_px"} <= set(columns) else "angles"

@@ -220,7 +220,7 @@ def analyse(options: Options, folder: str | Path, progress: Progress | None = No
     """
     path = Path(folder)
     run = RunFolder.open(path) if (path / "run.json").exists() else None
-    digests = Digests({} if run is None else dict(run.facts.get("digests", {})))
+    digests = Digests() if run is None else run.digests()
     todo = plan(options, path, digests)
     if run is None:
         run = RunFolder.open(path)

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from pydpend.analyse.folder import write_whole
 from pydpend.analyse.options import Options
+from pydpend.documents import read_json
 from pydpend.errors import PydpendError
 
 if TYPE_CHECKING:
@@ -301,8 +302,7 @@ def _settings(options: Options) -> dict[str, Any]:
 
 def converged(folder: Path) -> bool:
     """Whether the fit of a run came to its end."""
-    fitted = json.loads((folder / "fit" / "fit.json").read_text("utf-8"))
-    return bool(fitted["status"] == "converged")
+    return read_json(folder / "fit" / "fit.json", PydpendError).text("status") == "converged"
 
 
 def _steps(tell: Tell) -> Callable[[int, int, float], None]:

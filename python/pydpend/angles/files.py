@@ -17,7 +17,9 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from pydpend.angles.table import Floats, LinkAngles, check_table
+from pydpend.arrays import read_npy
 from pydpend.columns import Columns, read_columns
+from pydpend.documents import parse_json, read_text
 from pydpend.errors import AnglesError, Setting, fault
 
 META_KEY = "pydpend_angles"
@@ -92,6 +94,7 @@ def _read_table(path: Path, columns: dict[str, str]) -> _TableParts:
         [theirs["time_s"], *(columns[c] for c in columns if c != "time_s")],
         [theirs[c] for c in ours if c not in columns and c != "time_s"],
         error=AnglesError,
+        time=theirs["time_s"],
     )
     if table.rows == 0:
         raise AnglesError(fault(str(path), "the table has a header and no rows", "Give one row per instant"))
@@ -145,16 +148,11 @@ def _read_meta(path: Path, table: Columns) -> dict[str, Any]:
     text = table.metadata.get(META_KEY)
     side = path.with_name(path.name + ".json")
     if text is None and table.lines is not None and side.is_file():
-        text = side.read_text(encoding="utf-8")
+        text = read_text(side, AnglesError)
     if text is None:
         return {"source": str(path)}
-    try:
-        meta = json.loads(text)
-    except json.JSONDecodeError as problem:
-        raise AnglesError(
-            fault(str(side if table.lines is not None else path), f"its metadata is not JSON ({problem})")
-        ) from problem
-    return meta if isinstance(meta, dict) else {"source": str(path)}
+    where = f"metadata {META_KEY} of {path}" if table.lines is None else str(side)
+    return parse_json(text, where, AnglesError, "Write the table again").values
 
 
 def _read_published(folder: Path) -> tuple[Floats, Floats, Floats]:
@@ -202,24 +200,12 @@ def _read_published(folder: Path) -> tuple[Floats, Floats, Floats]:
 
 
 def _read_pair(path: Path) -> tuple[Floats, Floats]:
-    try:
-        array = np.load(path, allow_pickle=False)
-    except (OSError, ValueError, EOFError) as problem:
+    rows = "Row 0 is the time in s, row 1 the angle in degrees"
+    array = read_npy(path, AnglesError, rows)
+    if array.ndim != 2 or array.shape[0] != 2 or array.dtype.kind not in "fiu":
+        found = f"{array.shape}" if array.dtype.kind in "fiu" else f"{array.dtype}"
         raise AnglesError(
-            fault(str(path), f"the file is not a NumPy array ({problem})", "Copy it again")
-        ) from problem
-    if (
-        not isinstance(array, np.ndarray)
-        or array.ndim != 2
-        or array.shape[0] != 2
-        or array.dtype.kind not in "fiu"
-    ):
-        raise AnglesError(
-            fault(
-                str(path),
-                f"expected an array of numbers of shape (2, T), found {getattr(array, 'shape', type(array))}",
-                "Row 0 is the time in s, row 1 the angle in degrees",
-            )
+            fault(str(path), f"expected an array of numbers of shape (2, T), found {found}", rows)
         )
     return array[0].astype(np.float64), array[1].astype(np.float64)
 

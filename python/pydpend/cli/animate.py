@@ -11,7 +11,6 @@ chaotic: while it tumbles the two part after a second or some, however good the 
 from __future__ import annotations
 
 import argparse
-import json
 
 HELP = "film of a recording beside its simulation"
 
@@ -41,22 +40,31 @@ def add_arguments(p: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Simulates and films."""
+    from dataclasses import fields
+
     import numpy as np
 
     from pydpend.angles import read_angles
     from pydpend.damping.stored import load_fit
-    from pydpend.errors import ArgumentError, Setting, fault
+    from pydpend.documents import read_json
+    from pydpend.errors import ArgumentError, FitError, Setting, fault
     from pydpend.model import Damping
     from pydpend.plots.beside import Pictures, beside
-    from pydpend.plots.folder import chosen
+    from pydpend.plots.folder import AGAIN, FigureError, chosen
     from pydpend.simulate import simulate
 
     r = chosen(args.run_folder, args.recording)
     stored = load_fit(r.run / "fit")
     model = stored.model()
     angles = read_angles(r.here / "angles.parquet", name=r.facts["label"])
-    fit = json.loads((r.run / "fit" / "fit.json").read_text("utf-8"))
-    start = fit["inputs"][r.index].get("start_s", angles.t_s[0]) if args.start_s is None else args.start_s
+    fit = read_json(r.run / "fit" / "fit.json", FitError, AGAIN)
+    start = args.start_s
+    if start is None:
+        inputs = fit.tables("inputs")
+        if r.index >= len(inputs):
+            fit.refuse("inputs", f"{len(inputs)} recordings, {r.facts['name']} is the {r.index + 1}th")
+        first = inputs[r.index]
+        start = first.number("start_s") if "start_s" in first else float(angles.t_s[0])
     if not angles.t_s[0] <= start < angles.t_s[-1]:
         raise ArgumentError(
             fault(
@@ -71,14 +79,19 @@ def run(args: argparse.Namespace) -> int:
     # One state fits a second of a motion well, and more of a chaotic one hardly.
     state = stored.state(angles, start, min(1.0, until - start))
     times = np.arange(start, until, 1e-3)
-    damping = Damping(**{k: c["value"] for k, c in fit["coefficients"].items()})
+    coefficients = fit.table("coefficients")
+    known = {f.name for f in fields(Damping)}
+    for name in coefficients:
+        if name not in known:
+            coefficients.refuse(name, "there is no such coefficient")
+    damping = Damping(**{name: coefficients.table(name).number("value") for name in coefficients})
     motion = simulate(model, damping, state, times)
     pictures = None
     about = r.here / "overlay.json"
     if about.exists():
-        shown = json.loads(about.read_text("utf-8"))
-        width, height = shown["size_px"]
-        pictures = Pictures(r.here / "overlay.mp4", (width, height), np.array(shown["times_s"]))
+        shown = read_json(about, FigureError, AGAIN)
+        width, height = (int(side) for side in shown.array("size_px", 2))
+        pictures = Pictures(r.here / "overlay.mp4", (width, height), shown.array("times_s", -1))
     count = beside(angles, motion, model, args.output, pictures=pictures, fps=args.fps, speed=args.speed)
     print(f"{count} pictures from {times[0]:.3f} to {times[-1]:.3f} s; written to {args.output}")
     return 0

@@ -11,12 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pydpend.angles import LinkAngles
-from pydpend.damping.maps import Maps, corrected
+from pydpend.damping.maps import KNOTS, Maps, corrected
 from pydpend.damping.prediction import WINDOWS_S, Prediction, initial_state, predict
 from pydpend.damping.recording import prepare
 from pydpend.damping.result import DampingFit
-from pydpend.errors import FIT, FitError, Setting, fault
+from pydpend.documents import read_json
+from pydpend.errors import FIT, FitError, ModelError, Setting, fault
 from pydpend.model import Model
+from pydpend.model.file import MOST
 
 Floats = NDArray[np.float64]
 
@@ -92,24 +94,22 @@ def load_fit(path: str | Path) -> StoredFit:
     path = Path(path)
     if path.is_dir():
         path = path / "fit.json"
+    content = read_json(path, FitError, "Give the folder that " + FIT + " wrote")
+    table = content.table("parameters")
+    parameters = {name: table.number(name) for name in table}
+    for name, value in parameters.items():
+        if abs(value) > MOST:
+            table.refuse(name, f"{value:g} is no number of a pendulum")
+    maps = None
+    if "maps" in content:
+        maps = Maps(np.radians(content.table("maps").array("knots_deg", 2, 3, KNOTS)))
+    stored = StoredFit(parameters, maps)
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-        parameters = {str(k): float(v) for k, v in content["parameters"].items()}
-        maps = None if content.get("maps") is None else Maps.from_json(content["maps"])
-        stored = StoredFit(parameters, maps)
         stored.model()
-    except OSError as problem:
-        raise FitError(
-            fault(str(path), f"cannot be read ({problem.strerror})", "Give the folder that " + FIT + " wrote")
-        ) from problem
-    except (ValueError, KeyError, TypeError, AttributeError) as problem:
-        raise FitError(
-            fault(
-                str(path),
-                f"is not a fit.json of pydpend ({problem!r})",
-                "Give the folder that " + FIT + " wrote",
-            )
-        ) from problem
+    except KeyError as problem:
+        content.refuse("parameters", f"there is no parameter {problem.args[0]}")
+    except ModelError as problem:
+        content.refuse("parameters", str(problem))
     return stored
 
 

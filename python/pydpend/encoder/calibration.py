@@ -18,6 +18,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from pydpend.documents import read_json
 from pydpend.encoder.holds import Hold
 from pydpend.errors import CALIBRATE, EncoderError, fault
 
@@ -131,37 +132,49 @@ class Calibration:
 
 
 def read_calibration(path: str | Path) -> Calibration:
-    """Reads what :meth:`Calibration.write` wrote. Raises :class:`EncoderError` if it is not that."""
-    try:
-        value = json.loads(Path(path).read_text(encoding="utf-8"))
-        holds = tuple(
-            Hold(**{k: h[k] for k in ("angle_rad", "mean_v", "std_v", "n", "sigma_v", "name")})
-            for h in value["holds"]
-        )
-        low, high = (float(v) for v in value["range_v"])
-        return Calibration(
-            float(value["offset_v"]),
-            float(value["slope_v_per_rad"]),
-            np.array(value["covariance"], dtype=np.float64).reshape(2, 2),
-            int(value["dof"]),
-            holds,
-            np.array([h["residual_v"] for h in value["holds"]], dtype=np.float64),
-            float(value["linearity"]),
-            float(value["noise_v"]),
-            float(value["spec_v"]),
-            tuple(value["noisy_holds"]),
-            (low, high),
-            bool(value["wraps"]),
-            tuple(value["notes"]),
-        )
-    except OSError as problem:
-        raise EncoderError(
-            fault(str(path), f"the file cannot be read ({problem.strerror})", "Check the path")
-        ) from problem
-    except (ValueError, KeyError, TypeError) as problem:
-        raise EncoderError(
-            fault(str(path), f"it is not a calibration ({problem})", "Make one with " + CALIBRATE)
-        ) from problem
+    """Reads what :meth:`Calibration.write` wrote.
+
+    Raises :class:`EncoderError` naming the file, and the key that is missing or not what it must be.
+    """
+    value = read_json(Path(path), EncoderError, "Make one with " + CALIBRATE)
+    holds = value.tables("holds")
+    low, high = value.array("range_v", 2)
+    covariance = value.array("covariance", 2, 2)
+    slope = value.number("slope_v_per_rad")
+    noise, spec = value.number("noise_v"), value.number("spec_v")
+    for key, bad in (
+        ("slope_v_per_rad", slope == 0),
+        ("covariance", not (np.diag(covariance) >= 0).all()),
+        ("noise_v", not noise > 0),
+        ("range_v", not low < high),
+    ):
+        if bad:
+            value.refuse(key, "no calibration has this value")
+    return Calibration(
+        value.number("offset_v"),
+        slope,
+        covariance,
+        value.whole("dof"),
+        tuple(
+            Hold(
+                h.number("angle_rad"),
+                h.number("mean_v"),
+                h.number("std_v"),
+                h.whole("n"),
+                h.number("sigma_v"),
+                h.text("name"),
+            )
+            for h in holds
+        ),
+        np.array([h.number("residual_v") for h in holds], dtype=np.float64),
+        value.number("linearity"),
+        noise,
+        spec,
+        value.texts("noisy_holds"),
+        (float(low), float(high)),
+        value.flag("wraps"),
+        value.texts("notes"),
+    )
 
 
 def calibrate(

@@ -9,8 +9,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from pydpend.arrays import MAGIC, read_npy
 from pydpend.columns import Columns, read_columns
+from pydpend.documents import unreadable
 from pydpend.errors import EncoderError, fault
+from pydpend.instants import seconds_of_numpy
 
 Floats = NDArray[np.float64]
 Unit = Literal["v", "rad", "deg"]
@@ -22,6 +25,7 @@ KNOWN_COLUMNS = ("voltage_v", "phi1_rad", "phi1_deg")
 @dataclass(frozen=True, eq=False)
 class EncoderSignal:
     """``t_s`` (T,): s on the encoder's clock, increasing. ``value`` (T,): V, or rad if ``unit`` is ``"rad"``.
+    Times of ``datetime64`` become seconds from the first.
 
     Samples without a value are not in it; ``notes`` says how many were left out, and of gaps and uneven
     steps.
@@ -34,7 +38,7 @@ class EncoderSignal:
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        t = np.ascontiguousarray(self.t_s, dtype=np.float64)
+        t = seconds_of_numpy(np.asarray(self.t_s))
         value = np.ascontiguousarray(self.value, dtype=np.float64)
         if t.ndim != 1 or t.shape != value.shape or t.size == 0:
             raise EncoderError(
@@ -71,6 +75,7 @@ def read_encoder(
     ``phi1_deg``) by name; notes above the header do no harm. TDMS: ``column`` is a channel, ``channel`` or
     ``group/channel``; the time is ``time_column``'s channel or else the waveform's own increment. NumPy:
     (T,), or (T, 2) or (2, T) with the time first. ``rate_hz`` gives the time where the file has none.
+    Times given as dates become seconds from the first, which ``notes`` then names.
     ``unit`` is taken from the ending of the column's name (``_v``, ``_rad``, ``_deg``), else volts.
 
     A sample without a value is left out and noted, as are gaps and uneven steps. Raises
@@ -86,19 +91,19 @@ def read_encoder(
         with path.open("rb") as file:
             magic = file.read(6)
     except OSError as problem:
-        raise EncoderError(
-            fault(str(path), f"the file cannot be read ({problem.strerror})", "Check the path")
-        ) from problem
+        raise EncoderError(unreadable(path, problem)) from problem
     table: Columns | None = None
     notes: list[str] = []
     if magic[:4] == b"TDSm":
         from pydpend.encoder.tdms import read_tdms
 
         t, value, label, notes = read_tdms(path, column, time_column, rate_hz)
-    elif magic == b"\x93NUMPY":
+    elif magic == MAGIC:
         t, value, label = _read_numpy(path, rate_hz)
     else:
         t, value, label, table = _read_table(path, column, time_column, rate_hz)
+        if table.first_stamp:
+            notes.append(f"its times are dates; they are counted in s from the first, {table.first_stamp}")
     return _checked(path, t, value, label, unit, table, notes)
 
 
@@ -110,7 +115,7 @@ def _read_table(
     optional = () if column else KNOWN_COLUMNS
     if not required:
         raise EncoderError(fault(str(path), "with rate_hz the column must be named", "Give column=..."))
-    table = read_columns(path, required, optional, error=EncoderError)
+    table = read_columns(path, required, optional, error=EncoderError, time=when[0] if when else None)
     found = [column] if column else [c for c in KNOWN_COLUMNS if c in table.values]
     if len(found) != 1:
         raise EncoderError(
@@ -126,17 +131,7 @@ def _read_table(
 
 
 def _read_numpy(path: Path, rate_hz: float | None) -> tuple[Floats, Floats, str]:
-    try:
-        array = np.load(path, allow_pickle=False)
-    except (OSError, ValueError, EOFError) as problem:
-        raise EncoderError(
-            fault(str(path), f"the NumPy file is damaged ({problem})", "Copy it again")
-        ) from problem
-    if array.dtype.kind not in "fiu":
-        raise EncoderError(
-            fault(str(path), f"an array of {array.dtype}, not of numbers", "Save plain numbers")
-        )
-    array = np.asarray(array, dtype=np.float64)
+    array = seconds_of_numpy(read_npy(path, EncoderError, "Save plain numbers with numpy.save"))
     if array.ndim == 1 and rate_hz is not None:
         return np.arange(array.size) / rate_hz, array, "value"
     if array.ndim == 2 and array.shape[0] == 2 and array.shape[1] != 2:

@@ -2,28 +2,47 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from nptdms import TdmsFile
+from nptdms.timestamp import TimestampArray
 from numpy.typing import NDArray
 
 from pydpend.errors import EncoderError, fault
 
 Floats = NDArray[np.float64]
+T = TypeVar("T")
 
 
 def read_tdms(
     path: Path, channel: str | None, time_channel: str | None, rate_hz: float | None
 ) -> tuple[Floats, Floats, str, list[str]]:
-    """Times in s, values, the channel's name and notes. Raises :class:`EncoderError` if they cannot be had."""
+    """Times in s, values, the channel's name and notes. A channel of time stamps gives seconds from its first.
+
+    Raises :class:`EncoderError` if they cannot be had.
+    """
+    # Stamps come as whole seconds and fractions: as datetime64 they would be cut to microseconds.
+    file = _asked(path, lambda: TdmsFile.open(path, raw_timestamps=True))
+    with file:
+        return _read(path, file, channel, time_channel, rate_hz)
+
+
+def _asked(path: Path, ask: Callable[[], T]) -> T:
     try:
-        file = TdmsFile.read(path)
-    except Exception as problem:  # npTDMS raises what its parser happens to meet in a damaged file
+        return ask()
+    except Exception as problem:  # npTDMS raises what its parser happens to meet, and Exception itself
+        said = " ".join(str(problem).split())[:200] or type(problem).__name__
         raise EncoderError(
-            fault(str(path), f"the TDMS file is damaged ({problem})", "Copy it again")
+            fault(str(path), f"the TDMS file is damaged ({said})", "Copy it again")
         ) from problem
+
+
+def _read(
+    path: Path, file: TdmsFile, channel: str | None, time_channel: str | None, rate_hz: float | None
+) -> tuple[Floats, Floats, str, list[str]]:
     notes = []
     if file.file_status.incomplete_final_segment:
         notes.append("the TDMS file ends in the middle of a segment: the recording was cut off")
@@ -31,26 +50,47 @@ def read_tdms(
     data = _pick(path, channels, channel, "encoder", time_channel)
     value = _numbers(path, data)
     if time_channel is not None:
-        t = _numbers(path, _pick(path, channels, time_channel, "time", None))
+        times = _pick(path, channels, time_channel, "time", None)
+        t = _times(path, times, notes)
         if t.size != value.size:
             raise EncoderError(
                 fault(str(path), f"{t.size} times for {value.size} values", "Name the right channel")
             )
         return t, value, str(data.name), notes
-    step = data.properties.get("wf_increment")
     if rate_hz is not None:
         return np.arange(value.size, dtype=np.float64) / rate_hz, value, str(data.name), notes
-    if not isinstance(step, (int, float)) or not step > 0:
+    step = _property(path, data, "wf_increment", None)
+    if step is None or not step > 0:
         raise EncoderError(
             fault(
                 str(path),
-                "the channel has no waveform increment (wf_increment)",
+                "the channel has no waveform increment (wf_increment)"
+                if step is None
+                else f"its waveform increment (wf_increment) is {step:g} s",
                 "Name the channel of the times, or give rate_hz",
                 place=f"channel {data.name}",
             )
         )
-    start = float(data.properties.get("wf_start_offset", 0.0))
-    return start + np.arange(value.size, dtype=np.float64) * float(step), value, str(data.name), notes
+    start = _property(path, data, "wf_start_offset", 0.0) or 0.0
+    return start + np.arange(value.size, dtype=np.float64) * step, value, str(data.name), notes
+
+
+def _property(path: Path, channel: Any, key: str, absent: float | None) -> float | None:
+    """A property in seconds, a finite number."""
+    value = channel.properties.get(key, absent)
+    if value is None:
+        return None
+    number = isinstance(value, (int, float, np.number)) and not isinstance(value, (bool, np.timedelta64))
+    if not number or not np.isfinite(value):
+        raise EncoderError(
+            fault(
+                str(path),
+                f"{key} is {value}, not a number of seconds",
+                "Name the channel of the times, or give rate_hz",
+                place=f"channel {channel.name}",
+            )
+        )
+    return float(value)
 
 
 def _pick(path: Path, channels: dict[str, Any], name: str | None, what: str, other: str | None) -> Any:
@@ -74,15 +114,49 @@ def _pick(path: Path, channels: dict[str, Any], name: str | None, what: str, oth
     return channels[found[0]]
 
 
-def _numbers(path: Path, channel: Any) -> Floats:
-    try:
-        return np.asarray(channel[:], dtype=np.float64)
-    except (TypeError, ValueError) as problem:
+def _samples(path: Path, channel: Any) -> Any:
+    size = path.stat().st_size
+    if len(channel) > size:
+        # What npTDMS sets aside is as much as the file says, and a sample takes a byte at the least.
         raise EncoderError(
             fault(
                 str(path),
-                "the channel does not hold numbers",
+                f"the TDMS file is damaged ({len(channel)} samples in a file of {size} bytes)",
+                "Copy it again",
+                place=f"channel {channel.name}",
+            )
+        )
+    return _asked(path, lambda: channel[:])
+
+
+def _times(path: Path, channel: Any, notes: list[str]) -> Floats:
+    samples = _samples(path, channel)
+    if not isinstance(samples, TimestampArray):
+        return _as_numbers(path, channel, samples)
+    if samples.size == 0:
+        return np.zeros(0)
+    whole = np.asarray(samples.seconds, dtype=np.int64)
+    fraction = np.asarray(samples.second_fractions, dtype=np.uint64)
+    first = samples.as_datetime64("us")[0]
+    notes.append(f"its times are stamps; they are counted in s from the first, {first} UTC")
+    # Whole seconds and fractions apart: together they do not fit a float64 to the resolution of the stamps.
+    return np.asarray((whole - whole[0]) + (fraction.astype(np.float64) - float(fraction[0])) * 2.0**-64)
+
+
+def _numbers(path: Path, channel: Any) -> Floats:
+    return _as_numbers(path, channel, _samples(path, channel))
+
+
+def _as_numbers(path: Path, channel: Any, samples: Any) -> Floats:
+    array = np.asarray(samples)
+    if array.dtype.kind not in "fiub":
+        what = "time stamps" if isinstance(samples, TimestampArray) or array.dtype.kind == "M" else "text"
+        raise EncoderError(
+            fault(
+                str(path),
+                f"the channel holds {what}, not numbers",
                 "Name another",
                 place=f"channel {channel.name}",
             )
-        ) from problem
+        )
+    return np.asarray(array, dtype=np.float64)

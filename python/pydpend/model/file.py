@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -11,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from pydpend.components import Balls, Cage, Configuration, Part, Quantity, Races, Rigid
+from pydpend.documents import Table, read_toml
 from pydpend.errors import ModelError, fault
 from pydpend.model.pendulum import CONSTANTS, Model, uniform_bar
 from pydpend.model.reduce import constants_of, from_parts
@@ -28,6 +28,8 @@ _BEARING = {"name", "at", "inner", "outer", "count", "balls", "d_inner", "d_ball
     "cage_mass",
     "cage_inertia",
 }
+MOST = 1e30
+"""No quantity of a pendulum comes near this in any unit, and its square is still a float64."""
 ONE_LINK = ("psi_kg_m2", "sigma_j", "m1_kg")
 """Constants of a single pendulum; a file with these alone is one's, m1 being optional."""
 _KIND = {
@@ -50,12 +52,7 @@ _KIND = {
 def read_model(path: str | Path) -> Model:
     """The model of a TOML file. Raises ModelError naming the file and the key or part."""
     path = Path(path)
-    try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ModelError(fault(str(path), f"cannot be read ({error.strerror or error})")) from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ModelError(fault(str(path), f"is not TOML ({error})")) from error
+    data = read_toml(path, ModelError, "docs/model.md has examples")
     if ("constants" in data) == ("part" in data):
         raise ModelError(
             fault(
@@ -68,7 +65,7 @@ def read_model(path: str | Path) -> Model:
 def _pair(value: Any, where: str, key: str) -> tuple[float, float]:
     items = value if isinstance(value, list) else [value, 0.0]
     good = len(items) == 2 and all(isinstance(x, int | float) and not isinstance(x, bool) for x in items)
-    if not good or not all(math.isfinite(x) for x in items) or items[1] < 0:
+    if not good or not all(abs(x) < MOST for x in items) or items[1] < 0:
         raise ModelError(
             fault(where, f"{key} is {value!r}", "Give a number, or [value, standard uncertainty]", place="")
         )
@@ -126,20 +123,20 @@ def _known(known: set[str]) -> list[str]:
     return out
 
 
-def _gravity(data: Mapping[str, Any], path: Path) -> float:
-    g = _pair(data.get("g_m_s2", 9.81), str(path), "g_m_s2")[0]
+def _gravity(data: Table, path: Path) -> float:
+    g = _pair(data.values.get("g_m_s2", 9.81), str(path), "g_m_s2")[0]
     if g < 0:
         raise ModelError(fault(str(path), f"g_m_s2 is {g}", "It cannot be negative"))
     return g
 
 
-def _name(data: Mapping[str, Any], path: Path) -> str:
-    return str(data.get("name", path.stem))
+def _name(data: Table, path: Path) -> str:
+    return str(data.values.get("name", path.stem))
 
 
-def _from_constants(data: Mapping[str, Any], path: Path) -> Model:
+def _from_constants(data: Table, path: Path) -> Model:
     where = f"{path}, [constants]"
-    table = data["constants"]
+    table = data.table("constants").values
     for key in data:
         if key not in ("name", "g_m_s2", "constants"):
             raise ModelError(fault(str(path), f"unknown key {key!r}", "Known: name, g_m_s2, constants"))
@@ -181,8 +178,10 @@ def _from_constants(data: Mapping[str, Any], path: Path) -> Model:
     ).checked()
 
 
-def _from_parts(data: Mapping[str, Any], path: Path) -> Model:
-    head = {k: v for k, v in data.items() if k not in ("name", "g_m_s2", "part", "bearing")}
+def _from_parts(data: Table, path: Path) -> Model:
+    part_tables = [t.values for t in data.tables("part")]
+    bearing_tables = [t.values for t in data.tables("bearing")] if "bearing" in data else []
+    head = {k: v for k, v in data.values.items() if k not in ("name", "g_m_s2", "part", "bearing")}
     top = _Numbers(head, {"l1", "lower_inner", "lower_outer"}, str(path))
     quantities: dict[str, Quantity] = {}
 
@@ -190,12 +189,12 @@ def _from_parts(data: Mapping[str, Any], path: Path) -> Model:
         quantities[symbol] = Quantity(symbol, symbol, *pair, unit, "", "given", str(path))
         return symbol
 
-    single = not top.values and not any(_on_elbow(t) for t in (*data["part"], *data.get("bearing", [])))
+    single = not top.values and not any(_on_elbow(t) for t in (*part_tables, *bearing_tables))
     # Nothing of a single pendulum is at the elbow, wherever that is.
     keep("l1", (1.0, 0.0) if single else top.need("l1"), "mm")
     parts: list[Part] = []
     imbalance = {1: 0.0, 2: 0.0}
-    for i, table in enumerate(data["part"], 1):
+    for i, table in enumerate(part_tables, 1):
         where = f"{path}, part {i} ({table.get('name', 'no name')})"
         numbers = _Numbers(table, _PART, where)
         body = numbers.integer("body", None, range(1, 3))
@@ -227,7 +226,7 @@ def _from_parts(data: Mapping[str, Any], path: Path) -> Model:
         parts.append(
             Part(str(i), str(table.get("name", f"part {i}")), m, inertia_symbol, place, count, carried=body)
         )
-    for i, table in enumerate(data.get("bearing", []), 1):
+    for i, table in enumerate(bearing_tables, 1):
         parts += _bearing(table, f"{path}, bearing {i}", i, keep)
     pendulum = Configuration(_name(data, path), tuple(parts), quantities, length="l1")
     g = _gravity(data, path)

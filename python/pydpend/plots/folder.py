@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow.parquet as pq
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from pydpend.angles import read_angles
-from pydpend.damping.maps import Maps
+from pydpend.columns import read_columns
+from pydpend.damping.stored import load_fit
+from pydpend.documents import Table, read_json
 from pydpend.encoder import read_calibration
 from pydpend.errors import PydpendError, Setting, fault
 from pydpend.nodes import read_nodes
@@ -31,6 +31,9 @@ from pydpend.plots.encoder import calibration_figure, comparison_figure
 from pydpend.plots.nodes import nodes_figure
 
 Floats = NDArray[np.float64]
+
+
+AGAIN = "Do pydpend analyse again"
 
 
 class FigureError(PydpendError):
@@ -63,20 +66,13 @@ class Compared:
     rms_rad: float
 
 
-def read_columns(path: Path) -> dict[str, Floats]:
-    """Columns of a Parquet or CSV table of numbers."""
-    if path.suffix == ".parquet":
-        table = pq.read_table(path)
-        return {n: table.column(n).to_numpy().astype(np.float64) for n in table.column_names}
-    with path.open(encoding="utf-8") as f:
-        names = f.readline().strip().split(",")
-        values = np.loadtxt(f, delimiter=",", ndmin=2)
-    return {n: values[:, i] for i, n in enumerate(names)}
+def read_table(path: Path, *required: str) -> dict[str, Floats]:
+    """All columns of a table that a stage wrote. Raises FigureError if it is damaged or lacks a ``required`` one."""
+    return read_columns(path, required, None, error=FigureError).values
 
 
-def _json(path: Path) -> dict[str, Any]:
-    value: dict[str, Any] = json.loads(path.read_text("utf-8"))
-    return value
+def _json(path: Path) -> Table:
+    return read_json(path, FigureError, AGAIN)
 
 
 def _angles(r: Stored) -> Figure:
@@ -85,10 +81,15 @@ def _angles(r: Stored) -> Figure:
 
 
 def _nodes(r: Stored) -> Figure:
-    columns = read_columns(r.here / "residuals.parquet")
     path = r.here / "nodes.parquet"
     nodes = read_nodes(path if path.exists() else r.facts["path"])
-    residual = np.column_stack([columns[f"node{i}_px"] for i in range(len(nodes.rig.nodes))])
+    names = [f"node{i}_px" for i in range(len(nodes.rig.nodes))]
+    columns = read_table(r.here / "residuals.parquet", *names)
+    residual = np.column_stack([columns[name] for name in names])
+    if len(residual) != len(nodes):
+        raise FigureError(
+            fault(str(r.here), f"{len(residual)} rows of residuals for {len(nodes)} frames", AGAIN)
+        )
     return nodes_figure(nodes, residual)
 
 
@@ -97,9 +98,11 @@ def _calibration(r: Stored) -> Figure:
 
 
 def _comparison(r: Stored) -> Figure:
-    numbers, c = _json(r.here / "comparison.json"), read_columns(r.here / "comparison.parquet")
+    numbers = _json(r.here / "comparison.json")
+    c = read_table(r.here / "comparison.parquet", "time_s", "video_rad", "encoder_rad", "residual_rad")
     film = read_angles(r.here / "angles.parquet")
-    link = int(numbers["link"]) - 1
+    link = numbers.whole("link", 1, film.links) - 1
+    sigmas = numbers.table("stated_sigma_rad")
     sigma = np.interp(c["time_s"], film.t_s, film.sigma_rad[:, link])
     found = Compared(
         link,
@@ -108,20 +111,22 @@ def _comparison(r: Stored) -> Figure:
         c["encoder_rad"],
         sigma,
         c["residual_rad"],
-        float(numbers["gain"]),
-        float(numbers["offset_rad"]),
-        float(numbers["stated_sigma_rad"]["encoder"] or np.nan),
-        float(numbers["rms_rad"]),
+        numbers.number("gain"),
+        numbers.number("offset_rad"),
+        (sigmas.number("encoder") if "encoder" in sigmas else 0.0) or np.nan,
+        numbers.number("rms_rad"),
     )
     return comparison_figure(found)
 
 
 def _energy(r: Stored) -> Figure:
-    return energy_figure(read_columns(table_of_fit("energy", r.run, r.index)))
+    path = table_of_fit("energy", r.run, r.index)
+    return energy_figure(read_table(path, "time_s", "energy_j", "model_j"))
 
 
 def _residuals(r: Stored) -> Figure:
-    return residuals_figure(read_columns(table_of_fit("residuals", r.run, r.index)))
+    path = table_of_fit("residuals", r.run, r.index)
+    return residuals_figure(read_table(path, "time_s", "phi1_residual_rad", "phi1_sigma_rad"))
 
 
 def table_of_fit(name: str, run: Path, index: int) -> Path:
@@ -130,29 +135,55 @@ def table_of_fit(name: str, run: Path, index: int) -> Path:
     return alone if alone.exists() else run / "fit" / f"{name}-{index + 1}.csv"
 
 
+def _fit(r: Stored) -> Table:
+    return _json(r.run / "fit" / "fit.json")
+
+
 def _shares(r: Stored) -> Figure:
-    return shares_figure(_json(r.run / "fit" / "fit.json")["shares"])
-
-
-def _coefficients(r: Stored) -> Figure:
-    trials = r.run / "fit" / "trials.json"
-    if trials.exists():
-        return coefficients_figure(_json(trials)["coefficients"])
-    fit = _json(r.run / "fit" / "fit.json")
-    return coefficients_figure(
+    shares = _fit(r).table("shares")
+    groups = {group: shares.table(group) for group in ("law", "joint")}
+    return shares_figure(
         {
-            k: {"values": [c["value"]], "sigmas": [c["sigma"]], "unit": c["unit"]}
-            for k, c in fit["coefficients"].items()
+            group: {
+                name: {key: table.table(name).number(key) for key in ("value", "sigma")} for name in table
+            }
+            for group, table in groups.items()
         }
     )
 
 
+def _coefficients(r: Stored) -> Figure:
+    trials = r.run / "fit" / "trials.json"
+    stored = (_json(trials) if trials.exists() else _fit(r)).table("coefficients")
+    each = {name: stored.table(name) for name in stored}
+    if trials.exists():
+        return coefficients_figure({name: _trials(table) for name, table in each.items()})
+    return coefficients_figure(
+        {
+            name: {"values": [c.number("value")], "sigmas": [c.number("sigma")], "unit": c.text("unit")}
+            for name, c in each.items()
+        }
+    )
+
+
+def _trials(table: Table) -> dict[str, Any]:
+    """A coefficient over the recordings, every value checked."""
+    values, sigmas = table.array("values", -1), table.array("sigmas", -1)
+    if values.shape != sigmas.shape:
+        table.refuse("sigmas", f"{sigmas.size} uncertainties for {values.size} values")
+    more = {key: table.number(key) for key in ("mean", "sigma")}
+    return {"values": values.tolist(), "sigmas": sigmas.tolist(), "unit": table.text("unit"), **more}
+
+
 def _prediction(r: Stored) -> Figure:
-    return windows_figure(read_columns(r.here / "windows.csv"))
+    return windows_figure(read_table(r.here / "windows.csv", "window_s", "start_s", "phi1_rms_deg"))
 
 
 def _maps(r: Stored) -> Figure:
-    return maps_figure(Maps.from_json(_json(r.run / "fit" / "fit.json")["maps"]))
+    maps = load_fit(r.run / "fit").maps
+    if maps is None:
+        raise FigureError(fault("maps", f"the fit of {r.run} was made without angle maps", AGAIN))
+    return maps_figure(maps)
 
 
 @dataclass(frozen=True)
@@ -199,17 +230,24 @@ DRAWINGS = {
 def recordings_of(run: str | Path) -> list[Stored]:
     """The recordings of a run folder. Raises FigureError if it is none."""
     path = Path(run)
-    try:
-        facts = _json(path / "run.json")["facts"]["recordings"]
-    except (OSError, ValueError, KeyError, TypeError):
+    record = path / "run.json"
+    if not record.is_file():
         raise FigureError(
-            fault(
-                str(path),
-                "is not a run folder (run.json is missing or damaged)",
-                "Make one with pydpend analyse",
+            fault(str(path), "is not a run folder (it has no run.json)", "Make one with pydpend analyse")
+        )
+    out = []
+    for i, facts in enumerate(_json(record).table("facts").tables("recordings")):
+        name = facts.text("name")
+        if "/" in name or name in ("", ".", ".."):
+            facts.refuse(
+                "name", f"{name!r} is no folder of the run", "Make the run again with pydpend analyse"
             )
-        ) from None
-    return [Stored(i, path / r["name"], path, r) for i, r in enumerate(facts)]
+        for key in ("label", "path", "kind"):
+            facts.text(key)
+        out.append(Stored(i, path / name, path, facts.values))
+    if not out:
+        raise FigureError(fault(str(record), "there is no recording in it", AGAIN))
+    return out
 
 
 def chosen(run: str | Path, recording: str | None) -> Stored:

@@ -2,40 +2,39 @@
 
 from __future__ import annotations
 
-import json
 import re
 import shlex
 from pathlib import Path
 from typing import Any
 
+from pydpend.documents import read_json
+from pydpend.errors import PydpendError
+from pydpend.plots.folder import AGAIN
 from pydpend.report import damping, recording
 from pydpend.report.page import Block, Code, Heading, Listing, Page, Section, Table, Text
 from pydpend.report.words import sentence
 
 
-def read_json(path: Path) -> dict[str, Any] | None:
+def _json(path: Path) -> dict[str, Any] | None:
     """A JSON object, or ``None`` where the stage that writes it was not done."""
-    if not path.exists():
-        return None
-    value: dict[str, Any] = json.loads(path.read_text("utf-8"))
-    return value
+    return read_json(path, PydpendError, AGAIN).values if path.exists() else None
 
 
 def report_page(folder: str | Path) -> Page:
     """The report of a run folder (`pydpend.analyse`)."""
     path = Path(folder)
-    run = read_json(path / "run.json") or {"facts": {}, "stages": {}}
+    run = _json(path / "run.json") or {"facts": {}, "stages": {}}
     facts: dict[str, Any] = run["facts"]
     stages: set[str] = set(run["stages"])
     found: list[dict[str, Any]] = facts.get("recordings", [])
-    fit = read_json(path / "fit" / "fit.json") if "fit" in stages else None
-    prediction = read_json(path / "prediction.json") if "prediction" in stages else None
+    fit = _json(path / "fit" / "fit.json") if "fit" in stages else None
+    prediction = _json(path / "prediction.json") if "prediction" in stages else None
 
     titles: dict[str, str] = facts.get("titles", {})
     warnings = [f"{titles.get(name, name)}: {why}" for name, why in facts.get("not_done", {}).items()]
     answer: list[Block] = []
     if fit is not None:
-        model = read_json(path / "fit" / "model.json")
+        model = _json(path / "fit" / "model.json")
         answer = [Heading("Damping"), *damping.answer(fit, prediction, model)]
     read: list[recording.Part] = []
     parts: list[Section] = []

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 from typing import Any
@@ -11,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pydpend.coefficients import RATIO_UNITS
+from pydpend.documents import read_json
+from pydpend.errors import PydpendError
 from pydpend.plots.damping import coefficients_figure, shares_figure
-from pydpend.plots.folder import read_columns, table_of_fit
+from pydpend.plots.folder import AGAIN, read_table, table_of_fit
 from pydpend.plots.style import inline_svg
 from pydpend.report.page import (
     Block,
@@ -195,7 +196,7 @@ def _scale(model: dict[str, Any] | None, links: int) -> str:
 
 def _residuals(path: Path, group: str, title: str) -> list[Block]:
     """What the fitted motion leaves of each angle, with the standard deviation it was weighted by."""
-    c = {k: v if k == "time_s" else np.degrees(v) for k, v in read_columns(path).items()}
+    c = {k: v if k == "time_s" else np.degrees(v) for k, v in read_table(path).items()}
     out: list[Block] = []
     for j in (1, 2):
         if f"phi{j}_residual_rad" not in c:
@@ -217,7 +218,7 @@ def _residuals(path: Path, group: str, title: str) -> list[Block]:
 
 
 def _energy(path: Path, group: str, title: str) -> list[Block]:
-    c = read_columns(path)
+    c = read_table(path)
     t, energy, model = c["time_s"], c["energy_j"], c["model_j"]
     near = t <= t[0] + ZOOM_S
     laws = [n for n in c if n.endswith("_j") and n not in ("energy_j", "model_j")]
@@ -293,7 +294,7 @@ def sections(folder: Path, fit: dict[str, Any], prediction: dict[str, Any] | Non
             Section(
                 "trials",
                 "The recordings beside each other",
-                tuple(_trials(json.loads(trials.read_text("utf-8")), names)),
+                tuple(_trials(read_json(trials, PydpendError, AGAIN).values, names)),
             )
         )
     if prediction:
@@ -434,7 +435,7 @@ def _prediction(folder: Path, prediction: dict[str, Any]) -> list[Block]:
                 rows,
                 numbers=frozenset(range(2, 2 * links + 3)),
             ),
-            *_windows(read_columns(folder / name / "windows.csv"), f"w{k}"),
+            *_windows(read_table(folder / name / "windows.csv"), f"w{k}"),
         ]
     return blocks
 

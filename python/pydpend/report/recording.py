@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,9 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pydpend.angles import LinkAngles, read_angles
+from pydpend.documents import read_json
 from pydpend.encoder import read_calibration
+from pydpend.errors import PydpendError
 from pydpend.nodes import Nodes, read_nodes
 from pydpend.plots.encoder import calibration_figure
+from pydpend.plots.folder import AGAIN, read_table
 from pydpend.plots.style import inline_svg
 from pydpend.report.page import (
     Block,
@@ -298,11 +300,11 @@ def read(folder: Path, facts: dict[str, Any], stages: set[str]) -> Part:
         if isinstance(ending, dict) and ending.get("early"):
             part.warnings.append(f"{part.label}: the recording ended early: {ending['early']}")
     if f"{name}/markers" in stages and part.nodes is not None:
-        columns = _columns(here / "residuals.parquet")
+        columns = read_table(here / "residuals.parquet")
         part.residual_px = np.column_stack([columns[f"node{i}_px"] for i in range(len(part.nodes.rig.nodes))])
     if f"{name}/angles" in stages:
         part.angles = read_angles(here / "angles.parquet", name=part.label)
-        part.meta = json.loads((here / "angles.json").read_text("utf-8"))
+        part.meta = read_json(here / "angles.json", PydpendError, AGAIN).values
         if part.nodes is None:
             rows += [("samples", str(part.angles.t_s.size)), *_times(part.angles.t_s)]
         part.warnings += [f"{part.label}: {note}" for note in part.meta.get("notes", [])]
@@ -317,11 +319,11 @@ def read(folder: Path, facts: dict[str, Any], stages: set[str]) -> Part:
         )
         rows += [(f"range of phi{k + 1}", f"{t:.2f} turns") for k, t in enumerate(turns)]
     if f"{name}/overlay" in stages:
-        about = json.loads((here / "overlay.json").read_text("utf-8"))
+        about = read_json(here / "overlay.json", PydpendError, AGAIN).values
         part.film = ((here / "overlay.mp4").read_bytes(), about)
     if f"{name}/encoder" in stages:
-        part.comparison = json.loads((here / "comparison.json").read_text("utf-8"))
-        part.compared = _columns(here / "comparison.parquet")
+        part.comparison = read_json(here / "comparison.json", PydpendError, AGAIN).values
+        part.compared = read_table(here / "comparison.parquet")
         if (here / "encoder.json").exists():
             part.calibration = inline_svg(calibration_figure(read_calibration(here / "encoder.json")))
         part.warnings += [f"{part.label}: {note}" for note in part.comparison["notes"]]
@@ -358,10 +360,3 @@ def _doubts_of_time(source: dict[str, Any]) -> list[str]:
             "rate, give that with --fps: every time and rate here hinges on it"
         ]
     return []
-
-
-def _columns(path: Path) -> dict[str, NDArray[np.float64]]:
-    import pyarrow.parquet as pq
-
-    table = pq.read_table(path)
-    return {n: table.column(n).to_numpy().astype(np.float64) for n in table.column_names}

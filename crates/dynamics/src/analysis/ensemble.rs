@@ -19,7 +19,9 @@ pub struct Case {
 #[must_use]
 pub fn ensemble(cases: &[Case], times: &[f64], settings: &Settings) -> Vec<Result<Run, Failure>> {
     // Runs differ in cost by stick and chaos, so they are handed out singly.
-    cases.par_iter().with_max_len(1).map(|c| simulate(&c.parameters, c.state, times, settings)).collect()
+    threads::install(|| {
+        cases.par_iter().with_max_len(1).map(|c| simulate(&c.parameters, c.state, times, settings)).collect()
+    })
 }
 
 #[cfg(test)]

@@ -51,17 +51,15 @@ impl Problem<'_> {
                 _ => linearise::<MOST>(recording, segment, k, point, self.settings),
             }
         };
-        self.segments.par_iter().enumerate().map(one).collect()
+        threads::install(|| self.segments.par_iter().enumerate().map(one).collect())
     }
 
     /// Half the robust sum of squares with the jumps, without derivatives.
     pub(super) fn cost(&self, point: &Point, weight: Option<Vector4<f64>>) -> f64 {
-        let trials: Vec<_> = self
-            .segments
-            .par_iter()
-            .enumerate()
-            .map(|(k, s)| trial(&self.recordings[s.recording], s, k, point, self.settings.huber))
-            .collect();
+        let one = |(k, s): (usize, &Segment)| {
+            trial(&self.recordings[s.recording], s, k, point, self.settings.huber)
+        };
+        let trials: Vec<_> = threads::install(|| self.segments.par_iter().enumerate().map(one).collect());
         let mut cost: f64 = trials.iter().map(|t| t.cost).sum();
         if let Some(weight) = weight {
             for (k, t) in trials.iter().enumerate() {

@@ -37,30 +37,27 @@ pub fn unit_powers(p: &Parameters<f64>, x: &State<f64>, a: [f64; 2]) -> [f64; TE
 /// Follows every segment from its state in `point`.
 #[must_use]
 pub fn trace(recordings: &[Recording<'_>], segments: &[Segment], point: &Point) -> Trace {
-    let pieces: Vec<Trace> = segments
-        .par_iter()
-        .enumerate()
-        .map(|(k, segment)| {
-            let recording = &recordings[segment.recording];
-            let span = Span {
-                start_s: segment.start_s,
-                end_s: segment.end_s,
-                times_s: &recording.t_s[segment.first..segment.last],
-            };
-            let mut out = Trace::default();
-            let p = &point.parameters;
-            follow(p, point.states[k], &span, point.stretch, true, |n, x| {
-                let sign = [x[2], x[3] - x[2]].map(f64::signum);
-                let motion = accelerations(p, x, sign.map(Contact::Slip));
-                out.recording.push(segment.recording);
-                out.sample.push(segment.first + n);
-                out.segment.push(k);
-                out.state.push(*x);
-                out.unit_power.push(unit_powers(p, x, motion.a));
-            });
-            out
-        })
-        .collect();
+    let one = |(k, segment): (usize, &Segment)| {
+        let recording = &recordings[segment.recording];
+        let span = Span {
+            start_s: segment.start_s,
+            end_s: segment.end_s,
+            times_s: &recording.t_s[segment.first..segment.last],
+        };
+        let mut out = Trace::default();
+        let p = &point.parameters;
+        follow(p, point.states[k], &span, point.stretch, true, |n, x| {
+            let sign = [x[2], x[3] - x[2]].map(f64::signum);
+            let motion = accelerations(p, x, sign.map(Contact::Slip));
+            out.recording.push(segment.recording);
+            out.sample.push(segment.first + n);
+            out.segment.push(k);
+            out.state.push(*x);
+            out.unit_power.push(unit_powers(p, x, motion.a));
+        });
+        out
+    };
+    let pieces: Vec<Trace> = threads::install(|| segments.par_iter().enumerate().map(one).collect());
     let mut all = Trace::default();
     for mut piece in pieces {
         all.recording.append(&mut piece.recording);

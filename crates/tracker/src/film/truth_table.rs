@@ -204,7 +204,7 @@ impl Truth {
         use rayon::prelude::*;
         Self {
             nodes: film.scene().markers.iter().map(|m| (m.name.clone(), m.link.clone())).collect(),
-            frames: (0..film.frames()).into_par_iter().map(|i| film.truth(i)).collect(),
+            frames: threads::install(|| (0..film.frames()).into_par_iter().map(|i| film.truth(i)).collect()),
         }
     }
 
@@ -314,6 +314,9 @@ fn read_csv(path: &Path, name: &str) -> Result<Columns> {
     for (i, line) in lines.enumerate().filter(|(_, l)| !l.trim().is_empty()) {
         let fields: Vec<&str> = line.split(',').map(str::trim).collect();
         let bad = |what: &str| Error::Film(Fault::new(name, what.to_string()).at(Place::Line(i as u64 + 2)));
+        if fields.len() != header.len() {
+            return Err(bad(&format!("{} fields under {} headings", fields.len(), header.len())));
+        }
         let field = |k: usize| fields.get(k).copied().ok_or_else(|| bad("fields are missing"));
         columns.frame.push(field(frame)?.parse().map_err(|_| bad("frame is not a whole number"))?);
         columns.node.push(field(node)?.to_string());

@@ -60,19 +60,17 @@ pub fn write(
 ) -> Result<()> {
     let mut truth = options.truth.as_deref().map(|p| TruthWriter::create(p, film)).transpose()?;
     let mut sink = Sink::create(film, path, options)?;
-    let batch = 4 * rayon::current_num_threads().max(1) as u64;
+    let batch = 4 * threads::count() as u64;
     let mut first = 0;
     while first < film.frames() {
         let end = film.frames().min(first + batch);
         let with_truth = truth.is_some();
-        let made: Vec<_> = (first..end)
-            .into_par_iter()
-            .map(|i| {
-                let mut samples = Vec::new();
-                film.render(i, &mut samples);
-                (samples, with_truth.then(|| film.truth(i)))
-            })
-            .collect();
+        let one = |i| {
+            let mut samples = Vec::new();
+            film.render(i, &mut samples);
+            (samples, with_truth.then(|| film.truth(i)))
+        };
+        let made: Vec<_> = threads::install(|| (first..end).into_par_iter().map(one).collect());
         for (samples, true_frame) in &made {
             sink.write(film, samples)?;
             if let (Some(table), Some(t)) = (&mut truth, true_frame) {

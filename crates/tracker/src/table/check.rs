@@ -30,8 +30,9 @@ impl NodeTable {
                 format!("columns hold {lengths:?} values, expected {frames} frames x {nodes} nodes"),
             )));
         }
-        let first =
-            (0..frames).into_par_iter().filter_map(|t| self.frame_fault(t)).min_by_key(|(row, _)| *row);
+        let first = threads::install(|| {
+            (0..frames).into_par_iter().filter_map(|t| self.frame_fault(t)).min_by_key(|(row, _)| *row)
+        });
         match first {
             Some((row, problem)) => Err(row_fault(name, row, problem)),
             None => Ok(()),

@@ -43,7 +43,7 @@ pub(super) fn read(path: &Path) -> Result<NodeTable> {
     if !lines.next()? {
         return Err(lines.fault("the file is empty", "Run " + TRACK + " again"));
     }
-    let columns = columns_of(&lines)?;
+    let (width, columns) = columns_of(&lines)?;
     let mut rows = Rows::default();
     let nodes = meta.rig.nodes.len();
     let mut n = 0;
@@ -52,6 +52,13 @@ pub(super) fn read(path: &Path) -> Result<NodeTable> {
     while lines.next()? {
         split(&lines.line, &mut unquoted, &mut ends)
             .map_err(|problem| lines.fault(problem, "Write the table again"))?;
+        // Spreadsheets leave separators at the end of a line.
+        if ends.len() > width && !unquoted[ends[width - 1]..].trim().is_empty() {
+            return Err(lines.fault(
+                format!("the row has {} fields, the header has {width}", ends.len()),
+                "If commas are its decimal marks too, write the table with decimal points",
+            ));
+        }
         let cell = |column: usize| -> Result<&str> {
             let at = columns[column];
             match ends.get(at) {
@@ -107,23 +114,44 @@ pub(super) fn read(path: &Path) -> Result<NodeTable> {
 }
 
 /// For each of [`COLUMNS`] its place in the file.
-fn columns_of(lines: &Lines) -> Result<[usize; COLUMNS.len()]> {
-    let header: Vec<&str> =
-        lines.line.trim_start_matches('\u{feff}').split(',').map(|c| c.trim().trim_matches('"')).collect();
+/// Also how many columns there are.
+fn columns_of(lines: &Lines) -> Result<(usize, [usize; COLUMNS.len()])> {
+    let line = lines.line.trim_start_matches('\u{feff}');
+    if line.contains('\r') {
+        return Err(lines.fault("its lines end in carriage returns alone", "Save it with line feeds"));
+    }
+    let mut header: Vec<&str> = line.split(',').map(|c| c.trim().trim_matches('"')).collect();
+    while header.last().is_some_and(|name| name.is_empty()) {
+        header.pop();
+    }
     let mut columns = [0; COLUMNS.len()];
     for (place, name) in columns.iter_mut().zip(COLUMNS) {
+        let count = header.iter().filter(|c| **c == name).count();
+        if count > 1 {
+            let problem = format!("the column {name} is there {count} times");
+            return Err(lines.fault(problem, "Rename all but one"));
+        }
         *place = header.iter().position(|c| *c == name).ok_or_else(|| {
             Error::Table(
                 Fault::new(
                     lines.path.display(),
-                    format!("there is no column {name}, only {}", header.join(", ")),
+                    format!("there is no column {name}, only {}", shown(&header)),
                 )
                 .at(Place::Line(1))
                 .advice("Give a node table written by " + TRACK),
             )
         })?;
     }
-    Ok(columns)
+    Ok((header.len(), columns))
+}
+
+/// Names for a message, which is to stay a line that can be read.
+fn shown(header: &[&str]) -> String {
+    let all = header.join(", ");
+    match all.char_indices().nth(200) {
+        Some((end, _)) => format!("{}...", &all[..end]),
+        None => all,
+    }
 }
 
 struct Lines {

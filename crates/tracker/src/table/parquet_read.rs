@@ -92,9 +92,16 @@ fn open(path: &Path) -> Result<(Shared, ArrowReaderMetadata, TableMeta)> {
         pairs?.iter().find(|kv| kv.key == full)?.value.clone()
     };
     let meta = TableMeta::from_entries(find, &name)?;
+    let there: Vec<&str> = metadata.schema().fields().iter().map(|f| f.name().as_str()).collect();
     for column in COLUMNS {
-        if metadata.schema().field_with_name(column).is_err() {
-            let there: Vec<&str> = metadata.schema().fields().iter().map(|f| f.name().as_str()).collect();
+        let count = there.iter().filter(|name| **name == column).count();
+        if count > 1 {
+            return Err(Error::Table(
+                Fault::new(&name, format!("the column {column} is there {count} times"))
+                    .advice("Rename all but one"),
+            ));
+        }
+        if count == 0 {
             return Err(Error::Table(
                 Fault::new(&name, format!("there is no column {column}, only {}", there.join(", ")))
                     .advice("Give a node table written by " + TRACK),
@@ -110,9 +117,21 @@ pub(super) fn read(path: &Path) -> Result<NodeTable> {
     let groups = metadata.metadata().row_groups();
     let mut first_rows = Vec::with_capacity(groups.len());
     let mut total = 0usize;
-    for group in groups {
+    for (g, group) in groups.iter().enumerate() {
         first_rows.push(total);
-        total += group.num_rows().max(0) as usize;
+        let rows = group.num_rows();
+        // What is set aside below is as much as the file says, so it must say the same everywhere.
+        let agreed = group.columns().iter().all(|c| c.num_values() == rows);
+        total = usize::try_from(rows)
+            .ok()
+            .filter(|_| agreed)
+            .and_then(|rows| total.checked_add(rows))
+            .ok_or_else(|| {
+                Error::Table(
+                    Fault::new(&name, format!("row group {g} says {rows} rows, its columns say otherwise"))
+                        .advice("It is damaged: copy it again, or run `tracker track` again"),
+                )
+            })?;
     }
     let nodes = meta.rig.nodes.len();
     if !total.is_multiple_of(nodes) {
@@ -163,7 +182,7 @@ pub(super) fn read(path: &Path) -> Result<NodeTable> {
         }
         if part.status.is_empty() { Ok(begun) } else { Err(damaged(format!("it has {done} of {rows} rows"))) }
     });
-    let begun: Vec<Result<Option<Stamp>>> = begun.collect();
+    let begun: Vec<Result<Option<Stamp>>> = threads::install(|| begun.collect());
     for begun in begun {
         // A frame that begins in one group and ends in another.
         if let Some(here) = begun? {
@@ -230,6 +249,12 @@ fn column(batch: &RecordBatch, at: usize, to: &DataType, first_row: usize, name:
     let Some(array) = batch.column_by_name(COLUMNS[at]) else {
         return Err(fault("the column is missing".into()));
     };
+    if array.data_type().is_temporal() {
+        let fault = Fault::new(name, format!("the column holds {}, not numbers", array.data_type()))
+            .at(Place::Key(COLUMNS[at].into()))
+            .advice("Write times in s from the recording's start");
+        return Err(Error::Table(fault));
+    }
     let array = if array.data_type() == to {
         Arc::clone(array)
     } else {

@@ -27,6 +27,10 @@ impl Levels {
     /// [`Error::Detect`] if no frame was decoded, frames differ in size, a threshold is out of range, or
     /// nothing like a marker is found.
     pub fn learn(samples: &[Frame], settings: &DetectSettings) -> Result<Self> {
+        threads::install(|| Self::learn_here(samples, settings))
+    }
+
+    fn learn_here(samples: &[Frame], settings: &DetectSettings) -> Result<Self> {
         // Step 1: unpack.
         let mut planes = Vec::new();
         let mut first: Option<&Frame> = None;

@@ -109,7 +109,7 @@ impl SequenceSource {
             details: Vec::new(),
             warnings,
         };
-        let batch = (AHEAD_BYTES / first.samples.len().max(1)).clamp(1, 2 * rayon::current_num_threads());
+        let batch = (AHEAD_BYTES / first.samples.len().max(1)).clamp(1, 2 * threads::count());
         Ok(Self {
             info,
             files,
@@ -126,7 +126,8 @@ impl SequenceSource {
         let end = (self.next_file + self.batch).min(self.files.len());
         let range = self.next_file..end;
         let read = |path: &Option<PathBuf>| path.as_ref().map(|p| picture::read(p));
-        let pictures: Vec<_> = self.files[range.clone()].par_iter().map(read).collect();
+        let files = &self.files[range.clone()];
+        let pictures: Vec<_> = threads::install(|| files.par_iter().map(read).collect());
         for (index, picture) in range.zip(pictures) {
             let picture =
                 picture.and_then(|p| p.map_err(|e| self.damaged.push(format!("picture {index}: {e}"))).ok());
@@ -173,7 +174,8 @@ impl FrameSource for SequenceSource {
         let there: Vec<&PathBuf> = self.files.iter().flatten().collect();
         let n = count.min(there.len());
         let spread: Vec<&PathBuf> = (0..n).map(|k| there[(2 * k + 1) * there.len() / (2 * n)]).collect();
-        let pictures: Vec<_> = spread.par_iter().map(|p| picture::read(p).ok()).collect();
+        let pictures: Vec<_> =
+            threads::install(|| spread.par_iter().map(|p| picture::read(p).ok()).collect());
         let frames = pictures.into_iter().enumerate().map(|(i, p)| frame(&self.info, i as u64, p));
         Ok(frames.filter(|f| f.plane.is_some()).collect())
     }

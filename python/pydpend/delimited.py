@@ -1,0 +1,295 @@
+"""Delimited text taken apart: which character parts the fields, which marks the decimals, where the header is.
+
+Owns: what a spreadsheet, a logger, LabVIEW or ``numpy.savetxt`` may have written. What could be read in two ways is
+refused by its line: a wrong number without a word is the worst that a reader can give.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pydpend.errors import PydpendError, fault
+
+_EMPTY = frozenset({"", "nan", "na", "n/a", "null", "none"})
+"""Fields (lower case, stripped) that mean "no value"."""
+
+_HEADER_WITHIN = 200
+"""A header is looked for in this many lines: loggers write some lines of notes before it."""
+
+_COMMENTS = ("#", "%", "//")
+"""What a line begins with that is not data; a header may begin so too."""
+
+_PARTERS = {",": "commas", ";": "semicolons", "\t": "tabs", " ": "spaces"}
+
+_COMMA_NUMBER = re.compile(r"[+-]?(\d+,\d*|,\d+)([eE][+-]?\d+)?")
+_MAY_BE_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
+
+
+@dataclass(frozen=True)
+class Cells:
+    """A text file with its header found. ``delimiter`` parts the fields; a space stands for any run of white space."""
+
+    name: str
+    text: str
+    header: tuple[str, ...]
+    header_line: int
+    delimiter: str
+    error: type[PydpendError]
+
+    def refuse(self, problem: str, advice: str, place: str) -> NoReturn:
+        """Raises the file's error."""
+        raise self.error(fault(self.name, problem, advice, place=place))
+
+    def fields(self, wanted: Sequence[str]) -> tuple[dict[str, list[str]], list[int]]:
+        """The stripped fields of each wanted column, "" for those without a value, and each row's line."""
+        index = [self.header.index(c) for c in wanted]
+        out: list[list[str]] = [[] for _ in wanted]
+        lines: list[int] = []
+        units_may_come = True
+        width = len(self.header)
+        for line, row in self._rows():
+            if line <= self.header_line or row[0].lstrip().startswith(_COMMENTS):
+                continue
+            if len(row) != width and not self._only_empty(row):
+                self._wrong_width(line, row)
+            if not any(f and not f.isspace() for f in row):
+                continue
+            here = [row[i].strip() for i in index]
+            if units_may_come:
+                units_may_come = False
+                if all(_is_word(f) for f in here):
+                    continue
+            lines.append(line)
+            for column, field in zip(out, here, strict=True):
+                column.append("" if field.lower() in _EMPTY else field)
+        return dict(zip(wanted, out, strict=True)), lines
+
+    def _rows(self) -> Iterator[tuple[int, list[str]]]:
+        if self.delimiter == " ":
+            for number, line in enumerate(self.text.split("\n"), 1):
+                yield number, line.split() or [""]
+        elif '"' not in self.text:
+            for number, line in enumerate(self.text.split("\n"), 1):
+                yield number, line.split(self.delimiter)
+        else:
+            # The limit is the module's own and only grows: a long note is no fault.
+            csv.field_size_limit(max(csv.field_size_limit(), len(self.text)))
+            reader = csv.reader(io.StringIO(self.text, newline=""), delimiter=self.delimiter, strict=True)
+            start = 1
+            try:
+                for row in reader:
+                    yield start, row or [""]
+                    start = reader.line_num + 1
+            except csv.Error as problem:
+                said = (
+                    "a quote is opened and not closed" if "unexpected end" in str(problem) else str(problem)
+                )
+                self.refuse(said, "Repair or remove the line", f"line {start}")
+
+    def _only_empty(self, row: list[str]) -> bool:
+        """Whether a row has the header's fields and empty ones after them, is blank, or lacks LabVIEW's comment, which
+        it writes in the first row alone."""
+        width = len(self.header)
+        if len(row) > width:
+            return not any(f.strip() for f in row[width:])
+        return (
+            row == [""]
+            or (len(row) == 1 and row[0].isspace())
+            or (len(row) == width - 1 and self.header[-1].lower() == "comment")
+        )
+
+    def _wrong_width(self, line: int, row: list[str]) -> NoReturn:
+        names, parted = len(self.header), _PARTERS[self.delimiter]
+        problem = f"{len(row)} fields parted by {parted}, the header in line {self.header_line} has {names}"
+        advice = "Repair or remove the line"
+        if self.delimiter == "," and len(row) > names:
+            advice = (
+                "If the commas are decimal marks too, write the file with semicolons between the fields or with "
+                "decimal points; put text that holds commas in quotes"
+            )
+        self.refuse(problem, advice, f"line {line}")
+
+
+def take_apart(name: str, data: bytes, required: Sequence[str], error: type[PydpendError]) -> Cells:
+    """The text of a file and its header, the first line that holds every required name."""
+    text = _decoded(data).replace("\r\n", "\n").replace("\r", "\n")
+    if "\0" in text[:4096]:
+        raise error(
+            fault(
+                name, "the file is neither Parquet nor text", "Give a CSV or Parquet file with named columns"
+            )
+        )
+    if not text.strip():
+        raise error(fault(name, "the file is empty", "Give a CSV file with a header line and rows"))
+    header, line, delimiter = _find_header(name, text, required, error)
+    return Cells(name, text, header, line, delimiter, error)
+
+
+def names_on_first_line(data: bytes) -> list[str]:
+    """The fields of a text's first line, parted by commas."""
+    line = _decoded(data).lstrip().replace("\r", "\n").partition("\n")[0]
+    return _names(line, ",")
+
+
+def _decoded(data: bytes) -> str:
+    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return data.decode("utf-16", "replace")
+    head = data[:512]
+    for start, encoding in ((1, "utf-16-le"), (0, "utf-16-be")):
+        half = head[start::2]
+        # Latin letters and digits in UTF-16 without its mark: every second byte is zero.
+        if half and not any(half) and any(head):
+            return data.decode(encoding, "replace")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("latin-1")
+
+
+def _find_header(
+    name: str, text: str, required: Sequence[str], error: type[PydpendError]
+) -> tuple[tuple[str, ...], int, str]:
+    """Column names, the header's line (from 1) and the delimiter."""
+    head = text.split("\n", _HEADER_WITHIN)[:_HEADER_WITHIN]
+    bare = [line.strip(" \r").lstrip("#%/").strip(" ") for line in head]
+    first: list[str] | None = None
+    # A sentence above the header may hold the names between spaces, so spaces are tried last.
+    for delimiters in (",;\t", " "):
+        for number, line in enumerate(bare, start=1):
+            for delimiter in delimiters if line.strip() else "":
+                names = line.split() if delimiter == " " else _names(line, delimiter)
+                if first is None and (len(names) > 1 or delimiter == " "):
+                    first = names
+                if all(c in names for c in required):
+                    return tuple(names), number, delimiter
+    found = first or []
+    if found and all(_is_number(f) for f in found):
+        raise error(
+            fault(
+                name,
+                f"there is no header line with the names {', '.join(required)}",
+                "Write the names of the columns above the numbers",
+                place="line 1",
+            )
+        )
+    missing = [c for c in required if c not in found] or list(required)
+    raise error(
+        fault(
+            name,
+            f"there is no column {', '.join(missing)}",
+            f"The columns are {', '.join(found) or '(none)'}; name the right one",
+        )
+    )
+
+
+def _names(line: str, delimiter: str) -> list[str]:
+    """The names of a header; separators at its end part nothing."""
+    try:
+        names = [f.strip() for f in next(csv.reader([line], delimiter=delimiter), [])]
+    except csv.Error:  # a note of more than the module's limit
+        names = [f.strip() for f in line.split(delimiter)]
+    while names and not names[-1]:
+        names.pop()
+    return names
+
+
+def _is_word(field: str) -> bool:
+    """Whether a field is neither a number nor empty, as the units under a header are."""
+    return field.lower() not in _EMPTY and not re.match(r"[+-]?[.,]?\d", field) and not _is_number(field)
+
+
+def _is_number(field: str) -> bool:
+    try:
+        float(field.replace(",", "."))
+    except ValueError:
+        return False
+    return True
+
+
+class Numbers:
+    """The numbers of a file's fields, with one decimal mark for the whole file."""
+
+    def __init__(self, cells: Cells, fields: Mapping[str, list[str]], lines: Sequence[int]) -> None:
+        self._cells, self._fields, self._lines = cells, fields, lines
+        self._comma = self._decimal_comma()
+
+    def _at(self, row: int, column: str) -> str:
+        return f"line {self._lines[row]}, column {column}"
+
+    def _decimal_comma(self) -> bool:
+        """Whether the decimal mark is a comma. Refuses a file that has both marks or may mean thousands."""
+        doubtful: tuple[int, str] | None = None
+        sure: tuple[int, str] | None = None
+        for column, fields in self._fields.items():
+            for row, field in enumerate(fields):
+                if "," not in field:
+                    continue
+                if "." in field or field.count(",") > 1:
+                    self._cells.refuse(
+                        f"{field!r} has marks between thousands",
+                        "Write numbers without them",
+                        self._at(row, column),
+                    )
+                if not _COMMA_NUMBER.fullmatch(field):
+                    self._not_a_number(row, column)
+                if _MAY_BE_THOUSANDS.fullmatch(field):
+                    doubtful = doubtful or (row, column)
+                else:
+                    sure = sure or (row, column)
+        if sure is None and doubtful is not None:
+            row, column = doubtful
+            field = self._fields[column][row]
+            self._cells.refuse(
+                f"{field!r} may be {field.replace(',', '.')} or {field.replace(',', '')}, and no other number of the "
+                "file tells which",
+                "Write decimal points, and no marks between thousands",
+                self._at(row, column),
+            )
+        if sure is None:
+            return False
+        for column, fields in self._fields.items():
+            for row, field in enumerate(fields):
+                if "." in field:
+                    seen = f"{self._fields[sure[1]][sure[0]]!r} in {self._at(*sure)}"
+                    self._cells.refuse(
+                        f"{field!r} has a decimal point, {seen} a decimal comma",
+                        "Use one decimal mark in the whole file",
+                        self._at(row, column),
+                    )
+        return True
+
+    def _not_a_number(self, row: int, column: str) -> NoReturn:
+        field = self._fields[column][row]
+        shown = repr(field if len(field) <= 40 else field[:40] + "...")
+        self._cells.refuse(
+            f"{shown} is not a number", "Remove the line or leave the field empty", self._at(row, column)
+        )
+
+    def column(self, column: str) -> NDArray[np.float64]:
+        """The numbers of a column (R,), NaN where there is none."""
+        fields = [f or "nan" for f in self._fields[column]]
+        if self._comma:
+            fields = [f.replace(",", ".") for f in fields]
+        # Python's own 1_000 and digits of other scripts are no numbers of a data file.
+        if all(f.isascii() and "_" not in f for f in fields):
+            try:
+                return np.array(fields, dtype=np.float64)
+            except ValueError:
+                pass  # one by one, to find which
+        out = np.empty(len(fields))
+        for row, field in enumerate(fields):
+            try:
+                if "_" in field or not field.isascii():
+                    raise ValueError
+                out[row] = float(field)
+            except ValueError:
+                self._not_a_number(row, column)
+        return out

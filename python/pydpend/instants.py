@@ -1,0 +1,130 @@
+"""Dates, times of day and durations as seconds.
+
+A stamp becomes seconds from the first one: differences are taken in whole ticks, so nothing of the resolution is lost
+to the size of the date. A duration is seconds already.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+_TICKS_PER_S = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}
+
+_DATE = re.compile(r"\d{4}-\d{2}-\d{2}")
+_CLOCK = re.compile(
+    r"(?:(?P<days>[+-]?\d+) days? )?(?P<sign>[+-]?)(?P<h>\d{1,4}):(?P<m>[0-5]\d)"
+    r"(?::(?P<s>[0-5]\d)(?:[.,](?P<f>\d{1,9})\d*)?)?"
+)
+"""A time of day or a duration as pandas writes it: ``12:00:00.25``, ``0 days 00:00:01.5``."""
+
+
+class NotInstants(ValueError):
+    """Values that are no dates, times or durations, or mixed ones. ``row`` is the first at fault."""
+
+    def __init__(self, row: int, problem: str) -> None:
+        super().__init__(problem)
+        self.row = row
+
+
+def is_instant(field: str) -> bool:
+    """Whether a field of a text begins as a date, or is a time of day or a duration."""
+    return bool(_DATE.match(field) or _CLOCK.fullmatch(field))
+
+
+def seconds_of_text(fields: Sequence[str]) -> tuple[Floats, str]:
+    """Seconds of ISO 8601 dates with times (T,), counted from the first, or of times of day and durations; NaN where a
+    field is empty. And the first stamp, "" for durations. With an offset from UTC in every field or in none.
+
+    Raises NotInstants with the row of the first field that is neither.
+    """
+    filled = [i for i, f in enumerate(fields) if f]
+    out = np.full(len(fields), np.nan)
+    if not filled:
+        return out, ""
+    first = fields[filled[0]]
+    if not _DATE.match(first):
+        for i in filled:
+            out[i] = _clock_s(fields[i], i)
+        return out, ""
+    zoned = _has_offset(first)
+    kind = pa.timestamp("ns", "UTC" if zoned else None)
+    texts = [fields[i].replace(",", ".") for i in filled]
+    try:
+        stamps = pa.array(texts).cast(kind)
+    except pa.ArrowInvalid:
+        for i, text in zip(filled, texts, strict=True):
+            try:
+                pa.array([text]).cast(kind)
+            except pa.ArrowInvalid as problem:
+                if _DATE.match(text) and _has_offset(text) != zoned:
+                    raise NotInstants(i, "some dates have an offset from UTC and some have none") from problem
+                raise NotInstants(i, f"{fields[i]!r} is no date and time as ISO 8601 writes it") from problem
+        raise
+    out[filled] = _since_first(stamps.cast(pa.int64()).to_numpy(), 10**9)
+    return out, first
+
+
+def _has_offset(text: str) -> bool:
+    return bool(re.search(r"(Z|[+-]\d\d:?\d\d|[+-]\d\d)$", text[10:]))
+
+
+def _clock_s(field: str, row: int) -> float:
+    found = _CLOCK.fullmatch(field)
+    if found is None:
+        raise NotInstants(row, f"{field!r} is no time as hours:minutes:seconds")
+    part = {k: int(v or 0) for k, v in found.groupdict(default="0").items() if k in ("days", "h", "m", "s")}
+    fraction = (found["f"] or "").ljust(9, "0")
+    within = part["h"] * 3600 + part["m"] * 60 + part["s"] + int(fraction) / 1e9
+    return part["days"] * 86400 + (-within if found["sign"] == "-" else within)
+
+
+def seconds_of_arrow(column: pa.ChunkedArray) -> tuple[Floats, str] | None:
+    """Seconds of an Arrow column of dates, times of day or durations (T,), NaN where it is null, and the first stamp.
+    ``None`` for a column of anything else."""
+    kind = column.type
+    if pa.types.is_date(kind):
+        column = column.cast(pa.timestamp("ms"))
+        kind = column.type
+    if not (pa.types.is_timestamp(kind) or pa.types.is_time(kind) or pa.types.is_duration(kind)):
+        return None
+    whole = column.cast(pa.int32() if kind in (pa.time32("s"), pa.time32("ms")) else pa.int64())
+    there = np.asarray(column.is_valid().to_numpy(), dtype=np.bool_)
+    ticks = np.asarray(whole.drop_null().to_numpy(), dtype=np.int64)
+    out = np.full(there.size, np.nan)
+    per_s = _TICKS_PER_S[kind.unit]
+    if pa.types.is_timestamp(kind) and ticks.size:
+        out[there] = _since_first(ticks, per_s)
+        return out, f"{np.datetime64(int(ticks[0]), kind.unit)}{' UTC' if kind.tz else ''}"
+    out[there] = _quotient(ticks, per_s)
+    return out, ""
+
+
+def seconds_of_numpy(values: NDArray[np.generic]) -> Floats:
+    """Numbers as they are; ``datetime64`` as seconds from the first, ``timedelta64`` as seconds; NaT is NaN."""
+    if values.dtype.kind not in "mM":
+        return np.ascontiguousarray(values, dtype=np.float64)
+    fine = values.astype(f"{values.dtype.kind}8[ns]")
+    out = np.full(values.shape, np.nan)
+    there = ~np.isnat(fine)
+    ticks = fine[there].astype(np.int64)
+    out[there] = _since_first(ticks, 10**9) if values.dtype.kind == "M" else _quotient(ticks, 10**9)
+    return out
+
+
+def _since_first(ticks: NDArray[np.int64], per_s: int) -> Floats:
+    if ticks.size == 0:
+        return np.zeros(0)
+    whole, rest = np.divmod(ticks, per_s)
+    return np.asarray((whole - whole[0]) + (rest - rest[0]) / per_s, dtype=np.float64)
+
+
+def _quotient(ticks: NDArray[np.int64], per_s: int) -> Floats:
+    whole, rest = np.divmod(ticks, per_s)
+    return np.asarray(whole + rest / per_s, dtype=np.float64)

@@ -1,0 +1,269 @@
+"""Tables as spreadsheets, loggers and pandas write them: the right numbers or one line that names the line at fault."""
+
+from __future__ import annotations
+
+import datetime
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from nptdms import ChannelObject, TdmsWriter
+from pydpend.angles import read_angles
+from pydpend.columns import Columns, read_columns
+from pydpend.encoder import EncoderSignal, calibrate, read_encoder, read_holds
+from pydpend.errors import AnglesError, EncoderError
+
+HEAD = "time_s,voltage_v\n"
+
+
+def read(tmp_path: Path, data: str | bytes, time: str | None = "time_s") -> Columns:
+    path = tmp_path / "t.csv"
+    path.write_bytes(data.encode() if isinstance(data, str) else data)
+    return read_columns(path, ["time_s", "voltage_v"], error=EncoderError, time=time)
+
+
+LONG = "x" * 200_000
+"""Longer than the 131 072 characters that Python's csv takes by itself."""
+
+READ: dict[str, str | bytes] = {
+    "points": HEAD + "0.5,0.65\n1,1.65\n",
+    "spaces after commas": "time_s, voltage_v\n0.5, 0.65\n1, 1.65\n",
+    "semicolons and decimal commas": "time_s;voltage_v\n0,5;0,65\n1,0;1,65\n",
+    "tabs and decimal commas": "time_s\tvoltage_v\n0,5\t0,65\n1\t1,65\n",
+    "spaces and decimal commas": "time_s voltage_v\n0,5 0,65\n1 1,65\n",
+    "quoted decimal commas": HEAD + '"0,5","0,65"\n"1,0","1,65"\n',
+    "semicolons and points": "time_s;voltage_v\n0.5;0.65\n1;1.65\n",
+    "decimal commas with three digits, one of them sure": "time_s;voltage_v\n0,500;0,650\n1,000;1,650\n",
+    "decimal commas with exponents": "time_s;voltage_v\n5,0e-1;6,5E-1\n1;1,65\n",
+    "numpy.savetxt": "# time_s voltage_v\n5.000000000000000000e-01 6.5e-01\n1.0e+00 1.65e+00\n",
+    "aligned columns": "  time_s   voltage_v\n     0.5       0.65\n     1.0       1.65\n",
+    "carriage returns alone": HEAD.replace("\n", "\r") + "0.5,0.65\r1,1.65\r",
+    "carriage returns and line feeds": HEAD.replace("\n", "\r\n") + "0.5,0.65\r\n1,1.65\r\n",
+    "UTF-16 with its mark": (HEAD + "0.5,0.65\n1,1.65\n").encode("utf-16"),
+    "UTF-16 without": (HEAD + "0.5,0.65\n1,1.65\n").encode("utf-16-le"),
+    "UTF-8 with its mark": (HEAD + "0.5,0.65\n1,1.65\n").encode("utf-8-sig"),
+    "a long note": f"time_s,voltage_v,note\n0.5,0.65,{LONG}\n1,1.65,\n",
+    "a long quoted note": f'time_s,voltage_v,note\n0.5,0.65,"{LONG},"\n1,1.65,\n',
+    "a long note above": f"# {LONG}, it is\n" + HEAD + "0.5,0.65\n1,1.65\n",
+    "a quoted note over two lines": 'time_s,voltage_v,note\n0.5,0.65,"a\nb"\n1,1.65,\n',
+    "separators at the ends": "time_s,voltage_v,\n0.5,0.65,\n1,1.65,\n",
+    "separators at the ends of rows": HEAD + "0.5,0.65,,\n1,1.65,\n",
+    "comments": "# a, b\n% c\n" + HEAD + "# d\n0.5,0.65\n% e\n// f, g, h\n1,1.65\n",
+    "units": HEAD + "s,V\n0.5,0.65\n1,1.65\n",
+    "units with digits": HEAD + "(s),V/m2\n0.5,0.65\n1,1.65\n",
+    "a sentence above with the names in it": "the columns time_s and voltage_v follow\n"
+    + HEAD
+    + "0.5,0.65\n1,1.65\n",
+    "LabVIEW": "LabVIEW Measurement\t\nDecimal_Separator\t,\n***End_of_Header***\t\ntime_s\tvoltage_v\tComment\n"
+    "0,5\t0,65\tbegun\n1\t1,65\n",
+}
+
+
+@pytest.mark.parametrize("kind", READ)
+def test_what_can_be_read_one_way_is_read(tmp_path: Path, kind: str) -> None:
+    found = read(tmp_path, READ[kind])
+    assert found.values["time_s"].tolist() == [0.5, 1.0]
+    assert found.values["voltage_v"].tolist() == [0.65, 1.65]
+
+
+REFUSED: dict[str, tuple[str | bytes, str]] = {
+    "decimal commas between commas": (
+        HEAD + "0,5,0,65\n1,0,1,65\n",
+        "line 2: 4 fields parted by commas, the header",
+    ),
+    "a decimal comma in one row": (HEAD + "0.5,0.65\n1,1,65\n", "line 3: 3 fields parted by commas"),
+    "whole times, volts with commas": (HEAD + "0,0,65\n1,1,65\n", "line 2: 3 fields"),
+    "too few fields": (HEAD + "0.5\n", "line 2: 1 fields parted by commas"),
+    "another separator below": (HEAD + "0.5;0.65\n", "line 2: 1 fields parted by commas"),
+    "text with commas": ("time_s,voltage_v,note\n0.5,0.65,a, b\n", "put text that holds commas in quotes"),
+    "thousands or decimals": (
+        "time_s;voltage_v\n1;1,234\n2;2,345\n",
+        "column voltage_v: '1,234' may be 1.234 or 1234",
+    ),
+    "quoted thousands or decimals": (HEAD + '1,"1,234"\n', "'1,234' may be 1.234 or 1234"),
+    "both marks in a number": ("time_s;voltage_v\n1;1.234,5\n", "'1.234,5' has marks between thousands"),
+    "many thousands": ("time_s;voltage_v\n1;1,234,567\n", "'1,234,567' has marks between thousands"),
+    "a comma here, a point there": (
+        "time_s;voltage_v\n0.5;0,65\n",
+        "line 2, column time_s: '0.5' has a decimal point",
+    ),
+    "a comma first, a point later": (
+        "time_s;voltage_v\n0;0,65\n1;1.65\n",
+        "line 3, column voltage_v: '1.65' has a decimal point, '0,65' in line 2",
+    ),
+    "no header": ("0.5,0.65\n1,1.65\n", "line 1: there is no header line with the names time_s, voltage_v"),
+    "no header, spaces": ("0.5 0.65\n1 1.65\n", "line 1: there is no header line"),
+    "underscores": (HEAD + "0.5,1_0\n", "'1_0' is not a number"),
+    "other scripts' digits": (HEAD + "0.5,\u0661\n", "is not a number"),
+    "a unit in the field": (HEAD + "0.5,0.65 V\n", "line 2, column voltage_v: '0.65 V' is not a number"),
+    "a quote that stays open": (HEAD + '0.5,"0.65\n1,1.65\n', "line 2: a quote is opened and not closed"),
+    "a second block of LabVIEW": (
+        "time_s\tvoltage_v\n0.5\t0.65\ntime_s\tvoltage_v\n1\t1.65\n",
+        "line 3, column time_s: 'time_s' is not a number",
+    ),
+    "a name twice": (
+        "time_s,voltage_v,voltage_v\n0.5,0.65,0.7\n",
+        "line 1: the column voltage_v is there 2 times",
+    ),
+    "binary": (b"\x7fELF\0\0\1\0", "neither Parquet nor text"),
+    "UTF-32": ((HEAD + "0.5,0.65\n").encode("utf-32"), "neither Parquet nor text"),
+}
+
+
+@pytest.mark.parametrize("kind", REFUSED)
+def test_what_can_be_read_two_ways_is_refused_by_its_line(tmp_path: Path, kind: str) -> None:
+    data, message = REFUSED[kind]
+    with pytest.raises(EncoderError) as caught:
+        read(tmp_path, data)
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("delimiter", [",", ";"])
+def test_volts_of_a_calibration_are_never_cut(tmp_path: Path, delimiter: str) -> None:
+    """Seven holds of 0.65 V a turn with decimal commas: 0.65, or refused; once it was 0.6427 without a word."""
+    rows = [f"{turn * 360}{delimiter}{5 + 0.65 * turn:.4f}".replace(".", ",") for turn in range(-3, 4)]
+    table = tmp_path / "cal.csv"
+    table.write_text(f"angle_deg{delimiter}voltage_v\n" + "\n".join(rows) + "\n")
+    if delimiter == ",":
+        with pytest.raises(EncoderError, match=r"cal.csv, line 2: 3 fields parted by commas"):
+            read_holds([table])
+    else:
+        found = calibrate(read_holds([table]))
+        assert found.slope_v_per_rad * 2 * np.pi == pytest.approx(0.65, abs=1e-12)
+
+
+STAMPS = {
+    "UTC": ("2024-05-01T12:00:00.250Z", "2024-05-01T12:00:00.251Z"),
+    "no zone": ("2024-05-01 12:00:00.250", "2024-05-01 12:00:00.251"),
+    "an offset": ("2024-05-01T12:00:00.250+02:00", "2024-05-01T12:00:00.251+02:00"),
+    "the end of summer time": ("2024-10-27T02:59:59.999500+02:00", "2024-10-27T02:00:00.000500+01:00"),
+    "nanoseconds": ("2024-05-01T12:00:00.249999900", "2024-05-01T12:00:00.250999900"),
+    "a time of day": ("12:00:00.250", "12:00:00.251"),
+    "pandas' duration": ("0 days 00:00:00.250000", "0 days 00:00:00.251000"),
+}
+
+
+@pytest.mark.parametrize("kind", STAMPS)
+def test_dates_in_text_become_seconds(tmp_path: Path, kind: str) -> None:
+    first, second = STAMPS[kind]
+    found = read(tmp_path, HEAD + f"{first},0.65\n{second},1.65\n")
+    # A float64 holds times of day to 1e-11 s.
+    assert np.diff(found.values["time_s"]) == pytest.approx([0.001], abs=1e-10)
+    if "day" not in kind and "duration" not in kind:
+        assert found.values["time_s"][0] == 0.0
+        assert found.first_stamp == first
+
+
+@pytest.mark.parametrize(
+    ("rows", "message"),
+    [
+        (
+            "2024-05-01T12:00:00Z,1\n2024-05-01T12:00:01,2\n",
+            "line 3, column time_s: some dates have an offset",
+        ),
+        (
+            "2024-05-01T12:00:00,1\n05/01/2024 12:00:01,2\n",
+            "line 3, column time_s: '05/01/2024 12:00:01' is no date",
+        ),
+        ("05/01/2024 12:00:01,2\n", "line 2, column time_s: '05/01/2024 12:00:01' is not a number"),
+        ("2024-05-01T12:00:00,1\n3.5,2\n", "'3.5' is no date and time"),
+        ("12:00:00,1\n3.5,2\n", "'3.5' is no time as hours:minutes:seconds"),
+        ("0,2024-05-01T12:00:00\n", "line 2, column voltage_v: '2024-05-01T12:00:00' is not a number"),
+    ],
+)
+def test_dates_that_say_no_instant_are_refused(tmp_path: Path, rows: str, message: str) -> None:
+    with pytest.raises(EncoderError) as caught:
+        read(tmp_path, HEAD + rows)
+    assert message in str(caught.value)
+
+
+def test_clocks_that_go_back_are_refused(tmp_path: Path) -> None:
+    """Local time without its zone, over the end of summer time: the hour that comes twice is not guessed at."""
+    path = tmp_path / "t.csv"
+    path.write_text(HEAD + "2024-10-27T02:59:59,1\n2024-10-27T02:00:00,2\n")
+    with pytest.raises(EncoderError, match="line 3, column time: the time -3599 s does not come after 0 s"):
+        read_encoder(path)
+
+
+TIMES = pd.to_datetime(["2024-05-01T12:00:00.250", "2024-05-01T12:00:00.251", "2024-05-01T12:00:00.252"])
+ARROW = {
+    "timestamp[ns]": pa.array(TIMES.astype("datetime64[ns]")),
+    "timestamp[us]": pa.array(TIMES.astype("datetime64[us]")),
+    "timestamp[ms]": pa.array(TIMES.astype("datetime64[ms]")),
+    "timestamp[ns, tz]": pa.array(TIMES.astype("datetime64[ns]").tz_localize("Europe/Berlin")),
+    "time64[us]": pa.array([t.time() for t in TIMES], pa.time64("us")),
+    "time32[ms]": pa.array([t.time() for t in TIMES], pa.time32("ms")),
+    "duration[us]": pa.array(TIMES - TIMES[0], pa.duration("us")),
+    "float": pa.array([0.0, 0.001, 0.002]),
+    "decimal": pa.array([0, 0.001, 0.002]).cast(pa.decimal128(10, 6)),
+}
+
+
+@pytest.mark.parametrize("kind", ARROW)
+def test_dates_in_parquet_become_seconds(tmp_path: Path, kind: str) -> None:
+    path = tmp_path / "t.parquet"
+    phi = np.zeros(3)
+    pq.write_table(pa.table({"time_s": ARROW[kind], "voltage_v": phi, "phi1_rad": phi}), path)
+    found = read_encoder(path, column="voltage_v")
+    # A time of day of 43 200 s has a resolution of 7e-12 s.
+    assert np.diff(found.t_s) == pytest.approx([0.001, 0.001], abs=2e-11)
+    assert np.diff(read_angles(path).t_s) == pytest.approx([0.001, 0.001], abs=2e-11)
+    if kind.startswith("timestamp"):
+        assert found.t_s[0] == 0.0
+        assert "counted in s from the first, 2024-05-01T1" in found.notes[0]
+    swapped = tmp_path / "s.parquet"
+    if not kind.startswith(("float", "decimal")):
+        pq.write_table(pa.table({"time_s": np.arange(3.0), "voltage_v": ARROW[kind]}), swapped)
+        with pytest.raises(EncoderError, match=r"column voltage_v: the column is of type .* not numbers"):
+            read_encoder(swapped)
+
+
+def test_a_name_twice_in_parquet(tmp_path: Path) -> None:
+    path = tmp_path / "t.parquet"
+    twice = pa.Table.from_arrays([pa.array([0.0])] * 3, ["time_s", "phi1_rad", "phi1_rad"])
+    pq.write_table(twice, path)
+    with pytest.raises(AnglesError, match="the column phi1_rad is there 2 times"):
+        read_angles(path)
+
+
+def test_stamps_in_tdms_become_seconds_to_their_resolution(tmp_path: Path) -> None:
+    path = tmp_path / "t.tdms"
+    first = np.datetime64("2026-01-01T00:00:00.250", "us")
+    stamps = first + np.arange(5) * np.timedelta64(20, "us")
+
+    def made(name: str, **properties: object) -> ChannelObject:
+        return ChannelObject("g", name, np.arange(5) / 10, properties=properties)
+
+    with TdmsWriter(path) as writer:
+        writer.write_segment(
+            [
+                ChannelObject("g", "when", stamps),
+                made("voltage_v", wf_increment=np.datetime64("2026-01-01T00:00:00")),
+                made("late", wf_increment=0.001, wf_start_offset="soon"),
+                made("still", wf_increment=0.0),
+            ]
+        )
+    found = read_encoder(path, column="voltage_v", time_column="when")
+    # The file keeps 2^-64 s, a float64 of 1e-4 s 1e-20 s.
+    assert found.t_s == pytest.approx(np.arange(5) * 20e-6, abs=1e-12)
+    assert "counted in s from the first, 2026-01-01T00:00:00.250000 UTC" in found.notes[0]
+    for channel, message in (
+        ("when", "channel when: the channel holds time stamps, not numbers"),
+        ("voltage_v", r"channel voltage_v: wf_increment is 2026-01-01T00:00:00.* not a number of seconds"),
+        ("late", "channel late: wf_start_offset is soon, not a number of seconds"),
+        ("still", r"channel still: its waveform increment \(wf_increment\) is 0 s"),
+    ):
+        with pytest.raises(EncoderError, match=message):
+            read_encoder(path, column=channel, time_column="late" if channel == "when" else None)
+
+
+def test_dates_given_as_arrays_become_seconds() -> None:
+    for unit in ("ms", "us", "ns"):
+        found = EncoderSignal(TIMES.to_numpy().astype(f"datetime64[{unit}]"), np.zeros(3))
+        assert found.t_s == pytest.approx([0.0, 0.001, 0.002], abs=1e-15)
+    spans = np.array([datetime.timedelta(milliseconds=k) for k in (5, 6)], dtype="timedelta64[us]")
+    assert EncoderSignal(spans, np.zeros(2)).t_s == pytest.approx([0.005, 0.006], abs=1e-15)
