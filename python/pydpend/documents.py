@@ -171,9 +171,9 @@ def parse_json(text: str, source: str, error: type[PydpendError], advice: Text =
 
 def read_toml(path: Path, error: type[PydpendError], advice: Text = "") -> Table:
     """A TOML file; as `read_json`."""
-    source = str(path)
+    source, text = str(path), read_text(path, error, advice)
     try:
-        value = tomllib.loads(read_text(path, error, advice))
+        value = tomllib.loads(text)
     except tomllib.TOMLDecodeError as problem:
         said = re.fullmatch(r"(.*) \(at (line \d+, column \d+|end of document)\)", str(problem), re.DOTALL)
         what, place = said.groups() if said else (str(problem), "")
