@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
+from pydpend.angles import parse_zero, roll_sigma
 from pydpend.documents import read_toml
 from pydpend.errors import OptionError, Setting, Step, fault, one_of
 from pydpend.fit_options import INTERVALS, METHODS, RATIOS, check_fit
@@ -72,8 +73,9 @@ class Options:
     angle_maps: bool = False
     """Learn angle-dependent tracking bias with the fit."""
     zero: str = "rest"
-    """Where the links hang: ``rest`` (found in the recording), ``reference_frame``, degrees of each link in the
-    rig's reference frame (``180,180``), or a film or node table of the same rig hanging still."""
+    """Where the links hang: ``rest`` (found in the recording), ``vertical`` (the picture's, uncertain by the camera's
+    roll: 1 deg, or ``vertical=0.5``), ``reference_frame``, degrees of each link in the rig's reference frame
+    (``180,180``), or a film or node table of the same rig hanging still."""
     bodies: str | None = None
     """Names of the links in node tables from the pivot outwards, with a comma; the rig's order if not given."""
     mirrored: bool = False
@@ -144,17 +146,17 @@ def check_files(options: Options) -> None:
             )
         )
     zero = options.zero
-    if zero not in ("rest", "reference_frame") and not Path(zero).exists():
-        try:
-            [float(word) for word in zero.split(",")]
-        except ValueError:
-            raise OptionError(
-                fault(
-                    Setting("zero"),
-                    f"{zero} is no file and no degrees",
-                    "Give rest, reference_frame, 180,180, or a film or node table",
-                )
-            ) from None
+    said = parse_zero(zero)
+    if said is None and not Path(zero).exists():
+        raise OptionError(
+            fault(
+                Setting("zero"),
+                f"{zero} is no file and no degrees",
+                "Give rest, vertical, reference_frame, 180,180, or a film or node table",
+            )
+        )
+    if isinstance(said, str) and said.startswith("vertical"):
+        roll_sigma(said)
 
 
 def flag_of(field: str) -> str:

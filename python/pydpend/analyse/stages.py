@@ -119,22 +119,21 @@ def _nodes(here: Path, r: Recording) -> Nodes:
 def _hanging(r: Recording, options: Options, here: Path, into: Path) -> Any:
     """The ``zero`` of `angles.angles`, tracking a reference film if one is named."""
     from pydpend.analyse.recordings import kind_of
+    from pydpend.angles import parse_zero
     from pydpend.nodes import read_nodes
 
-    zero = options.zero
-    if zero in ("rest", "reference_frame"):
-        return zero
-    path = Path(zero)
-    if path.exists():
-        if kind_of(path) == "nodes":
-            return read_nodes(path)
-        from pydpend.tracking import track as track_film
+    said = parse_zero(options.zero)
+    if said is not None:
+        return said
+    path = Path(options.zero)
+    if kind_of(path) == "nodes":
+        return read_nodes(path)
+    from pydpend.tracking import track as track_film
 
-        # The same rig, so that the markers have the same names.
-        rig = into / "zero_rig.toml"
-        rig.write_text(_nodes(here, r).rig.to_toml(), encoding="utf-8")
-        return track_film(path, rig, fps=options.fps, output=into / "zero.parquet", progress=False)
-    return [math.radians(float(word)) for word in zero.split(",")]
+    # The same rig, so that the markers have the same names.
+    rig = into / "zero_rig.toml"
+    rig.write_text(_nodes(here, r).rig.to_toml(), encoding="utf-8")
+    return track_film(path, rig, fps=options.fps, output=into / "zero.parquet", progress=False)
 
 
 def angles(r: Recording, options: Options, here: Path, into: Path) -> str:

@@ -28,7 +28,7 @@ def angles(
     nodes: Nodes,
     estimator: Method = "rigid",
     *,
-    zero: Literal["rest", "reference_frame"] | Sequence[float] | float | Nodes = "rest",
+    zero: str | Sequence[float] | float | Nodes = "rest",
     bodies: Sequence[str] | None = None,
     mirrored: bool = False,
     link_length_m: float | None = None,
@@ -45,10 +45,12 @@ def angles(
     - ``"linkage"``: both links and the joints they share fitted together; needs a pivot that stays in place.
     - ``"pairwise"``: the paper's Eqs. 30-32 with a circular mean.
 
-    ``zero``: ``"rest"`` finds the stretches in which all links hang still; the nodes of another recording
-    with the same rig and camera take the rest from there; one number per link says at what angles, in rad,
-    the links stand in the rig's reference frame; ``"reference_frame"`` says 0 for both. The turn is such
-    that the first angle lies within (-pi, pi].
+    ``zero``: ``"rest"`` finds the stretches in which all links hang still, and believes them if nothing in the
+    recording contradicts that (docs/angles.md); ``"vertical"`` is the picture's vertical, with the camera's roll as
+    standard uncertainty, 1 deg or as in ``"vertical=0.5"``; the nodes of another recording with the same rig and
+    camera take the rest from there; one number per link says at what angles, in rad, the links stand in the rig's
+    reference frame; ``"reference_frame"`` says 0 for both. The turn is such that the first angle lies within
+    (-pi, pi].
 
     ``bodies`` names the links from the pivot outwards (the rig's order by default). ``mirrored`` for a film
     taken from behind. ``link_length_m`` (pivot to elbow) puts the scale into ``meta["linkage"]``. ``gaps``
@@ -58,8 +60,8 @@ def angles(
     ``sigma_rad`` holds each frame's own standard error; that of the zero, common to all frames, is in
     ``meta["zero"]``.
 
-    Raises :class:`~pydpend.errors.AnglesError`: a body never seen, or in one marker only; no rest found; a
-    turn that may be lost; links that turn too little for a linkage.
+    Raises :class:`~pydpend.errors.AnglesError`: a body never seen, or in one marker only; no rest found, or one in
+    which the links are held and do not hang; a turn that may be lost; links that turn too little for a linkage.
     """
     markers = body_markers(nodes, bodies, mirrored)
     label = name if name is not None else _label(nodes)
@@ -69,7 +71,8 @@ def angles(
     if isinstance(ending, dict) and ending.get("kind") != "complete":
         notes.append(f"the node table is not of the whole recording ({ending.get('kind')})")
     phi = _unwrapped(nodes, raw.theta, markers, label, gaps, notes)
-    offset, zero_meta = zero_for(nodes, phi, raw, markers, zero, bodies, mirrored, label)
+    offset, zero_meta, doubts = zero_for(nodes, phi, raw, markers, zero, bodies, mirrored, label)
+    notes += doubts
     phi = phi - offset
     for k in range(phi.shape[1]):
         first = phi[np.flatnonzero(np.isfinite(phi[:, k]))[0], k]

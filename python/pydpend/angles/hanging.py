@@ -1,26 +1,30 @@
-"""What zero follows from what the caller says: a rest that hangs, another recording, or given angles.
-
-Owns: telling a rest that hangs from one held upside down, by where the joints are.
-"""
+"""What zero follows from what the caller says: a rest that hangs, the picture, another recording, or given angles."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pydpend.angles.linkage import Shape
-from pydpend.angles.markers import BodyMarkers, body_markers, to_image
-from pydpend.angles.pose import rotate, solve
+from pydpend.angles.markers import BodyMarkers, body_markers
+from pydpend.angles.pose import solve
+from pydpend.angles.rests import hanging_rests, judge, unconfirmed
+from pydpend.angles.swing import HANGS_WITHIN_RAD, Swing, find_swing
 from pydpend.angles.table import Floats, LinkAngles
 from pydpend.angles.unwrap import unwrap
-from pydpend.angles.zero import Rest, find_rest, zero_of
+from pydpend.angles.vertical import ROLL_SIGMA_DEG, picture_down, vertical_zero
+from pydpend.angles.zero import find_rest, zero_of
 from pydpend.errors import AnglesError, Setting, fault
+from pydpend.series import highpass_noise
 
 if TYPE_CHECKING:
     from pydpend.nodes import Nodes
+
+VERTICAL = "vertical"
+"""The word for the picture's vertical, alone or with the roll's standard uncertainty in degrees: ``vertical=0.5``."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,38 +38,84 @@ class Raw:
     meta: dict[str, Any]
 
 
+def parse_zero(text: str) -> str | list[float] | None:
+    """What a text says of the zero: a word that `angles` knows, or angles in degrees (``12.5,-3``) as rad; ``None`` if
+    it can only be a file.
+    """
+    if text in ("rest", "reference_frame") or text.partition("=")[0] == VERTICAL:
+        return text
+    try:
+        return [float(np.radians(float(word))) for word in text.split(",")]
+    except ValueError:
+        return None
+
+
+def roll_sigma(zero: str) -> float:
+    """Standard uncertainty of the camera's roll, rad, in ``vertical`` or ``vertical=DEGREES``.
+
+    Raises :class:`AnglesError` if it is no number of degrees above zero.
+    """
+    text = zero.partition("=")[2] if "=" in zero else str(ROLL_SIGMA_DEG)
+    try:
+        value = float(text)
+    except ValueError:
+        value = np.nan
+    if not 0 < value <= 45:
+        raise AnglesError(
+            fault(
+                Setting("zero"),
+                f"{zero!r}: the camera's roll is uncertain by {text!r}, which is no number of degrees from 0 to 45",
+                f"Write {VERTICAL} for {ROLL_SIGMA_DEG:g} deg, or {VERTICAL}=0.5",
+            )
+        )
+    return float(np.radians(value))
+
+
 def zero_for(
     nodes: Nodes,
     phi: Floats,
     raw: Raw,
     markers: list[BodyMarkers],
-    zero: Literal["rest", "reference_frame"] | Sequence[float] | float | Nodes,
+    zero: str | Sequence[float] | float | Nodes,
     bodies: Sequence[str] | None,
     mirrored: bool,
     label: str,
-) -> tuple[Floats, dict[str, Any]]:
-    """What to take off the turns ``phi`` (T, L) to have angles, (L,), and where that comes from."""
+) -> tuple[Floats, dict[str, Any], list[str]]:
+    """What to take off the turns ``phi`` (T, L) to have angles, (L,), where that comes from, and what is doubtful."""
     links = phi.shape[1]
-    if isinstance(zero, str):
-        if zero == "reference_frame":
-            return np.zeros(links), {"from": "reference frame"}
-        if zero != "rest":
-            raise AnglesError(
-                fault(
-                    Setting("zero"),
-                    f"{zero!r} is not known",
-                    "Give rest, reference_frame or the links' angles",
-                )
+    if (
+        isinstance(zero, str)
+        and zero not in ("rest", "reference_frame")
+        and zero.partition("=")[0] != VERTICAL
+    ):
+        raise AnglesError(
+            fault(
+                Setting("zero"),
+                f"{zero!r} is not known",
+                f"Give rest, {VERTICAL}, reference_frame or the links' angles",
             )
+        )
+    down = picture_down(raw.shape, nodes, markers, mirrored)
+    swing = find_swing(nodes.t_s, phi, _noise(phi, raw.sigma), down.turn_rad)
+    notes: list[str] = []
+    if isinstance(zero, str) and zero == "rest":
         rests = find_rest(LinkAngles(nodes.t_s, phi, raw.sigma, name=label))
-        kept = [r for r in rests if _hangs(r.phi_rad, _down(raw, nodes, markers, mirrored))]
+        judged = judge(rests, phi, swing, down)
+        kept, notes = hanging_rests(judged, swing, label)
         value, sigma = zero_of(kept, label)
-        return value, {
-            "from": "rest",
+        notes += unconfirmed(judged)
+        meta = {"from": "rest", "sigma_rad": sigma.tolist(), "rests": [j.to_json() for j in judged]}
+        return value, meta | _told(swing, value), notes
+    if isinstance(zero, str) and zero == "reference_frame":
+        value, meta = np.zeros(links), {"from": "reference frame"}
+    elif isinstance(zero, str):
+        value, sigma = vertical_zero(down, roll_sigma(zero), label)
+        meta = {
+            "from": "the picture's vertical",
             "sigma_rad": sigma.tolist(),
-            "rests": [_rest_meta(r, r in kept) for r in rests],
+            "roll_sigma_rad": roll_sigma(zero),
         }
-    if isinstance(zero, (int, float, np.floating, Sequence, np.ndarray)):
+    elif isinstance(zero, (int, float, np.floating, Sequence, np.ndarray)):
         given = np.atleast_1d(np.asarray(zero, dtype=np.float64))
         if given.shape != (links,) or not np.isfinite(given).all():
             raise AnglesError(
@@ -73,17 +123,35 @@ def zero_for(
                     Setting("zero"), f"{zero!r} for {links} link(s)", "Give one finite angle in rad per link"
                 )
             )
-        return -given, {"from": "given", "reference_frame_rad": given.tolist()}
-    return _zero_from_reference(zero, raw, markers, bodies, mirrored)
+        value, meta = -given, {"from": "given", "reference_frame_rad": given.tolist()}
+    else:
+        value, meta, notes = _zero_from_reference(zero, raw, markers, bodies, mirrored)
+    if swing is not None and swing.refutes(value, np.array(meta.get("sigma_rad", 0.0))):
+        off = " and ".join(f"{v:.1f}" for v in np.degrees(np.abs(swing.off(value))))
+        notes.append(
+            f"the swing goes about a direction about {off} deg from the zero ({meta['from']}): the angles may be "
+            "off by that"
+        )
+    return value, meta | _told(swing, value), notes
 
 
-def _rest_meta(rest: Rest, hanging: bool) -> dict[str, Any]:
-    return {"start_s": rest.start_s, "stop_s": rest.stop_s, "hanging": hanging}
+def _noise(phi: Floats, sigma: Floats) -> float:
+    """Standard deviation of one angle, rad: the largest link's median, or measured where none is stated."""
+    stated = [float(np.median(s[np.isfinite(s)])) for s in sigma.T if np.isfinite(s).any()]
+    measured = [v for v in (highpass_noise(c) for c in phi.T) if np.isfinite(v)]
+    return max([v for v in stated if v > 0] or measured or [1e-3])
+
+
+def _told(swing: Swing | None, zero: Floats) -> dict[str, Any]:
+    """What the swing says of a zero, for the meta."""
+    if swing is None:
+        return {"swing": None}
+    return {"swing": {"off_rad": swing.off(zero).tolist(), "sigma_rad": swing.sigma_rad.tolist()}}
 
 
 def _zero_from_reference(
     reference: Nodes, raw: Raw, markers: list[BodyMarkers], bodies: Sequence[str] | None, mirrored: bool
-) -> tuple[Floats, dict[str, Any]]:
+) -> tuple[Floats, dict[str, Any], list[str]]:
     """The zero from another recording: its rest, with this recording's templates."""
     others = body_markers(reference, bodies, mirrored)
     if [m.nodes for m in others] != [m.nodes for m in markers]:
@@ -96,42 +164,10 @@ def _zero_from_reference(
     turns = np.stack([unwrap(reference.t_s, p.theta)[0] for p in poses], axis=1)
     sigma = np.stack([p.information**-0.5 for p in poses], axis=1)
     rests = find_rest(LinkAngles(reference.t_s, turns, sigma, name="reference recording"))
-    kept = [r for r in rests if _hangs(r.phi_rad, _down(raw, reference, markers, mirrored))]
-    value, sigma = zero_of(kept, "reference recording")
-    return value, {"from": "reference recording", "sigma_rad": sigma.tolist()}
-
-
-def _down(raw: Raw, nodes: Nodes, markers: list[BodyMarkers], mirrored: bool) -> list[Floats | None]:
-    """For each link the vector from its upper joint along it, in the reference frame; ``None`` if not
-    known.
-    """
-    shape = raw.shape
-    if shape is not None:
-        if shape.links == 1:
-            return [shape.upper_px.mean(axis=0)]
-        return [shape.elbow_px, _if_long(shape.lower_px)]
-    places = {j.bodies: np.array([j.x_px, j.y_px]) * to_image(np.ones(2), mirrored) for j in nodes.rig.joints}
-    pivot = next((p for b, p in places.items() if tuple(b) == (markers[0].name,)), None)
-    elbow = next((p for b, p in places.items() if len(b) == 2), None)
-    if len(markers) == 1:
-        return [None if pivot is None else _if_long(markers[0].reference_px - pivot)]
-    return [
-        None if pivot is None or elbow is None else elbow - pivot,
-        None if elbow is None else _if_long(markers[1].reference_px - elbow),
-    ]
-
-
-def _if_long(places: Floats) -> Floats | None:
-    """Their mean, if it is far enough from the joint to say which way the link points."""
-    mean = places.mean(axis=0)
-    return mean if np.hypot(*mean) > 0.2 * np.sqrt((places**2).sum(axis=1).mean()) else None
-
-
-def _hangs(theta: Floats, down: list[Floats | None]) -> bool:
-    """Whether every link points down to within 60 degrees; a link whose direction is not known may."""
-    for turn, vector in zip(theta, down, strict=True):
-        if vector is not None:
-            x, y = rotate(np.asarray(turn), vector)
-            if -y < 0.5 * np.hypot(x, y):
-                return False
-    return True
+    down = picture_down(raw.shape, reference, markers, mirrored)
+    swing = find_swing(reference.t_s, turns, _noise(turns, sigma), down.turn_rad)
+    # Whoever names it says that it hangs; only upside down cannot be.
+    judged = judge(rests, turns, swing, down, HANGS_WITHIN_RAD)
+    kept, notes = hanging_rests(judged, swing, "reference recording")
+    value, error = zero_of(kept, "reference recording")
+    return value, {"from": "reference recording", "sigma_rad": error.tolist()}, notes

@@ -26,6 +26,16 @@ BLOCK_S = 0.05
 """Rest is looked for in means over this long, s."""
 
 
+GIVE_ZERO = (
+    "Give "
+    + Setting("zero", "vertical")
+    + " for the picture's vertical, or "
+    + Setting("zero")
+    + " with the links' angles in the rig's reference frame or a recording in which they hang at rest"
+)
+"""What can be done where a recording has no zero of its own."""
+
+
 @dataclass(frozen=True, eq=False)
 class Rest:
     """A stretch in which no link moves.
@@ -121,10 +131,7 @@ def zero_of(rests: list[Rest], name: str) -> tuple[Floats, Floats]:
             fault(
                 name,
                 "no stretch of 0.5 s was found in which all links hang at rest, so there is no zero",
-                "Give "
-                + Setting("zero")
-                + ": the links' angles in the rig's reference frame, or the nodes of a recording "
-                "at rest",
+                GIVE_ZERO,
             )
         )
     base = rests[0].phi_rad
@@ -136,7 +143,7 @@ def zero_of(rests: list[Rest], name: str) -> tuple[Floats, Floats]:
             fault(
                 name,
                 f"the links rest at angles that differ by {np.degrees(spread.max()):.1f} deg ({times})",
-                "Say which hangs: give " + Setting("zero") + ", the angles in the rig's reference frame",
+                GIVE_ZERO,
             )
         )
     weight = np.array([r.last - r.first + 1 for r in rests], dtype=np.float64)

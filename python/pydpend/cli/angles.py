@@ -31,8 +31,9 @@ def add_arguments(p: argparse.ArgumentParser) -> None:
         "--zero",
         default="rest",
         metavar="WHERE",
-        help="rest (found in the recording, default), reference_frame, the links' angles in the rig's reference "
-        "frame in degrees (12.5,-3), or the node table of a recording at rest",
+        help="rest (found in the recording, default), vertical (the picture's, uncertain by the camera's roll: 1 deg, "
+        "or vertical=0.5), reference_frame, the links' angles in the rig's reference frame in degrees (12.5,-3), or "
+        "the node table of a recording at rest",
     )
     p.add_argument("--bodies", metavar="A,B", help="names of the links from the pivot outwards")
     p.add_argument("--mirrored", action="store_true", help="the film is mirror-inverted or taken from behind")
@@ -98,20 +99,18 @@ def run(args: argparse.Namespace) -> int:
             value = sigma[k]
             error = "not known" if value is None else f"{np.degrees(value):.4f} deg"
             print(f"phi{k + 1}: {seen[k]} of {found.t_s.size} frames, median standard uncertainty {error}")
-        print(f"zero from {found.meta['zero']['from']}; written to {args.output}")
+        zero = found.meta["zero"]
+        sure = zero.get("sigma_rad")
+        known = f" (+- {' and '.join(f'{v:.2g}' for v in np.degrees(sure))} deg)" if sure else ""
+        print(f"zero from {zero['from']}{known}; written to {args.output}")
     for note in found.meta["notes"]:
         print(f"note: {note}", file=sys.stderr)
     return 1 if any("left out" in n for n in found.meta["notes"]) else 0
 
 
 def _zero(text: str) -> Any:
-    import numpy as np
+    from pydpend.angles import parse_zero
+    from pydpend.nodes import read_nodes
 
-    if text in ("rest", "reference_frame"):
-        return text
-    try:
-        return [float(np.radians(float(v))) for v in text.split(",")]
-    except ValueError:
-        from pydpend.nodes import read_nodes
-
-        return read_nodes(text)
+    said = parse_zero(text)
+    return read_nodes(text) if said is None else said

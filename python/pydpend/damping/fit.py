@@ -145,6 +145,9 @@ def _energy(
     )
     excess = np.max([p.rectification for p in profiles], axis=0)
     duration = float(np.diff(smoothed.segments.times_s, axis=1).sum())
+    found = [
+        r.zero_of(zeros, np.full(2, np.nan)) for r, zeros in zip(recordings, smoothed.zeros_rad, strict=True)
+    ]
     return DampingFit(
         method="energy",
         status=fit.status,
@@ -165,14 +168,15 @@ def _energy(
         names=tuple(names),
         covariance=fit.covariance,
         inputs=tuple(
-            r.described(zeros) | {"e0_j": float(e0)}
-            for r, e0, zeros in zip(recordings, fit.e0_j, smoothed.zeros_rad, strict=True)
+            r.described(zero) | {"e0_j": float(e0)}
+            for r, e0, zero in zip(recordings, fit.e0_j, found, strict=True)
         ),
         energy=curves,
         residuals=shooting.residuals_of(tracks, path, smoothed.zeros_rad),
         ten=freed,
         notes=(
             *(note for r in recordings for note in r.notes()),
+            *(note for r, zero in zip(recordings, found, strict=True) for note in zero.notes(r.angles.name)),
             f"acceleration noise raises |N| by {100 * excess[0]:.1g} and {100 * excess[1]:.1g} % on average; "
             "taken off",
             *(() if freed is None else (freed.warning,)),

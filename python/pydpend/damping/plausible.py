@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import scipy
 from numpy.typing import NDArray
@@ -15,6 +17,12 @@ Floats = NDArray[np.float64]
 WOBBLE = 0.015
 """RMS by which the energy goes up and down, relative to its largest value, that no free decay shows. Table 8's
 constants, whose ratios are up to 10 % off, give 0.0024 on the paper's trials; psi off by 10 % gives 0.008."""
+
+ZERO_OFF_RAD = np.radians(20.0)
+"""The angles' zeros may be off by this much before the constants are doubted."""
+
+TOLD_CHI2 = 1.5
+"""Chi-square with the constants fixed that is worth telling."""
 
 SCALE = 5.0
 """Factor between the recording's and the model's frequencies that no motion of that pendulum has; units off by a
@@ -30,9 +38,24 @@ def modes_hz(model: Model) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def wobble(track: Track, span: tuple[float, float], model: Model) -> tuple[float, float]:
-    """How much the energy of the measured motion goes up and down, relative to its largest value: RMS distance from
-    the nearest curve that only falls, and the largest rise.
+@dataclass(frozen=True)
+class Wobble:
+    """How much the energy of a measured motion goes up and down, relative to its largest value."""
+
+    rms: float
+    """RMS distance from the nearest curve that only falls."""
+    rise: float
+    """The largest rise."""
+
+    @property
+    def too_large(self) -> bool:
+        """Whether no free decay shows as much."""
+        return self.rms > WOBBLE
+
+
+def wobble(track: Track, span: tuple[float, float], model: Model) -> Wobble:
+    """The energy's ups and downs, with the angles' zeros that make them smallest where the given ones make them too
+    large.
 
     Local cubics over 24 ms give the rates; means over 0.2 s take the noise off.
     """
@@ -46,18 +69,37 @@ def wobble(track: Track, span: tuple[float, float], model: Model) -> tuple[float
     smooth = np.column_stack([np.convolve(c, weights[0][::-1], "valid") for c in phi.T])
     rate = np.column_stack([np.convolve(c, weights[1][::-1], "valid") for c in phi.T]) / dt
     even = np.abs(t[2 * half :] - t[: -2 * half] - 2 * half * dt) < 0.5 * dt
-    if phi.shape[1] == 1:
+    links = phi.shape[1]
+    if links == 1:
         smooth, rate = (np.column_stack([c, 0 * c]) for c in (smooth, rate))
-    energy = model.energy(smooth, rate)[even]
+    smooth, rate = smooth[even], rate[even]
     width = max(1, round(0.2 / dt))
-    count = energy.size // width
+    count = smooth.shape[0] // width
     if count < 2:
-        return 0.0, 0.0
-    energy = energy[: count * width].reshape(count, width).mean(axis=1)
-    falling = scipy.optimize.isotonic_regression(energy, increasing=False).x
-    largest = max(float(energy.max()), 1e-300)
-    rise = energy - np.minimum.accumulate(energy)
-    return float(np.sqrt(np.mean((energy - falling) ** 2))) / largest, float(rise.max()) / largest
+        return Wobble(0.0, 0.0)
+
+    def energies(zeros: Floats) -> Floats:
+        energy = model.energy(smooth - np.pad(zeros, (0, 2 - links)), rate)
+        out: Floats = energy[: count * width].reshape(count, width).mean(axis=1)
+        return out / max(float(out.max()), 1e-300)
+
+    def rising(zeros: Floats) -> Floats:
+        energy = energies(zeros)
+        out: Floats = energy - scipy.optimize.isotonic_regression(energy, increasing=False).x
+        return out
+
+    def judged(zeros: Floats) -> Wobble:
+        energy = energies(zeros)
+        rise = energy - np.minimum.accumulate(energy)
+        return Wobble(float(np.sqrt(np.mean(rising(zeros) ** 2))), float(rise.max()))
+
+    given = judged(np.zeros(links))
+    if not given.too_large:
+        return given
+    found = scipy.optimize.least_squares(
+        rising, np.zeros(links), bounds=(-ZERO_OFF_RAD, ZERO_OFF_RAD), x_scale=0.05
+    )
+    return judged(found.x)
 
 
 def typical_hz(track: Track, span: tuple[float, float]) -> float:
@@ -89,28 +131,30 @@ def check_model(track: Track, span: tuple[float, float], model: Model, name: str
     """
     low, high = modes_hz(model)
     swings = " and ".join(f"{f:.3g}" for f in modes_hz(model)[: model.links])
-    seen = typical_hz(track, span)
-    if np.isfinite(seen) and (low > SCALE * seen or high < seen / SCALE):
-        factor = (low / seen) ** 2 if low > seen else (high / seen) ** 2
+    typical = typical_hz(track, span)
+    if np.isfinite(typical) and (low > SCALE * typical or high < typical / SCALE):
+        factor = (low / typical) ** 2 if low > typical else (high / typical) ** 2
         raise FitError(
             fault(
                 name,
                 f"the model {model.name!r} swings at {swings} Hz, the recording at "
-                f"about {seen:.2g} Hz: "
+                f"about {typical:.2g} Hz: "
                 f"sigma/psi is off by about {factor:.2g}",
                 "Check the units of the model (kg, m, s) and of the times",
             )
         )
-    rms, rise = wobble(track, span, model)
-    if rms > WOBBLE:
-        words = "" if chi2 is None else f", and with these constants fixed chi-square is {chi2:.0f}, not 1"
+    seen = wobble(track, span, model)
+    if seen.too_large:
+        words = ""
+        if chi2 is not None and chi2 > TOLD_CHI2:
+            words = f", and with these constants fixed chi-square is {chi2:.3g}, where noise alone gives 1"
         raise FitError(
             fault(
                 name,
                 f"the constants of the model {model.name!r} are not this pendulum's: the energy of the "
                 "measured "
-                f"motion goes up and down by {100 * rms:.0f} % RMS of its largest value (the largest rise is "
-                f"{100 * rise:.0f} %) although nothing drives it"
+                f"motion goes up and down by {100 * seen.rms:.2g} % RMS of its largest value (the largest rise is "
+                f"{100 * seen.rise:.2g} %) although nothing drives it"
                 f"{words} "
                 f"(its small oscillations would be at {swings} Hz)",
                 "Use constants derived from the parts"

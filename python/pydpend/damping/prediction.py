@@ -141,13 +141,14 @@ def predict(
                 late = start >= after
                 if late.any():
                     calm[f"{window:g}"] = _summary(errors.take(late))
+    taken_off = np.pad(recording.taken_off_rad, (0, 2 - recording.angles.links))
     words = ", ".join(f"{k} s: {slashed(w.rms_deg)} deg" for k, w in in_window.items())
     return Prediction(
         recording.angles.name,
         in_window,
         forecast,
         calm,
-        (float(zeros[0, 0]), float(zeros[0, 1])),
+        (float(zeros[0, 0] + taken_off[0]), float(zeros[0, 1] + taken_off[1])),
         rows,
         f"{recording.decay.message}; RMS in windows {words}",
     )

@@ -2,20 +2,71 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pydpend.angles import LinkAngles
+from pydpend.angles import LinkAngles, find_swing
 from pydpend.damping.noise import Noise, noise
 from pydpend.damping.shooting import Track
 from pydpend.decay import Decay, find_decay
 from pydpend.errors import FitError, fault
 from pydpend.model import Model
+from pydpend.series import highpass_noise
 
 Floats = NDArray[np.float64]
+
+UNKNOWN_NOISE_RAD = 1e-3
+"""Noise of angles with too many gaps to measure it."""
+
+
+OFF_SIGMAS = 5.0
+"""A fitted zero this many standard uncertainties from the given one, its own and the stated one together, is told."""
+
+OFF_RAD = np.radians(0.5)
+"""If it is off by at least this: lens and camera move the zeros of good recordings by a few tenths of a degree."""
+
+
+@dataclass(frozen=True)
+class FittedZero:
+    """What a fit says of the zero of the angles it was given: measured is true plus zero. All (links,), rad."""
+
+    zero_rad: Floats
+    sigma_rad: Floats
+    """Standard error; NaN where the fit does not tell."""
+    stated_rad: Floats
+    """Standard uncertainty that the angles state of their zero; NaN where they do not."""
+
+    @property
+    def off(self) -> NDArray[np.bool_]:
+        """Where the given zero is wrong beyond what is stated of it."""
+        allowed = OFF_SIGMAS * np.hypot(np.nan_to_num(self.sigma_rad), np.nan_to_num(self.stated_rad))
+        return np.asarray(np.abs(self.zero_rad) > np.maximum(allowed, OFF_RAD))
+
+    def to_json(self) -> dict[str, Any]:
+        """As in ``inputs``: degrees, null where not known."""
+        return {
+            "zeros_deg": np.degrees(self.zero_rad).tolist(),
+            "zeros_sigma_deg": np.degrees(self.sigma_rad).tolist(),
+            "zeros_stated_sigma_deg": np.degrees(self.stated_rad).tolist(),
+            "zeros_off": self.off.tolist(),
+        }
+
+    def notes(self, name: str) -> tuple[str, ...]:
+        """In words that the given zero was wrong; empty if it was not."""
+        if not self.off.any():
+            return ()
+        parts = [
+            f"{abs(np.degrees(z)):.1f} deg" + (f" (phi{j})" if self.off.size > 1 else "")
+            for j, (z, off) in enumerate(zip(self.zero_rad, self.off, strict=True), 1)
+            if off
+        ]
+        return (
+            f"{name}: the zero was off by {' and '.join(parts)}; the fit has its own, and the angles as "
+            "given keep theirs",
+        )
 
 
 @dataclass(frozen=True)
@@ -23,17 +74,30 @@ class Recording:
     """A recording made ready for a fit."""
 
     angles: LinkAngles
+    """With `taken_off_rad` taken off."""
     decay: Decay
     noise: Noise
     track: Track
+    taken_off_rad: Floats
+    """(links,): zero of the given angles by their own swing, where theirs is far from that; else 0."""
 
     @property
     def span(self) -> tuple[float, float]:
         """Start and stop of what is fitted, s."""
         return self.decay.start_s, self.decay.stop_s
 
-    def described(self, zeros_rad: Floats) -> dict[str, Any]:
-        """Its part of a fit's ``inputs``, with the angle zeros found, (2,)."""
+    def zero_of(self, zeros_rad: Floats, sigma_rad: Floats) -> FittedZero:
+        """The zero of the given angles, from the zeros (2,) of `track` that a fit found, with standard errors (2,)."""
+        links = self.angles.links
+        stated = np.asarray((self.angles.meta.get("zero") or {}).get("sigma_rad", ()), dtype=np.float64)
+        return FittedZero(
+            zeros_rad[:links] + self.taken_off_rad,
+            sigma_rad[:links],
+            stated if stated.shape == (links,) else np.full(links, np.nan),
+        )
+
+    def described(self, zero: FittedZero) -> dict[str, Any]:
+        """Its part of a fit's ``inputs``, with the angle zeros found."""
         return {
             "name": self.angles.name,
             "source": self.angles.meta.get("source"),
@@ -42,7 +106,7 @@ class Recording:
             "samples": int(self.angles.t_s.size),
             "noise_deg": [float(v) for v in np.degrees(self.noise.measured_rad)],
             "noise_source": list(self.noise.source),
-            "zeros_deg": [float(v) for v in np.degrees(zeros_rad)],
+            **zero.to_json(),
         }
 
     def notes(self) -> list[str]:
@@ -61,7 +125,19 @@ class Recording:
 def prepare(
     angles: LinkAngles, model: Model, start_s: float | None = None, stop_s: float | None = None
 ) -> Recording:
-    """Finds the free decay and the noise. Raises FitError where there is no decay to fit."""
+    """Finds the free decay and the noise, and takes a zero off that is not where the links hang by their swing.
+
+    Raises FitError where there is no decay to fit.
+    """
+    scatter = [highpass_noise(c) for c in angles.phi_rad.T]
+    known = [v for v in scatter if np.isfinite(v)]
+    swing = find_swing(
+        angles.t_s, angles.phi_rad, max(known, default=UNKNOWN_NOISE_RAD), np.zeros(angles.links)
+    )
+    taken_off = np.zeros(angles.links)
+    if swing is not None and swing.refutes(taken_off):
+        taken_off = swing.zero_rad
+        angles = replace(angles, phi_rad=angles.phi_rad - taken_off)
     decay = find_decay(angles, model, start_s, stop_s)
     level = noise(angles.t_s, angles.phi_rad, angles.sigma_rad, (decay.start_s, decay.stop_s))
     if not all(
@@ -73,4 +149,4 @@ def prepare(
                 angles.name, "the angles have no 20 stretches of nine samples", "Give angles with fewer gaps"
             )
         )
-    return Recording(angles, decay, level, (angles.t_s, angles.phi_rad, level.sigma_rad))
+    return Recording(angles, decay, level, (angles.t_s, angles.phi_rad, level.sigma_rad), taken_off)

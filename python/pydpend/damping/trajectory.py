@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pydpend.coefficients import FULL, RATIOS, parameters, ratios_of
 from pydpend.damping import maps, plausible, shooting
 from pydpend.damping.intervals import profile_intervals, refusal
-from pydpend.damping.recording import Recording
+from pydpend.damping.recording import FittedZero, Recording
 from pydpend.damping.result import DampingFit, estimates
 from pydpend.damping.shares import energy_curve, shares, unit_works
 from pydpend.damping.shooting import Progress, Solution, Track
@@ -214,6 +214,7 @@ def _judge(
     bounded = [n for n in wanted if n in FULL]
     strict = tightened(tracks, solution, wanted, bounded, progress) if model_error else solution
     cov = covariance(solution, model_error=model_error)
+    zeros = [_zero(r, k, solution, cov) for k, r in enumerate(recordings)]
     rows = [i for i, n in enumerate(solution.names) if n in names or n in RATIOS]
     kept = tuple(solution.names[i] for i in rows)
     cov = cov[np.ix_(rows, rows)]
@@ -245,8 +246,8 @@ def _judge(
         names=kept,
         covariance=cov,
         inputs=tuple(
-            r.described(zeros) | {"tail_modes_hz": list(plausible.tail_modes_hz(r.track, r.span, fitted))}
-            for r, zeros in zip(recordings, solution.zeros_rad, strict=True)
+            r.described(zero) | {"tail_modes_hz": list(plausible.tail_modes_hz(r.track, r.span, fitted))}
+            for r, zero in zip(recordings, zeros, strict=True)
         ),
         energy=tuple(energy_curve(tracks, path, names, values, fitted, k) for k in range(len(recordings))),
         residuals=shooting.residuals_of(tracks, path, solution.zeros_rad),
@@ -264,8 +265,22 @@ def _judge(
         iterations=solution.iterations,
         modes_hz=plausible.modes_hz(fitted)[:links],
         maps=None if bias is None else bias.to_json(),
-        notes=_notes(recordings, solution),
+        notes=(
+            *_notes(recordings, solution),
+            *(note for r, zero in zip(recordings, zeros, strict=True) for note in zero.notes(r.angles.name)),
+        ),
     )
+
+
+def _zero(recording: Recording, index: int, solution: Solution, cov: Floats) -> FittedZero:
+    """A recording's angle zero with its standard error."""
+    sigma = np.full(2, np.nan)
+    for j in (0, 1):
+        name = f"zero{j + 1}[{index}]"
+        if name in solution.names:
+            at = solution.names.index(name)
+            sigma[j] = np.sqrt(cov[at, at])
+    return recording.zero_of(solution.zeros_rad[index], sigma)
 
 
 def fitted_model(model: Model, values: dict[str, float]) -> Model:

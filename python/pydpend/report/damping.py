@@ -89,6 +89,19 @@ def warnings(fit: dict[str, Any]) -> list[str]:
             f"{digits(fit['chi2'], 3)}, where noise alone would give 1. The standard errors carry that; --laws full or "
             "the trajectory fit may tell what is missing."
         )
+    for given in fit["inputs"]:
+        off = [
+            f"{digits(abs(z))} deg{f' (phi{j})' if links_of(fit) > 1 else ''}"
+            for j, (z, wrong) in enumerate(
+                zip(given.get("zeros_deg", ()), given.get("zeros_off", ()), strict=False), 1
+            )
+            if wrong
+        ]
+        if off:
+            out.append(
+                f"{given['name']}: the zero of its angles was off by {listed(off)}, as the fit found with a zero "
+                "of its own. The damping is free of that; the angles above are not."
+            )
     # The sentence on the whole recording; those on single coefficients stand with them.
     out += [s for s in fit["identifiability"]["sentences"] if "too short" in s]
     return out
@@ -309,6 +322,14 @@ def _constants(fit: dict[str, Any]) -> list[Block]:
         (meaning(n, links), f"{n}/psi", quantity(v, sigmas.get(n), ratio_unit(n)))
         for n, v in fit["ratios"].items()
     ]
+    for given in fit["inputs"]:
+        for j, (zero, sigma) in enumerate(
+            zip(given.get("zeros_deg", ()), given.get("zeros_sigma_deg", ()), strict=False), 1
+        ):
+            of = f" of {given['name']}" if len(fit["inputs"]) > 1 else ""
+            rows.append(
+                (f"zero of phi{j}{of} by the fit, from the given one", "", quantity(zero, sigma, "deg"))
+            )
     rows.append(("small oscillations", "", f"{listed([f'{f:.4f}' for f in fit['modes_hz']])} Hz"))
     return [
         Heading("Constants of the motion"),

@@ -308,6 +308,9 @@ def read(folder: Path, facts: dict[str, Any], stages: set[str]) -> Part:
         if part.nodes is None:
             rows += [("samples", str(part.angles.t_s.size)), *_times(part.angles.t_s)]
         part.warnings += [f"{part.label}: {note}" for note in part.meta.get("notes", [])]
+        zero = part.meta.get("zero")
+        if isinstance(zero, dict) and "from" in zero:
+            rows.append(("zero of the angles", _zero_in_words(zero)))
         for k in range(part.angles.links):
             sigma = part.angles.sigma_rad[:, k]
             if np.isfinite(sigma).any():
@@ -338,6 +341,14 @@ def read(folder: Path, facts: dict[str, Any], stages: set[str]) -> Part:
             )
     part.answer = rows
     return part
+
+
+def _zero_in_words(zero: dict[str, Any]) -> str:
+    """Where the angles' zero is from, with its standard uncertainty."""
+    sigmas = zero.get("sigma_rad")
+    if not sigmas:
+        return f"{zero['from']}, uncertainty not stated"
+    return f"{zero['from']}, ± {' and '.join(digits(math.degrees(s)) for s in sigmas)} deg"
 
 
 def _times(t_s: NDArray[np.float64]) -> list[tuple[str, str]]:

@@ -1,0 +1,195 @@
+"""Which rest hangs: a stretch at rest is the zero only if nothing in the recording contradicts it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum, auto
+from typing import Any
+
+import numpy as np
+
+from pydpend.angles.swing import HANGS_WITHIN_RAD, Swing, within_half_turn
+from pydpend.angles.table import Floats
+from pydpend.angles.vertical import Down
+from pydpend.angles.zero import GIVE_ZERO, Rest
+from pydpend.errors import AnglesError, fault
+
+UPRIGHT_RAD = np.radians(15.0)
+"""Where no swing says where the links hang, the picture must: a camera held in the hand is rolled by less than this."""
+
+MOVES_RAD = np.radians(1.0)
+"""A link that moves by less than this does not say to which side."""
+
+BEYOND = 0.15
+"""A motion that goes by less than this part of itself to the other side goes to one side only."""
+
+LET_GO = 3.0
+"""A link let go swings about as far beyond the vertical as it was held away from it: one that was lifted goes farther
+than this many times as far."""
+
+
+class Verdict(Enum):
+    """What the recording says of a rest."""
+
+    CONFIRMED = auto()
+    """The swing goes about it."""
+    UNREFUTED = auto()
+    """Nothing contradicts it."""
+    REFUTED = auto()
+    """The swing goes about another direction."""
+    ONE_SIDED = auto()
+    """The motion goes to one side of it only."""
+    TILTED = auto()
+    """The links do not point down in the picture."""
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """A rest with what is said of it.
+
+    ``tilt_rad`` (L,): from the picture's vertical, NaN where that is not known; ``moves``: whether a link leaves it.
+    """
+
+    rest: Rest
+    verdict: Verdict
+    tilt_rad: Floats
+    moves: bool
+
+    @property
+    def hangs(self) -> bool:
+        """Whether it may be the zero."""
+        return self.verdict in (Verdict.CONFIRMED, Verdict.UNREFUTED)
+
+    def to_json(self) -> dict[str, Any]:
+        """As in the angles' ``meta``."""
+        return {
+            "start_s": self.rest.start_s,
+            "stop_s": self.rest.stop_s,
+            "hanging": self.hangs,
+            "verdict": self.verdict.name.lower(),
+            "from_vertical_deg": [None if np.isnan(v) else float(v) for v in np.degrees(self.tilt_rad)],
+        }
+
+
+def judge(
+    rests: list[Rest], phi: Floats, swing: Swing | None, down: Down, upright_rad: float = UPRIGHT_RAD
+) -> list[Judged]:
+    """What turns ``phi`` (T, L) and the picture say of each rest.
+
+    The swing decides where it is known. Else the links must point down within ``upright_rad``, and the motion must not
+    look like one that was let go there.
+    """
+    out = []
+    for rest in rests:
+        tilt = down.off(rest.phi_rad)
+        if swing is not None:
+            verdict = Verdict.REFUTED if swing.refutes(rest.phi_rad, rest.sigma_rad) else Verdict.CONFIRMED
+        elif (np.abs(tilt) > upright_rad + 3 * down.sigma_rad).any() or (
+            np.abs(tilt) > HANGS_WITHIN_RAD
+        ).any():
+            verdict = Verdict.TILTED
+        elif _let_go(rest, phi, tilt):
+            verdict = Verdict.ONE_SIDED
+        else:
+            verdict = Verdict.UNREFUTED
+        out.append(Judged(rest, verdict, tilt, bool(np.nanmax(np.abs(phi - rest.phi_rad)) > MOVES_RAD)))
+    return out
+
+
+def _let_go(rest: Rest, phi: Floats, tilt: Floats) -> bool:
+    """Whether a link moves to one side of the rest only, and not beyond where a link let go would swing to."""
+    for k, held in enumerate(tilt):
+        moved = phi[:, k] - rest.phi_rad[k]
+        moved = moved[np.isfinite(moved)]
+        side = 1.0 if moved.max() > -moved.min() else -1.0
+        far, back = float((side * moved).max()), float((-side * moved).max())
+        if far < MOVES_RAD or back > BEYOND * far:
+            continue
+        # The vertical lies at -held, seen from the rest.
+        if np.isnan(held) or far < LET_GO * -side * held:
+            return True
+    return False
+
+
+def hanging_rests(judged: list[Judged], swing: Swing | None, label: str) -> tuple[list[Rest], list[str]]:
+    """The rests that hang, and in words what contradicts the others.
+
+    Raises :class:`AnglesError` where the links rest, but not hanging.
+    """
+    kept = [j for j in judged if j.hangs]
+    others = [j for j in judged if not j.hangs]
+    if not kept and others:
+        nearest = min(others, key=lambda j: float(np.nan_to_num(np.abs(j.tilt_rad), nan=np.pi).max()))
+        raise AnglesError(
+            fault(
+                label,
+                f"{_held(nearest, swing)}{_reason(nearest, swing)}: it is no zero",
+                GIVE_ZERO,
+            )
+        )
+    return [j.rest for j in kept], _notes(kept, others, swing) if kept else []
+
+
+def _notes(kept: list[Judged], others: list[Judged], swing: Swing | None) -> list[str]:
+    """What a reader must know of the rests that are the zero, and of those that could be taken for it."""
+    notes = []
+    zero = kept[0].rest
+    near = [
+        j
+        for j in others
+        if (np.abs(within_half_turn(j.rest.phi_rad - zero.phi_rad)) < HANGS_WITHIN_RAD).all()
+    ]
+    if near:
+        held = max(near, key=lambda j: j.rest.stop_s - j.rest.start_s)
+        off = np.abs(within_half_turn(held.rest.phi_rad - zero.phi_rad))
+        notes.append(
+            f"two rests disagree: held still about {_each(off)} deg from hanging in {_when(held.rest)}"
+            f"{_reason(held, swing)}; the zero is the rest in {_when(zero)}"
+        )
+    if (np.abs(kept[0].tilt_rad) > HANGS_WITHIN_RAD).any():
+        notes.append(
+            f"the links hang about {_each(np.abs(kept[0].tilt_rad))} deg from the picture's vertical in {_when(zero)}: "
+            "the film is rolled"
+        )
+    return notes
+
+
+def unconfirmed(judged: list[Judged]) -> list[str]:
+    """What a reader must know where a zero rests on no swing: it moves too little, or by hand only."""
+    kept = [j for j in judged if j.hangs]
+    if not all(j.verdict is Verdict.UNREFUTED and (j.moves or np.isnan(j.tilt_rad).any()) for j in kept):
+        return []
+    return [
+        f"nothing contradicts that the links hang in {_when(kept[0].rest)}, but too little of a free swing is seen to "
+        "confirm it"
+    ]
+
+
+def _held(j: Judged, swing: Swing | None) -> str:
+    known = np.isfinite(j.tilt_rad)
+    if known.all() or (known.any() and swing is None):
+        off, what = np.abs(j.tilt_rad[known]), "from the picture's vertical"
+    elif swing is not None:
+        off, what = np.abs(swing.off(j.rest.phi_rad)), "from the direction that the swing goes about"
+    else:
+        return f"the links are held still in {_when(j.rest)}"
+    return f"held still at about {_each(off)} deg {what} in {_when(j.rest)}"
+
+
+def _reason(j: Judged, swing: Swing | None) -> str:
+    if j.verdict is Verdict.REFUTED and swing is not None:
+        off = np.abs(swing.off(j.rest.phi_rad))
+        return f", and the swing goes about a direction {_each(off)} deg from there"
+    if j.verdict is Verdict.ONE_SIDED:
+        return ", and the motion goes to one side of it only"
+    return ""
+
+
+def _each(angle_rad: Floats) -> str:
+    """Degrees of each link, or once where they are alike."""
+    words = [f"{v:.0f}" if v >= 9.95 else f"{v:.1f}" for v in np.degrees(angle_rad)]
+    return " and ".join(dict.fromkeys(words))
+
+
+def _when(rest: Rest) -> str:
+    return f"{rest.start_s:.3g}-{rest.stop_s:.3g} s"

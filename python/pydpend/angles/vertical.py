@@ -1,0 +1,97 @@
+"""Which way the links point in the picture: where they would hang if the camera stood upright."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pydpend.angles.linkage import Shape
+from pydpend.angles.markers import BodyMarkers, to_image
+from pydpend.angles.swing import within_half_turn
+from pydpend.angles.table import Floats
+from pydpend.errors import AnglesError, Setting, fault
+
+if TYPE_CHECKING:
+    from pydpend.nodes import Nodes
+
+ROLL_SIGMA_DEG = 1.0
+"""Standard uncertainty of the camera's roll, deg, where none is given: a camera on a tripod set up by eye."""
+
+OFF_CENTRE = 0.2
+"""A link's markers say which way it points if their mean is further from its joint than this part of their RMS
+distance."""
+
+
+@dataclass(frozen=True, eq=False)
+class Down:
+    """For each link the turn from the reference frame at which it points down in the picture.
+
+    ``turn_rad`` (L,): within (-pi, pi], NaN where the link's joint is not known. ``sigma_rad`` (L,): how uncertain the
+    link's own direction is. That of a link with two joints is the line through them; that of the last one leads from
+    its joint to the mean of its markers, as sure as these lie on a line.
+    """
+
+    turn_rad: Floats
+    sigma_rad: Floats
+
+    def off(self, turn_rad: Floats) -> Floats:
+        """How far turns (L,) are from the picture's vertical, rad, within (-pi, pi]; NaN where that is not known."""
+        return within_half_turn(turn_rad - self.turn_rad)
+
+
+def picture_down(shape: Shape | None, nodes: Nodes, markers: list[BodyMarkers], mirrored: bool) -> Down:
+    """Where the links point down, by the joints found from the motion, or else by those of the rig."""
+    found = [_direction(v) for v in _vectors(shape, nodes, markers, mirrored)]
+    return Down(np.array([turn for turn, _ in found]), np.array([sigma for _, sigma in found]))
+
+
+def vertical_zero(down: Down, roll_sigma_rad: float, label: str) -> tuple[Floats, Floats]:
+    """The zero (L,) by the picture's vertical and its standard uncertainty (L,), rad.
+
+    Raises :class:`AnglesError` if a link's direction is not known.
+    """
+    unknown = np.flatnonzero(np.isnan(down.turn_rad))
+    if unknown.size:
+        raise AnglesError(
+            fault(
+                label,
+                f"the joint of link {unknown[0] + 1} is not known, so the picture does not say when it hangs",
+                "Put the joint into the rig, or give "
+                + Setting("zero")
+                + " with the links' angles in the rig's reference frame or a recording in which they hang at rest",
+            )
+        )
+    return down.turn_rad, np.hypot(roll_sigma_rad, down.sigma_rad)
+
+
+def _direction(places: Floats | None) -> tuple[float, float]:
+    """Turn that brings the mean of ``places`` (K, 2), seen from the joint, to point down, and its uncertainty."""
+    if places is None:
+        return np.nan, np.nan
+    mean = places.mean(axis=0)
+    length = float(np.hypot(*mean))
+    if not length > OFF_CENTRE * float(np.sqrt((places**2).sum(axis=1).mean())):
+        return np.nan, np.nan
+    across = places @ np.array([-mean[1], mean[0]]) / length
+    count = places.shape[0]
+    sigma = float(np.sqrt((across**2).sum() / max(count - 1, 1) / count)) / length
+    return float(within_half_turn(np.asarray(-np.pi / 2 - np.arctan2(mean[1], mean[0])))), sigma
+
+
+def _vectors(
+    shape: Shape | None, nodes: Nodes, markers: list[BodyMarkers], mirrored: bool
+) -> list[Floats | None]:
+    """For each link the places (K, 2) that say where it points, seen from its upper joint, in the reference frame."""
+    if shape is not None:
+        return [shape.upper_px] if shape.links == 1 else [shape.elbow_px[None], shape.lower_px]
+    joints = {j.bodies: np.array([j.x_px, j.y_px]) * to_image(np.ones(2), mirrored) for j in nodes.rig.joints}
+    pivot = next((p for b, p in joints.items() if tuple(b) == (markers[0].name,)), None)
+    elbow = next((p for b, p in joints.items() if len(b) == 2), None)
+    if len(markers) == 1:
+        return [None if pivot is None else markers[0].reference_px - pivot]
+    upper = None
+    if pivot is not None:
+        upper = markers[0].reference_px - pivot if elbow is None else (elbow - pivot)[None]
+    return [upper, None if elbow is None else markers[1].reference_px - elbow]
