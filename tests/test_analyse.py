@@ -23,7 +23,11 @@ from pydpend.errors import PydpendError
 from pydpend.model import Damping, Model
 from pydpend.nodes import read_nodes
 from pydpend.report import report_page
+from pydpend.report.page import Table
 from pydpend.simulate import simulate
+
+from tests import drawn_nodes, two_links
+from tests.test_hanging import BAR, held
 
 DEMO = Path(__file__).parent.parent / "fixtures" / "demo"
 
@@ -292,6 +296,30 @@ def test_a_single_pendulum(tmp_path: Path) -> None:
     alone = analyse(Options(inputs=inputs[:1]), tmp_path / "alone")
     assert alone.status == "partly"
     assert any("Give a one-link model" in w for w in report_page(tmp_path / "alone").warnings)
+
+
+def test_a_zero_by_the_vertical_and_how_far_it_was_off_are_in_the_report(tmp_path: Path) -> None:
+    """A bar held and let go, the camera rolled by 20 deg, which is more than five times what is stated."""
+    t, phi = held((40.0,), 6.0, damping=Damping(mu_v1=2e-4, tau_c1=1e-3))
+    roll = np.radians(20.0)
+    nodes = two_links.film(t, phi + roll, 75, reference_rad=(roll, roll))
+    replace(nodes, meta=drawn_nodes.META).write(tmp_path / "held.parquet")
+    constants = f"psi_kg_m2 = {BAR.psi_kg_m2}\nsigma_j = {BAR.sigma_j}\nm1_kg = {BAR.m1_kg}"
+    (tmp_path / "bar.toml").write_text(f"[constants]\n{constants}\n", encoding="utf-8")
+    options = Options(
+        (str(tmp_path / "held.parquet"),), zero="vertical=1", model=str(tmp_path / "bar.toml"), comparison=False,
+        prediction=False, laws="mu_v1,tau_c1", start_s=1.1,
+    )  # fmt: skip
+    outcome = analyse(options, tmp_path / "run")
+    assert outcome.status == "done", outcome
+    page = report_page(tmp_path / "run")
+    assert any("the zero of its angles was off by" in w for w in page.warnings), page.warnings
+    rows = [row for block in page.sections[0].blocks if isinstance(block, Table) for row in block.rows]
+    assert ("zero of the angles", "the picture's vertical, ± 3.0 deg") in rows
+    fit = json.loads((tmp_path / "run" / "fit" / "fit.json").read_text("utf-8"))
+    assert fit["inputs"][0]["zeros_deg"][0] == pytest.approx(20, abs=3.0)
+    found = fit["coefficients"]["mu_v1"]
+    assert abs(found["value"] - 2e-4) < 4 * found["sigma"]
 
 
 def test_angles_of_anyone_are_enough_and_json_and_dry_run_tell_what_is_done(

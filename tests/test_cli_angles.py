@@ -16,6 +16,7 @@ from pydpend.angles import LinkAngles, read_angles, write_angles
 from pydpend.cli import main
 
 from tests import two_links
+from tests.test_hanging import held
 
 META: dict[str, Any] = {
     "schema_version": 1,
@@ -109,6 +110,27 @@ def test_errors_are_one_line_and_exit_status_2(tmp_path: Path, capsys: pytest.Ca
     given = ["angles", str(tmp_path / "moving.parquet"), "-o", str(tmp_path / "a.csv"), "--zero=0,0"]
     assert main(given) == 0
     np.testing.assert_allclose(read_angles(tmp_path / "a.csv").phi_rad, phi, atol=0.02)
+
+
+def test_a_hold_is_refused_with_the_flag_that_helps_and_the_vertical_is_stored_with_its_uncertainty(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    t, phi = held((40.0,), 2.0)
+    dataclasses.replace(two_links.film(t, phi, 74), meta=META).write(tmp_path / "held.parquet")
+    line = ["angles", str(tmp_path / "held.parquet"), "-o", str(tmp_path / "a.parquet")]
+    assert main(line) == 2
+    error = capsys.readouterr().err
+    assert "held still at about 39 deg from the picture's vertical" in error
+    assert "Give --zero vertical for the picture's vertical" in error
+    assert error.count("\n") == 1
+    assert main([*line, "--zero", "vertical=oops"]) == 2
+    assert "vertical=0.5" in capsys.readouterr().err
+    # Three markers on no straight line say to 2.8 deg which way their link points.
+    for zero, sigma in (("vertical", 3.0), ("vertical=3", 4.2)):
+        assert main([*line, "--zero", zero]) == 0
+        assert f"zero from the picture's vertical (+- {sigma:.2g} deg)" in capsys.readouterr().out
+        stored = read_angles(tmp_path / "a.parquet").meta["zero"]
+        assert np.degrees(stored["sigma_rad"]) == pytest.approx([sigma], abs=0.06)
 
 
 @pytest.fixture(scope="module")
