@@ -19,6 +19,7 @@ from pydpend.report import damping as told
 from pydpend.simulate import simulate
 
 from tests import two_links as rig
+from tests.test_hanging import BAR, held
 
 MODEL = derived("A")
 TRUTH = Damping(mu_v1=2e-4, mu_v2=5e-5, tau_c1=1e-3)
@@ -104,7 +105,7 @@ def test_a_zero_by_the_pictures_vertical_gives_the_right_damping() -> None:
     phi[free] = simulate(MODEL, TRUTH, [*phi[0], 0, 0], t[free], tolerance=1e-9).phi_rad
     roll = np.radians(3.0)
     found = angles(rig.film(t, phi + roll, 53, reference_rad=(roll, roll)), zero="vertical")
-    fit = fit_damping(found, MODEL, laws=LAWS, start_s=0.65)
+    fit = fit_damping(found, MODEL, laws=LAWS)
     assert fit.status == "converged"
     for name, estimate in fit.coefficients.items():
         assert abs(estimate.value - getattr(TRUTH, name)) < 4 * estimate.sigma, name
@@ -113,6 +114,25 @@ def test_a_zero_by_the_pictures_vertical_gives_the_right_damping() -> None:
     # Three degrees of roll and 0.9 of the upper link's line of joints, less than five of the stated degree.
     assert given["zeros_deg"][0] == pytest.approx(3.9, abs=0.2)
     assert given["zeros_off"] == [False, False]
+
+
+@pytest.mark.parametrize(
+    ("deg", "off_deg"), [((10.0, 10.0), 0.0), ((10.0, 10.0), -9.5), ((3.0,), 0.0), ((30.0, -30.0), 5.0)]
+)
+def test_a_hold_is_no_part_of_the_free_decay(deg: tuple[float, ...], off_deg: float) -> None:
+    """Held for a second and let go gently, so that no rate tells the release; the zero of the angles right or wrong."""
+    laws = ("mu_v1", "tau_c1")
+    truth = Damping(mu_v1=2e-4, tau_c1=2e-4)
+    t, phi = held(deg, 6.0, damping=truth)
+    phi = phi + np.radians(off_deg) + NOISE_RAD * np.random.default_rng(54).standard_normal(phi.shape)
+    model = MODEL if len(deg) == 2 else BAR
+    fit = fit_damping(LinkAngles(t, phi, np.full(phi.shape, NOISE_RAD), name="held"), model, laws=laws)
+    assert fit.status == "converged"
+    assert fit.inputs[0]["start_s"] > 1.1
+    assert abs(fit.chi2 - 1) < 0.08
+    for name in laws:
+        found = fit.coefficients[name]
+        assert abs(found.value - getattr(truth, name)) < 4 * found.sigma, name
 
 
 def test_a_zero_is_off_by_its_own_and_the_stated_uncertainty_together() -> None:

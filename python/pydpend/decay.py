@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pydpend.angles import LinkAngles
+from pydpend.angles import LinkAngles, find_rest
 from pydpend.errors import FitError, Setting, fault
 from pydpend.model import Model
 
@@ -21,6 +21,10 @@ RELEASED_RAD_S = 4.0
 SETTLE_S = 1.0
 """What is left out after a release by hand: the hand's last touch, and the first instants near the unstable
 equilibrium, which no initial state describes."""
+TOUCH_S = 0.2
+"""What is left out after a gentle release: the hand's last touch."""
+START_S = 0.5
+"""A hold that begins within this of the motion's start is where it was released from."""
 REST_RAD = np.radians(1.5)
 """Both links' swing over a second is below this: dry friction is about to stop them, or has."""
 
@@ -88,7 +92,7 @@ def find_decay(
     last = t.size - 1 if stop is None else int(np.searchsorted(t, stop))
     if stop_s is not None:
         last, at_rest = max(1, int(np.searchsorted(t, stop_s, side="right")) - 1), False
-    first, released = 0, False
+    first, released, after_s = 0, False, 0.0
     if start_s is None:
         later = np.maximum.accumulate(energy[: last + 1][::-1])[::-1]
         # A lift begins at rest near hanging; wrong constants only make the energy of a motion rise and fall,
@@ -102,11 +106,17 @@ def find_decay(
         runs = _runs(held[: last + 1], max(1, round(HELD_S / dt)))
         lifted = first > 0
         runs = [(a, b) for a, b in runs if b >= first and (a <= first + round(0.5 / dt) or lifted)]
-        if runs and (lifted or runs[0][0] <= round(0.5 / dt)):
+        if runs and (lifted or runs[0][0] <= round(START_S / dt)):
             moving = np.flatnonzero(speed[runs[-1][1] : last + 1] > RELEASED_RAD_S)
             if moving.size:
                 let_go = t[runs[-1][1] + int(moving[0])]
                 first, released = int(np.searchsorted(t, let_go + SETTLE_S)), True
+                after_s = SETTLE_S
+        if not released:
+            hold = _hold(angles, float(t[first]), float(t[last]), lifted)
+            if hold is not None:
+                first, released = int(np.searchsorted(t, hold + TOUCH_S)), True
+                after_s = TOUCH_S
     else:
         first = int(np.searchsorted(t, start_s))
     begin, end = float(t[min(first, t.size - 1)]), float(t[last])
@@ -120,10 +130,20 @@ def find_decay(
             )
         )
     message = f"free decay from {begin:.3f} s" + (
-        f" ({SETTLE_S} s after a release by hand)" if released else ""
+        f" ({after_s} s after a release by hand)" if released else ""
     )
     message += f" to {end:.3f} s" + (" (then at rest)" if at_rest else "")
     return Decay(begin, end, released, at_rest, message)
+
+
+def _hold(angles: LinkAngles, begin_s: float, end_s: float, lifted: bool) -> float | None:
+    """The end of the rest with which the motion begins: a gentle release, which no rate tells."""
+    ends = [
+        rest.stop_s
+        for rest in find_rest(angles)
+        if begin_s <= rest.stop_s < end_s and (lifted or rest.start_s <= begin_s + START_S)
+    ]
+    return max(ends, default=None)
 
 
 def _running_mean(x: Floats, width: int) -> Floats:
