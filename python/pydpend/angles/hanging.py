@@ -11,8 +11,8 @@ import numpy as np
 from pydpend.angles.linkage import Shape
 from pydpend.angles.markers import BodyMarkers, body_markers
 from pydpend.angles.pose import solve
-from pydpend.angles.rests import hanging_rests, judge, unconfirmed
-from pydpend.angles.swing import HANGS_WITHIN_RAD, Swing, find_swing
+from pydpend.angles.rests import HANGS_WITHIN_RAD, hanging_rests, judge, unconfirmed
+from pydpend.angles.swing import Swing, find_swing
 from pydpend.angles.table import Floats, LinkAngles
 from pydpend.angles.unwrap import unwrap
 from pydpend.angles.vertical import ROLL_SIGMA_DEG, picture_down, vertical_zero

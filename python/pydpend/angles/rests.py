@@ -8,17 +8,23 @@ from typing import Any
 
 import numpy as np
 
-from pydpend.angles.swing import HANGS_WITHIN_RAD, Swing, within_half_turn
+from pydpend.angles.swing import Swing, within_half_turn
 from pydpend.angles.table import Floats
 from pydpend.angles.vertical import Down
 from pydpend.angles.zero import GIVE_ZERO, Rest
 from pydpend.errors import AnglesError, fault
 
+HANGS_WITHIN_RAD = np.radians(60.0)
+"""A link that hangs points down in the picture to within this, or the film is rolled."""
+
 UPRIGHT_RAD = np.radians(15.0)
 """Where no swing says where the links hang, the picture must: a camera held in the hand is rolled by less than this."""
 
-MOVES_RAD = np.radians(1.0)
-"""A link that moves by less than this does not say to which side."""
+MOVES_RAD = np.radians(0.25)
+"""A link that leaves its rest by less than this, or than `MOVES_NOISE`, does not say to which side it moves."""
+
+MOVES_NOISE = 8.0
+"""The same in standard deviations of one angle at rest: none of a million is that far off by chance."""
 
 BEYOND = 0.15
 """A motion that goes by less than this part of itself to the other side goes to one side only."""
@@ -92,18 +98,33 @@ def judge(
             verdict = Verdict.ONE_SIDED
         else:
             verdict = Verdict.UNREFUTED
-        out.append(Judged(rest, verdict, tilt, bool(np.nanmax(np.abs(phi - rest.phi_rad)) > MOVES_RAD)))
+        out.append(
+            Judged(
+                rest,
+                verdict,
+                tilt,
+                bool((np.nanmax(np.abs(phi - rest.phi_rad), axis=0) > _moves(rest, phi)).any()),
+            )
+        )
     return out
+
+
+def _moves(rest: Rest, phi: Floats) -> Floats:
+    """How far a link (L,) must be from the rest to have left it."""
+    scatter = np.nanstd(phi[rest.first : rest.last + 1], axis=0)
+    return np.asarray(np.maximum(MOVES_RAD, MOVES_NOISE * scatter))
 
 
 def _let_go(rest: Rest, phi: Floats, tilt: Floats) -> bool:
     """Whether a link moves to one side of the rest only, and not beyond where a link let go would swing to."""
+    least = _moves(rest, phi)
     for k, held in enumerate(tilt):
         moved = phi[:, k] - rest.phi_rad[k]
         moved = moved[np.isfinite(moved)]
         side = 1.0 if moved.max() > -moved.min() else -1.0
         far, back = float((side * moved).max()), float((-side * moved).max())
-        if far < MOVES_RAD or back > BEYOND * far:
+        # Half of what leaving the rest takes is noise yet.
+        if far < least[k] or back > BEYOND * far + least[k] / 2:
             continue
         # The vertical lies at -held, seen from the rest.
         if np.isnan(held) or far < LET_GO * -side * held:

@@ -42,8 +42,8 @@ SPEED_S = 0.15
 REVERSALS = 2
 """With fewer turns back a motion may be one lift or one lowering by hand, and the picture must agree with its zero."""
 
-HANGS_WITHIN_RAD = np.radians(60.0)
-"""A link that hangs points down in the picture to within this, or the film is rolled."""
+UPRIGHT_RAD = np.radians(20.0)
+"""To within this: a camera held in the hand is rolled by less."""
 
 ZERO_AT = {1: (0,), 2: (3, 5)}
 """Columns of the equations in which the moments of gravity begin, by the number of links."""
@@ -100,12 +100,13 @@ def within_half_turn(angle_rad: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class _Local:
-    """Angles, rates and accelerations (n, L) at n instants, with the accelerations' standard errors."""
+    """Angles, rates and accelerations (n, L) at n instants, with the standard errors of the last two (n,)."""
 
     t_s: Floats
     phi: Floats
     w: Floats
     a: Floats
+    w_sigma: Floats
     a_sigma: Floats
     reach_s: Floats
 
@@ -123,8 +124,17 @@ def find_swing(t_s: Floats, phi_rad: Floats, noise_rad: float, down_rad: Floats)
     local = _local(t_s, phi_rad, noise_rad)
     if local is None:
         return None
-    links = phi_rad.shape[1]
-    design, wanted, noise = _equations(local)
+    found = [_swing(local, _equations(local), down_rad)]
+    if phi_rad.shape[1] == 1:
+        found.append(_swing(local, _creeping(local), down_rad))
+    known = [swing for swing in found if swing is not None]
+    return min(known, key=lambda swing: float(swing.sigma_rad.max()), default=None)
+
+
+def _swing(local: _Local, equations: tuple[Floats, Floats, Floats], down_rad: Floats) -> Swing | None:
+    """The swing by one form of the equations."""
+    links = local.phi.shape[1]
+    design, wanted, noise = equations
     best: NDArray[np.bool_] | None = None
     for part in _stretches(local.t_s.size):
         x = _solve(design[part], wanted[part], noise[part])
@@ -133,8 +143,8 @@ def find_swing(t_s: Floats, phi_rad: Floats, noise_rad: float, down_rad: Floats)
         inside = _obeyed(design, wanted, noise, x)
         if best is not None and inside.sum() <= best.sum():
             continue
-        tilted = np.abs(within_half_turn(_zero(x, links) - down_rad)) > HANGS_WITHIN_RAD
-        if _reversals(local.w[inside]) >= REVERSALS or not tilted.any():
+        upright = np.abs(within_half_turn(_zero(x, links) - down_rad)) < UPRIGHT_RAD
+        if _reversals(local.w[inside]) >= REVERSALS or upright.all():
             best = inside
     if best is None:
         return None
@@ -206,15 +216,17 @@ def _local(t: Floats, phi: Floats, noise: float) -> _Local | None:
             normal = np.linalg.inv(powers.transpose(0, 2, 1) @ powers)
             c = normal @ (powers.transpose(0, 2, 1) @ values[whole])
             scale = side * step
-            error = noise * 2 * np.sqrt(normal[:, 2, 2]) / scale**2
+            w_error = noise * np.sqrt(normal[:, 1, 1]) / scale
+            a_error = noise * 2 * np.sqrt(normal[:, 2, 2]) / scale**2
             out.append(
                 (
                     t[here[whole]],
                     c[:, 0],
                     c[:, 1] / scale,
                     2 * c[:, 2] / scale**2,
-                    error,
-                    np.full(error.size, scale),
+                    w_error,
+                    a_error,
+                    np.full(a_error.size, scale),
                 )
             )
         left = left[~np.isin(left, here[whole])]
@@ -244,6 +256,14 @@ def _equations(x: _Local) -> tuple[Floats, Floats, Floats]:
         np.stack([-2 * a1, o], axis=1),
         np.stack([2 * x.a_sigma, 2 * x.a_sigma], axis=1),
     )
+
+
+def _creeping(x: _Local) -> tuple[Floats, Floats, Floats]:
+    """The same of one link over its friction instead of its inertia: for a link that creeps to where it hangs, whose
+    acceleration is lost in the noise."""
+    a = x.phi[:, 0]
+    rows = np.stack([np.sin(a), -np.cos(a), x.a[:, 0]], axis=1)[:, None, :]
+    return rows, -x.w, x.w_sigma[:, None]
 
 
 def _stretches(n: int) -> list[slice]:
@@ -280,7 +300,7 @@ def _obeyed(design: Floats, wanted: Floats, noise: Floats, x: Floats) -> NDArray
 
 
 def _physical(x: Floats, links: int) -> bool:
-    """Whether such a pendulum can exist: it has a mass, and friction does not drive it."""
+    """Whether such a pendulum can exist: it has a mass, and friction does not drive it (or the other way round)."""
     if links == 1:
         moment = float(np.hypot(x[0], x[1]))
         return bool(moment > 0 and x[2] > -0.2 * np.sqrt(2 * moment))
