@@ -19,6 +19,8 @@ from pydpend.crossing import (
     OpenArguments,
     Row,
 )
+from pydpend.errors import Message
+from pydpend.kinds import Kind
 
 __all__ = [
     "VERSION",
@@ -29,7 +31,9 @@ __all__ = [
     "detect",
     "follow_motion",
     "info",
+    "kind_of",
     "learn_noise",
+    "misplaced",
     "overlay_film",
     "poincare_section",
     "read_meta",
@@ -130,6 +134,8 @@ def check_table(held: HeldColumns, meta: str) -> None:
 def arrow_reader(held: HeldColumns, rig: str) -> Any:
     """The rows as an Arrow stream; `rig` is JSON."""
 
+def kind_of(path: str) -> Kind: ...
+def misplaced(path: str, wanted: list[str]) -> Message | None: ...
 def read_rig(path: str) -> str:
     """A rig file as JSON."""
 

@@ -13,11 +13,15 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from pydpend.errors import ArgumentError, TableError, fault
+from pydpend.errors import ArgumentError, Setting, TableError, fault
 from pydpend.nodes import STATUS_WORDS, Nodes
 
 LEAST_EVEN = 1e-6
 """A rate is one number, so steps of time may differ by so much of a step; time stamps in whole ticks do not."""
+
+
+SCALED = (".c3d", ".trc")
+"""Endings of the forms that have a unit of length."""
 
 
 def export(nodes: Nodes, path: str | os.PathLike[str], *, px_per_m: float | None = None) -> None:
@@ -26,7 +30,7 @@ def export(nodes: Nodes, path: str | os.PathLike[str], *, px_per_m: float | None
     Args:
         nodes: the nodes.
         path: the file; one that is there is replaced when the new one is whole.
-        px_per_m: scale of the image; C3D and TRC are then in mm. Not used for the others, which are in px.
+        px_per_m: scale of the image, for C3D and TRC, which are then in mm; the others are in px.
 
     Raises:
         ArgumentError: if the ending is not known or the scale makes no sense.
@@ -39,7 +43,15 @@ def export(nodes: Nodes, path: str | os.PathLike[str], *, px_per_m: float | None
             fault(str(target), f"the ending is none of {', '.join(WRITERS)}", "Choose one of them")
         )
     if px_per_m is not None and not (np.isfinite(px_per_m) and px_per_m > 0):
-        raise ArgumentError(fault("px_per_m", f"{px_per_m} is no scale", "Give pixels per metre, above 0"))
+        raise ArgumentError(
+            fault(Setting("px_per_m"), f"{px_per_m} is no scale", "Give pixels per metre, above 0")
+        )
+    if px_per_m is not None and target.suffix.lower() not in SCALED:
+        raise ArgumentError(
+            fault(
+                Setting("px_per_m"), f"{target.suffix} files are in px", "Leave it out, or write .c3d or .trc"
+            )
+        )
     nodes.check()
     # The libraries look at the ending, so the temporary name keeps it.
     temporary = target.with_name(f".{target.stem}.writing{target.suffix}")

@@ -16,6 +16,7 @@ pub mod discover;
 pub mod error;
 pub mod film;
 pub mod frame;
+pub mod kind;
 pub mod message;
 pub mod observation;
 pub mod overlay;

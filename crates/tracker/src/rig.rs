@@ -7,6 +7,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Fault, Place, Result};
+use crate::kind::{self, Kind};
 use crate::message::SETUP;
 
 /// Version of the rig file's form; a file with a higher one is refused.
@@ -102,6 +103,7 @@ impl Rig {
     /// # Errors
     /// [`Error::Rig`] naming the file and the line or key.
     pub fn read(path: &Path) -> Result<Self> {
+        kind::expect(path, &[Kind::Rig], Error::Rig)?;
         let name = path.display().to_string();
         let text = std::fs::read_to_string(path).map_err(|e| {
             Error::Rig(

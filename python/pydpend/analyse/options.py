@@ -11,6 +11,7 @@ from pydpend.angles import parse_zero, roll_sigma
 from pydpend.documents import read_toml
 from pydpend.errors import OptionError, Setting, Step, fault, one_of
 from pydpend.fit_options import INTERVALS, METHODS, RATIOS, check_fit
+from pydpend.kinds import expect
 
 CHOICES = {
     "method": METHODS,
@@ -58,7 +59,7 @@ class Options:
     pinned: bool = False
     """The elbow is pinned: a single pendulum. A recording of one link needs a one-link model instead."""
     ten_coefficients: bool = False
-    """Also the paper's ten, with a warning; needs ``--method energy --laws paper``."""
+    """Also the paper's ten, with a warning; needs the energy method and the paper's laws."""
     intervals: str = "covariance"
     """``covariance``: standard errors; ``profile``: 95 % intervals by profile likelihood too (takes much longer)."""
     comparison: bool | None = None
@@ -164,12 +165,17 @@ def flag_of(field: str) -> str:
     return "--" + field.removesuffix("_s").removesuffix("_deg").replace("_", "-")
 
 
-WRITE_CONFIG = Step("pydpend analyse --write-config", "dp.analyse.write_config(dp.Options())")
+WRITE_CONFIG = Step(
+    "pydpend analyse --write-config", "pydpend.analyse.write_config(pydpend.analyse.Options())"
+)
 """Prints every option with its default."""
+READ_CONFIG = Step("pydpend analyse --config THIS_FILE", "pydpend.analyse.read_config(THIS_FILE)")
+"""Uses a file of options."""
 
 
 def read_config(path: str | Path) -> Options:
     """Options from a TOML file as ``--write-config`` writes it. Unknown keys are errors."""
+    expect(path, ("config",), OptionError)
     raw = read_toml(Path(path), OptionError, "Start from what " + WRITE_CONFIG + " prints")
     known = {f.name: f for f in fields(Options)}
     values: dict[str, Any] = {}
@@ -193,7 +199,7 @@ def read_config(path: str | Path) -> Options:
 def write_config(options: Options) -> str:
     """The options as TOML, each with what it means; what is not set is commented out."""
     docs = _field_docs()
-    lines = ["# pydpend analyse --config THIS_FILE", ""]
+    lines = [f"# {READ_CONFIG}", ""]
     for f in fields(Options):
         value = getattr(options, f.name)
         lines += [f"# {line}" for line in docs[f.name].splitlines()]

@@ -118,7 +118,7 @@ def _nodes(here: Path, r: Recording) -> Nodes:
 
 def _hanging(r: Recording, options: Options, here: Path, into: Path) -> Any:
     """The ``zero`` of `angles.angles`, tracking a reference film if one is named."""
-    from pydpend.analyse.recordings import kind_of
+    from pydpend.analyse.recordings import recording_kind
     from pydpend.angles import parse_zero
     from pydpend.nodes import read_nodes
 
@@ -126,7 +126,7 @@ def _hanging(r: Recording, options: Options, here: Path, into: Path) -> Any:
     if said is not None:
         return said
     path = Path(options.zero)
-    if kind_of(path) == "nodes":
+    if recording_kind(path) == "nodes":
         return read_nodes(path)
     from pydpend.tracking import track as track_film
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pydpend.angles.table import Floats
-from pydpend.errors import AnglesError, fault
+from pydpend.errors import AnglesError, Setting, fault
 
 if TYPE_CHECKING:
     from pydpend.nodes import Nodes
@@ -79,13 +79,15 @@ def body_markers(
     wanted = list(bodies) if bodies is not None else names
     for name in wanted:
         if name not in names:
-            raise AnglesError(fault("nodes", f"there is no body {name!r}", f"The rig has {', '.join(names)}"))
+            raise AnglesError(
+                fault(Setting("bodies"), f"there is no body {name!r}", f"The rig has {', '.join(names)}")
+            )
     if not 1 <= len(wanted) <= 2 or len(set(wanted)) != len(wanted):
         raise AnglesError(
             fault(
                 "nodes",
                 f"{len(wanted)} bodies ({', '.join(wanted)}), but angles are of one or two links",
-                "Name the upper and the lower link with `bodies`",
+                "Name the upper and the lower link with " + Setting("bodies"),
             )
         )
     trusted = np.isin(nodes.status, SEEN_STATUS) & np.isfinite(nodes.xy_px).all(axis=2)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pydpend.angles import LinkAngles, read_angles
 from pydpend.documents import read_json
 from pydpend.encoder import read_calibration
-from pydpend.errors import PydpendError
+from pydpend.errors import PydpendError, Setting
 from pydpend.nodes import Nodes, read_nodes
 from pydpend.plots.encoder import calibration_figure
 from pydpend.plots.folder import AGAIN, read_table
@@ -364,10 +364,12 @@ def _doubts_of_time(source: dict[str, Any]) -> list[str]:
     """Warnings where the frame rate may not be the camera's: every rate and coefficient scales with it."""
     origin, rate = source.get("rate_origin"), source.get("rate_hz")
     if origin == "unknown":
-        return ["nothing gives its frame rate, so times count frames. Give the camera's with --fps"]
+        return [
+            f"nothing gives its frame rate, so times count frames. Give the camera's with {Setting('fps')}"
+        ]
     if origin == "container" and rate is not None and rate <= PLAYERS_RATE_HZ:
         return [
             f"its {rate:g} frames a second are what the file tells a player. If the camera took them at another "
-            "rate, give that with --fps: every time and rate here hinges on it"
+            f"rate, give that with {Setting('fps')}: every time and rate here hinges on it"
         ]
     return []

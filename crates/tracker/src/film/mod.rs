@@ -25,6 +25,7 @@ mod spline;
 mod truth;
 mod truth_table;
 mod write;
+mod write_options;
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -34,7 +35,8 @@ pub use presets::{PRESETS, paper_layout, preset};
 pub use scene::Scene;
 pub use truth::{FrameTruth, NodeTruth};
 pub use truth_table::{Truth, TruthWriter};
-pub use write::{WriteOptions, write};
+pub use write::write;
+pub use write_options::WriteOptions;
 
 use crate::error::Result;
 use crate::frame::{Frame, PixelFormat, TimeBase};
