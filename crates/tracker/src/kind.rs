@@ -118,6 +118,31 @@ impl Kind {
         }
     }
 
+    /// What makes one of what is wanted of it in one step, where that is not what is done with it anyway.
+    fn towards(self, wanted: &[Self], path: &Path) -> Option<Message> {
+        let name = path.display().to_string();
+        let file = shell_word(&name);
+        let step = |command: String, call: String| {
+            Some("Next: " + Message::from(Step { command: command.into(), call: call.into() }))
+        };
+        match self {
+            Self::Film | Self::Pictures | Self::NodeTable | Self::Angles
+                if wanted.contains(&Self::RunFolder) =>
+            {
+                let options = format!("pydpend.analyse.Options(inputs=({name:?},))");
+                step(
+                    format!("pydpend analyse {file} -o run/"),
+                    format!("pydpend.analyse.analyse({options}, 'run')"),
+                )
+            }
+            Self::Encoder if wanted.contains(&Self::Calibration) => step(
+                format!("pydpend calibrate {file} -o encoder.json"),
+                format!("dp.calibrate(dp.read_holds([{name:?}]))"),
+            ),
+            _ => None,
+        }
+    }
+
     /// What is done with it next.
     fn next(self, path: &Path) -> Message {
         let name = path.display().to_string();
@@ -235,7 +260,7 @@ pub fn misplaced(path: &Path, wanted: &[Kind]) -> Option<Fault> {
     let inside = if kind == Kind::RunFolder { wanted.iter().find_map(|w| part_of(path, *w)) } else { None };
     Some(match inside {
         Some((what, file)) => fault.advice(format!("Give its {what}, {}", file.display())),
-        None => fault.advice(kind.next(path)),
+        None => fault.advice(kind.towards(wanted, path).unwrap_or_else(|| kind.next(path))),
     })
 }
 

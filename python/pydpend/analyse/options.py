@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,7 @@ from pydpend.angles import parse_zero, roll_sigma
 from pydpend.documents import read_toml
 from pydpend.errors import OptionError, Setting, Step, fault, one_of
 from pydpend.fit_options import INTERVALS, METHODS, RATIOS, check_fit
-from pydpend.kinds import expect
+from pydpend.kinds import Kind, expect
 
 CHOICES = {
     "method": METHODS,
@@ -132,11 +133,25 @@ class Options:
                 )
 
 
+WANTED: Mapping[str, tuple[Kind, ...]] = {
+    "rig": ("rig",),
+    "encoder": ("encoder", "angles"),
+    "calibration": ("calibration", "tables", "encoder"),
+    "model": ("model",),
+    "zero": ("film", "pictures", "nodes"),
+}
+"""What a file that an option names may be."""
+
+
 def check_files(options: Options) -> None:
-    """Whether the files that options name are there. Raises OptionError, naming the option, before anything is done."""
-    for field in ("rig", "encoder", "calibration"):
+    """Whether the files that options name are there and what they are to be. Raises OptionError, naming the option,
+    before anything is done."""
+    for field, kinds in WANTED.items():
         name = getattr(options, field)
-        if name is not None and not Path(name).exists():
+        if name is None or (field == "zero" and parse_zero(name) is not None):
+            continue
+        expect(name, kinds, OptionError)
+        if field in ("rig", "encoder", "calibration") and not Path(name).exists():
             raise OptionError(fault(Setting(field), f"there is no file {name}", "Check the name"))
     if options.model not in ("derived", "published") and not Path(options.model).is_file():
         raise OptionError(

@@ -92,7 +92,7 @@ def read_holds(
     """
     files: list[Path] = []
     for path in map(Path, paths):
-        expect(path, ("encoder", "angles", "tables"), EncoderError)
+        expect(path, ("encoder", "tables"), EncoderError)
         if path.is_dir():
             inside = [p for p in sorted(path.iterdir()) if p.suffix.lower() in ENDINGS]
             if not inside:

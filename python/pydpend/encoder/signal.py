@@ -85,6 +85,14 @@ def read_encoder(
     """
     path = Path(path)
     expect(path, ("encoder", "angles"), EncoderError)
+    if rate_hz is not None and time_column is not None:
+        raise EncoderError(
+            fault(
+                Setting("rate_hz"),
+                "the times are also to be a column's",
+                "Leave it or " + Setting("time_column") + " out",
+            )
+        )
     if rate_hz is not None and not (np.isfinite(rate_hz) and rate_hz > 0):
         raise EncoderError(
             fault(Setting("rate_hz"), f"a rate of {rate_hz} Hz cannot be", "Give the samples per second")
@@ -101,6 +109,11 @@ def read_encoder(
 
         t, value, label, notes = read_tdms(path, column, time_column, rate_hz)
     elif magic == MAGIC:
+        for option, given in (("column", column), ("time_column", time_column)):
+            if given is not None:
+                raise EncoderError(
+                    fault(Setting(option), f"{path} is an array without names", "Leave it out")
+                )
         t, value, label = _read_numpy(path, rate_hz)
     else:
         t, value, label, table = _read_table(path, column, time_column, rate_hz)
@@ -149,7 +162,7 @@ def _read_numpy(path: Path, rate_hz: float | None) -> tuple[Floats, Floats, str]
             fault(
                 str(path),
                 f"an array of shape {array.shape}",
-                "Save (T, 2) with the time in s first, or (T,) and give rate_hz",
+                "Save (T, 2) with the time in s first, or (T,) and give " + Setting("rate_hz"),
             )
         )
     return array[:, 0].copy(), array[:, 1].copy(), "value"
