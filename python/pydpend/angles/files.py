@@ -97,6 +97,7 @@ def _read_table(path: Path, columns: dict[str, str]) -> _TableParts:
         [theirs[c] for c in ours if c not in columns and c != "time_s"],
         error=AnglesError,
         time=theirs["time_s"],
+        naming=Setting("columns"),
     )
     if table.rows == 0:
         raise AnglesError(fault(str(path), "the table has a header and no rows", "Give one row per instant"))

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pydpend.angles.table import Floats
-from pydpend.errors import AnglesError, Setting, fault
+from pydpend.errors import CHECK, AnglesError, Setting, fault
 
 if TYPE_CHECKING:
     from pydpend.nodes import Nodes
@@ -111,7 +111,7 @@ def body_markers(
                 fault(
                     "nodes",
                     f"no node of the body {name} is ever seen",
-                    "Look at `tracker check` of the table",
+                    "Look at " + CHECK + " of the table",
                 )
             )
         xy = to_world(np.where(seen[..., None], nodes.xy_px[:, index], 0.0), mirrored)

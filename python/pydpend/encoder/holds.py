@@ -140,7 +140,9 @@ def read_holds(
 
 
 def _holds_of_table(path: Path, column: str) -> list[Hold]:
-    table = read_columns(path, [column], ["angle_deg", "angle_rad", "std_v", "n"], error=EncoderError)
+    table = read_columns(
+        path, [column], ["angle_deg", "angle_rad", "std_v", "n"], error=EncoderError, naming=Setting("column")
+    )
     if ("angle_deg" in table.values) == ("angle_rad" in table.values):
         raise EncoderError(
             fault(

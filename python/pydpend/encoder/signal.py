@@ -136,7 +136,14 @@ def _read_table(
                 "Name the encoder's with " + Setting("column"),
             )
         )
-    table = read_columns(path, required, optional, error=EncoderError, time=when[0] if when else None)
+    table = read_columns(
+        path,
+        required,
+        optional,
+        error=EncoderError,
+        time=when[0] if when else None,
+        naming=Setting("column" if column else "time_column"),
+    )
     found = [column] if column else [c for c in KNOWN_COLUMNS if c in table.values]
     if len(found) != 1:
         raise EncoderError(

@@ -34,7 +34,7 @@ from pydpend.plots.nodes import nodes_figure
 Floats = NDArray[np.float64]
 
 
-AGAIN = "Do pydpend analyse again"
+AGAIN = "Do " + ANALYSE + " again"
 
 
 class FigureError(PydpendError):
