@@ -452,6 +452,18 @@ def test_the_program_tracker_says_the_same(tmp_path: Path) -> None:
     assert not out.exists()
 
 
+def test_a_warning_of_the_tracker_speaks_as_its_caller(tmp_path: Path) -> None:
+    film = dp.film("clean", tmp_path / "f" / "%03d.png", frames=8)
+    rig = tmp_path / "rig.toml"
+    rig.write_text(film.rig_toml(), encoding="utf-8")
+    nodes = dp.track(tmp_path / "f", rig)
+    assert all(isinstance(w, str) for w in nodes.meta["warnings"])
+    assert any(w.endswith("Give it with fps=...") for w in nodes.meta["warnings"]), nodes.meta["warnings"]
+    words: list[str | Path] = [TRACKER, "track", tmp_path / "f", "--rig", rig, "-o", tmp_path / "n.csv"]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert "note: pictures have no rate; times are frame numbers. Give it with --fps\n" in done.stderr
+
+
 def test_every_command_has_its_place() -> None:
     assert set(_parsers()[1]) == set(COMMANDS)
     assert all(isinstance(p, argparse.ArgumentParser) for p in _parsers()[1].values())

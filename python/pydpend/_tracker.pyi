@@ -66,7 +66,7 @@ def track(
     output: str | None,
     existing: str,
     progress: Callback,
-) -> tuple[Columns, list[str], BaseException | None]:
+) -> tuple[Columns, list[Message], BaseException | None]:
     """Columns, warnings, and the exception that stopped the run, if one did. `rig` is JSON."""
 
 def setup(
@@ -76,7 +76,7 @@ def setup(
     open: OpenArguments,
     picture: str | None,
     progress: Callback,
-) -> tuple[str, list[str], NDArray[np.uint8]]:
+) -> tuple[str, list[Message], NDArray[np.uint8]]:
     """The rig as JSON, warnings, and the reference frame with the rig drawn, (H, W, 3), red, green, blue."""
 
 def overlay_film(

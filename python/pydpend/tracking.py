@@ -186,7 +186,7 @@ def track(
     finally:
         close()
     nodes = nodes_of(columns)
-    nodes.meta["warnings"] = warnings
+    nodes.meta["warnings"] = [str(warning) for warning in warnings]
     if stopped is not None:
         stopped.nodes = nodes  # type: ignore[attr-defined]
         raise stopped
@@ -219,6 +219,7 @@ def setup(
     threshold: float | None = None,
     polarity: Polarity = "auto",
     decoder: Decoder = "auto",
+    allow_protocol: bool = False,
 ) -> Setup:
     """Finds markers, bodies and joints of a recording.
 
@@ -226,7 +227,7 @@ def setup(
         path: the recording; it is read through.
         output: a rig file to write, to be looked at and edited.
         picture: an image file to write, for example .png: the reference frame with all that was found.
-        fps, frames, threads, progress, threshold, polarity, decoder: as in `track`.
+        fps, frames, threads, progress, threshold, polarity, decoder, allow_protocol: as in `track`.
 
     Raises:
         SourceError, DetectError, RigError, ArgumentError: as `track`.
@@ -239,7 +240,7 @@ def setup(
             os.fspath(path),
             _frames(frames),
             (threshold, polarity, "weighted"),
-            (fps, decoder, False, _threads(threads)),
+            (fps, decoder, allow_protocol, _threads(threads)),
             None if picture is None else os.fspath(picture),
             callback,
         )
@@ -248,7 +249,7 @@ def setup(
     rig = Rig.from_json(text)
     if output is not None:
         rig.write(output)
-    return Setup(rig, warnings, drawn)
+    return Setup(rig, [str(warning) for warning in warnings], drawn)
 
 
 @dataclass(frozen=True, eq=False)
@@ -327,7 +328,9 @@ def overlay(
     return OverlayFilm(os.fspath(output), frame, t_s, play_fps)
 
 
-def info(path: Path, *, fps: float | None = None, decoder: Decoder = "auto") -> dict[str, Any]:
+def info(
+    path: Path, *, fps: float | None = None, decoder: Decoder = "auto", allow_protocol: bool = False
+) -> dict[str, Any]:
     """What is known of a recording before it is read through.
 
     Returns:
@@ -338,7 +341,7 @@ def info(path: Path, *, fps: float | None = None, decoder: Decoder = "auto") -> 
     Raises:
         SourceError: if it cannot be opened.
     """
-    known: dict[str, Any] = json.loads(_tracker.info(os.fspath(path), (fps, decoder, False, 0)))
+    known: dict[str, Any] = json.loads(_tracker.info(os.fspath(path), (fps, decoder, allow_protocol, 0)))
     return known
 
 
