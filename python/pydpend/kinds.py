@@ -6,7 +6,7 @@ import os
 from typing import Literal, TypeAlias
 
 from pydpend import _tracker
-from pydpend.errors import Message, PydpendError
+from pydpend.errors import Message, PydpendError, Setting
 
 Kind: TypeAlias = Literal[
     "film",
@@ -36,8 +36,16 @@ def kind_of(path: str | os.PathLike[str]) -> Kind:
     return kind
 
 
-def expect(path: str | os.PathLike[str], wanted: tuple[Kind, ...], error: type[PydpendError]) -> None:
-    """Raises ``error`` for a file that is of a known kind and of none that is wanted, with what is done with it."""
+def expect(
+    path: str | os.PathLike[str],
+    wanted: tuple[Kind, ...],
+    error: type[PydpendError],
+    setting: str | None = None,
+) -> None:
+    """Raises ``error`` for a file that is of a known kind and of none that is wanted, with what is done with it.
+
+    ``setting``: the option that names the file.
+    """
     said: Message | None = _tracker.misplaced(os.fspath(path), list(wanted))
     if said is not None:
-        raise error(said)
+        raise error(said if setting is None else Setting(setting, subject=True) + ": " + said)

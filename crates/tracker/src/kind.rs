@@ -147,7 +147,7 @@ impl Kind {
     fn next(self, path: &Path) -> Message {
         let name = path.display().to_string();
         let file = shell_word(&name);
-        let stem = shell_word(&path.with_extension("").display().to_string().trim_end_matches('/'));
+        let stem = shell_word(path.with_extension("").display().to_string().trim_end_matches('/'));
         let type_this = |command: String, call: String| {
             "Next: " + Message::from(Step { command: command.into(), call: call.into() })
         };

@@ -150,7 +150,7 @@ def check_files(options: Options) -> None:
         name = getattr(options, field)
         if name is None or (field == "zero" and parse_zero(name) is not None):
             continue
-        expect(name, kinds, OptionError)
+        expect(name, kinds, OptionError, field)
         if field in ("rig", "encoder", "calibration") and not Path(name).exists():
             raise OptionError(fault(Setting(field), f"there is no file {name}", "Check the name"))
     if options.model not in ("derived", "published") and not Path(options.model).is_file():
