@@ -368,6 +368,8 @@ def test_what_does_nothing_with_these_inputs_is_refused(
     for option in (["--columns", "time_s=t"], ["--hanging", "180"], ["--clockwise"], ["--unwrap"]):
         assert main(["analyse", str(DEMO / "drop.mp4"), *option, "-o", str(tmp_path / "out")]) == 2, option
         assert option[0] in capsys.readouterr().err
+    assert main(["export", FIT[1], "--px-per-m", "900", "-o", str(tmp_path / "out.mat")]) == 2
+    assert "--px-per-m: .mat files are in px" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
 
 

@@ -30,7 +30,7 @@ def export(nodes: Nodes, path: str | os.PathLike[str], *, px_per_m: float | None
     Args:
         nodes: the nodes.
         path: the file; one that is there is replaced when the new one is whole.
-        px_per_m: scale of the image, for C3D and TRC, which are then in mm; the others are in px.
+        px_per_m: scale of the image; C3D and TRC are then in mm. Not used for the others, which are in px.
 
     Raises:
         ArgumentError: if the ending is not known or the scale makes no sense.
@@ -45,12 +45,6 @@ def export(nodes: Nodes, path: str | os.PathLike[str], *, px_per_m: float | None
     if px_per_m is not None and not (np.isfinite(px_per_m) and px_per_m > 0):
         raise ArgumentError(
             fault(Setting("px_per_m"), f"{px_per_m} is no scale", "Give pixels per metre, above 0")
-        )
-    if px_per_m is not None and target.suffix.lower() not in SCALED:
-        raise ArgumentError(
-            fault(
-                Setting("px_per_m"), f"{target.suffix} files are in px", "Leave it out, or write .c3d or .trc"
-            )
         )
     nodes.check()
     # The libraries look at the ending, so the temporary name keeps it.

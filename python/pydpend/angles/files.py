@@ -51,7 +51,8 @@ def read_angles(
     Raises :class:`~pydpend.errors.AnglesError` naming file, line (or row) and column.
     """
     path = Path(path)
-    expect(path, ("angles",), AnglesError)
+    # What a folder lacks is told below.
+    expect(path, ("angles", "tables") if path.is_dir() else ("angles",), AnglesError)
     label = name if name is not None else (path.name if path.is_dir() else path.stem)
     if path.is_dir():
         t, phi, sigma = _read_published(path)
