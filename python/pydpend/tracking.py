@@ -336,10 +336,12 @@ def info(
     Returns:
         `name`, `container`, `codec`, `width`, `height` (px), `depth_bits`, `declared_frames`, `rate_hz`,
         `rate_origin`, `time_base` (numerator and denominator of s per tick), `size_bytes`, `sha256_first_mib`,
-        `converted_from`, `warnings` and `details`; None where unknown.
+        `converted_from`, `warnings` and `details`; `frames` that are there by their packets, without decoding any, and
+        what its times are (`time`: `kind`, `rate_hz`, `sigma_s`, `gaps`, `notes`, ...); None where unknown. Of a long
+        recording only the first frames are looked at for these two.
 
     Raises:
-        SourceError: if it cannot be opened.
+        SourceError: if it cannot be opened, or its time stamps stand still.
     """
     known: dict[str, Any] = json.loads(_tracker.info(os.fspath(path), (fps, decoder, allow_protocol, 0)))
     return known

@@ -146,9 +146,18 @@ pub fn info(py: Python<'_>, input: String, open: OpenArguments) -> PyResult<Stri
     let options = open_options(py, &open)?;
     let mut watch = Watch::new(None);
     let known = py.detach(|| {
-        let source = pipeline::open(&input, &options, &mut watch)?;
+        let mut source = pipeline::open(&input, &options, &mut watch)?;
+        let surveyed = pipeline::survey(&mut *source)?;
         let info = source.info();
-        let mut value = json!(SourceFacts::of(info));
+        let (steps, is_whole) = surveyed.unwrap_or_default();
+        let (timing, _) = pipeline::times(info, &steps, 0)?;
+        let mut value = json!(SourceFacts {
+            rate_hz: timing.rate_hz,
+            rate_origin: timing.rate_origin,
+            ..SourceFacts::of(info)
+        });
+        value["time"] = json!(timing);
+        value["frames"] = json!(is_whole.then(|| steps.len()));
         value["details"] = json!(info.details.iter().cloned().collect::<std::collections::BTreeMap<_, _>>());
         Ok(value.to_string())
     });

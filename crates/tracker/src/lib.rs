@@ -29,4 +29,5 @@ pub mod setup;
 pub mod source;
 pub mod store;
 pub mod table;
+pub mod timing;
 pub mod track;

@@ -74,6 +74,8 @@ def track(r: Recording, options: Options, into: Path, tell: Tell, resume: bool) 
         force=True,
         progress=_share(tell),
     )
+    for note in nodes.meta.get("warnings", []):
+        tell(f"note: {note}")
     count = len(nodes.rig.nodes)
     return f"{nodes.frame.size} frames, {count} node{'s' if count > 1 else ''}"
 

@@ -58,7 +58,8 @@ def angles(
     refuse, or leave the link's angles out from there on and say so in ``meta["notes"]``.
 
     ``sigma_rad`` holds each frame's own standard error; that of the zero, common to all frames, is in
-    ``meta["zero"]``.
+    ``meta["zero"]``. Where the table says that its times are uncertain (a variable frame rate in coarse ticks), it
+    holds that too, times the link's speed; ``meta["time"]`` says what the times are.
 
     Raises :class:`~pydpend.errors.AnglesError`: a body never seen, or in one marker only; no rest found, or one in
     which the links are held and do not hang; a turn that may be lost; links that turn too little for a linkage.
@@ -78,10 +79,31 @@ def angles(
         first = phi[np.flatnonzero(np.isfinite(phi[:, k]))[0], k]
         phi[:, k] -= 2 * np.pi * np.ceil((first - np.pi) / (2 * np.pi))
     meta = {"method": estimator, "mirrored": mirrored, **raw.meta, "zero": zero_meta, "notes": notes}
-    source = nodes.meta.get("source")
-    if source is not None:
-        meta["source"] = source
-    return LinkAngles(nodes.t_s, phi, raw.sigma, nodes.frame, meta, label)
+    for key in ("source", "time"):
+        if nodes.meta.get(key) is not None:
+            meta[key] = nodes.meta[key]
+    sigma = _with_time(nodes.t_s, phi, raw.sigma, _time_sigma_s(nodes))
+    return LinkAngles(nodes.t_s, phi, sigma, nodes.frame, meta, label)
+
+
+def _time_sigma_s(nodes: Nodes) -> float:
+    """Standard uncertainty of each frame's time in s, as the table says; 0 where it says nothing."""
+    time = nodes.meta.get("time")
+    return float(time.get("sigma_s", 0.0)) if isinstance(time, dict) else 0.0
+
+
+def _with_time(t_s: Floats, phi: Floats, sigma: Floats, time_sigma_s: float) -> Floats:
+    """Standard uncertainties of angles whose times have one too, each frame's own: a link that turns with w is at
+    another angle by ``w dt``. (T, L), rad."""
+    if time_sigma_s == 0.0:
+        return sigma
+    out = sigma.copy()
+    for k in range(phi.shape[1]):
+        seen = np.flatnonzero(np.isfinite(phi[:, k]))
+        if seen.size > 1:
+            rate = np.gradient(phi[seen, k], t_s[seen])
+            out[seen, k] = np.hypot(sigma[seen, k], rate * time_sigma_s)
+    return out
 
 
 def find_linkage(nodes: Nodes, *, bodies: Sequence[str] | None = None, mirrored: bool = False) -> Linkage:

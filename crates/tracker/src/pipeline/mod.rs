@@ -8,6 +8,7 @@ mod detecting;
 mod observer;
 mod opening;
 mod state;
+mod times;
 
 use std::ops::Range;
 use std::path::PathBuf;
@@ -18,6 +19,7 @@ use serde_json::json;
 pub use observer::{Observer, Silent, Stage};
 pub use opening::open;
 pub use state::partial_path;
+pub use times::{survey, times};
 
 use crate::detect::{DetectSettings, Levels};
 use crate::discover::{Discovery, discover};
@@ -30,6 +32,7 @@ use crate::store::DetectionStore;
 use crate::table::{
     Form, NodeSummary, NodeTable, Rows, RunEnding, SCHEMA_VERSION, SourceFacts, TableMeta, TableWriter, Tally,
 };
+use crate::timing::{self, Clock, Steps, Timing};
 use crate::track::track_recording;
 use state::State;
 
@@ -166,6 +169,7 @@ fn check(settings: &RunSettings) -> Result<()> {
 /// What is asked of a recording, once it is open.
 struct Request {
     facts: SourceFacts,
+    info: SourceInfo,
     detect: DetectSettings,
     state: State,
 }
@@ -180,7 +184,7 @@ impl Request {
             detect.lens = detect.lens.or_else(|| rig.lens.clone());
         }
         let state = State::new(settings, &facts, &detect);
-        Ok(Self { facts, detect, state })
+        Ok(Self { facts, info: info.clone(), detect, state })
     }
 }
 
@@ -224,6 +228,7 @@ struct Run<'a> {
     settings: &'a RunSettings,
     detect: DetectSettings,
     facts: SourceFacts,
+    info: SourceInfo,
     levels: Arc<Levels>,
     store: DetectionStore,
     resumed: u64,
@@ -240,7 +245,7 @@ impl<'a> Run<'a> {
         source: Box<dyn FrameSource>,
         observer: &mut dyn Observer,
     ) -> Result<(Self, Box<dyn FrameSource>)> {
-        let Request { facts, detect, state } = request;
+        let Request { facts, info, detect, state } = request;
         let warnings = source.info().warnings.clone();
         if settings.existing == Existing::Resume
             && let Some(output) = &settings.output
@@ -249,7 +254,7 @@ impl<'a> Run<'a> {
             let store = DetectionStore::on_spool(earlier.spool)?;
             let (resumed, levels) = (store.len() as u64, Arc::new(earlier.levels));
             let finished = earlier.ending;
-            let run = Self { settings, detect, facts, levels, store, resumed, finished, warnings };
+            let run = Self { settings, detect, facts, info, levels, store, resumed, finished, warnings };
             return Ok((run, source));
         }
         observer.stage(Stage::Learn, None);
@@ -264,7 +269,7 @@ impl<'a> Run<'a> {
             None => DetectionStore::new(),
         };
         let levels = Arc::new(levels);
-        let run = Self { settings, detect, facts, levels, store, resumed: 0, finished: None, warnings };
+        let run = Self { settings, detect, facts, info, levels, store, resumed: 0, finished: None, warnings };
         Ok((run, source))
     }
 
@@ -325,6 +330,8 @@ impl<'a> Run<'a> {
         if self.store.is_empty() {
             return Err(self.no_frames(ending));
         }
+        let (timing, clock) = self.times()?;
+        self.warnings.extend(timing::notes(&timing));
         let rig = match &self.settings.rig {
             Some(rig) => rig.clone(),
             None => {
@@ -341,13 +348,12 @@ impl<'a> Run<'a> {
         };
         let mut rows = self.settings.collect.then(Rows::default);
         let mut tally = Tally::new(&rig);
-        let time_base = self.facts.time_base();
         // A run that was stopped while it read is only stopped here if the user does not want to wait.
         let mut stop = ending.is_none();
         let reading_was_stopped = stop;
         let mut done = 0;
         let tracked = track_recording(&self.store, &rig, &mut |stamp, observations| {
-            let time_s = time_base.seconds(stamp.ticks);
+            let time_s = clock.seconds(done, stamp.ticks);
             if let Some(writer) = &mut writer {
                 writer.push(stamp.index, time_s, observations)?;
             }
@@ -376,7 +382,12 @@ impl<'a> Run<'a> {
             schema_version: SCHEMA_VERSION,
             tool: TableMeta::this_tool(),
             settings: self.settings_json(),
-            source: self.facts.clone(),
+            source: SourceFacts {
+                rate_hz: timing.rate_hz,
+                rate_origin: timing.rate_origin,
+                ..self.facts.clone()
+            },
+            time: Some(timing),
             ending: match ending {
                 _ if stop => RunEnding::Interrupted,
                 Some(Ending::Early { frames, byte, reason }) => {
@@ -400,6 +411,17 @@ impl<'a> Run<'a> {
             table: rows.map(|rows| NodeTable { meta: meta.clone(), rows }),
             meta,
         })
+    }
+
+    /// What the frames' times are, from all their stamps.
+    fn times(&self) -> Result<(Timing, Clock)> {
+        let mut steps = Steps::default();
+        for i in 0..self.store.len() {
+            steps.push(self.store.stamp(i).ticks);
+        }
+        let first = self.store.stamp(0).index;
+        self.store.check()?;
+        times(&self.info, &steps, first)
     }
 
     fn no_frames(&self, ending: Option<Ending>) -> Error {

@@ -50,7 +50,11 @@ impl OpencvSource {
             warnings: Vec::new(),
             ..known.clone()
         };
-        let times = if options.fps.is_some() { Vec::new() } else { display_times(name, input)? };
+        let times = if options.fps.is_some() {
+            Vec::new()
+        } else {
+            display_times(name, input, usize::MAX, u64::MAX)?.0
+        };
         Ok(Self { info, capture, color: Mat::default(), next: 0, times, ending: Ending::Complete })
     }
 }
@@ -131,6 +135,10 @@ impl FrameSource for OpencvSource {
 
     fn ending(&self) -> Ending {
         self.ending.clone()
+    }
+
+    fn stamps(&mut self) -> Result<Option<(Vec<i64>, bool)>> {
+        Ok(Some((self.times.clone(), true)).filter(|t| !t.0.is_empty()))
     }
 
     fn sample(&mut self, count: usize) -> Result<Vec<Frame>> {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::{Ending, FrameSource, SourceInfo};
 use crate::error::Result;
 use crate::film::{Film, Scene};
-use crate::frame::{Frame, PixelFormat, RateOrigin};
+use crate::frame::{Frame, PixelFormat, RateClaims, RateOrigin};
 
 /// Frames of a [`Film`], made when they are asked for.
 #[derive(Debug)]
@@ -43,6 +43,7 @@ impl SyntheticSource {
             time_base,
             rate_hz: Some(time_base.denominator as f64 / time_base.numerator as f64),
             rate_origin: RateOrigin::TimeStamps,
+            claims: RateClaims::default(),
             converted_from: None,
             size_bytes: None,
             details: Vec::new(),

@@ -51,6 +51,7 @@ pub(crate) fn meta(names: &[(String, usize)], bodies: &[String]) -> TableMeta {
             sha256_first_mib: Some("00".into()),
             warnings: vec!["a \"quoted\" warning, with a comma".into()],
         },
+        time: None,
         settings: serde_json::json!({"detect": {"threshold": 0.1}}),
         ending: RunEnding::Early { frames: 9, byte: Some(77), reason: "cut".into() },
     }

@@ -13,3 +13,4 @@ mod mraw;
 mod opencv;
 mod pixels;
 mod program;
+mod times;

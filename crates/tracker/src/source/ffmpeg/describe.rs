@@ -4,6 +4,7 @@
 
 use ffmpeg_next::ffi;
 
+use super::claims::claims;
 use super::codec_name;
 use super::demux::Demuxer;
 use super::layout::{Layout, Orientation};
@@ -40,6 +41,23 @@ pub(super) fn describe(
             if stream_rate_hz.is_some() { RateOrigin::Container } else { RateOrigin::Unknown },
         ),
     };
+    if demuxer.boxes().edits_change_time {
+        warnings.push(
+            "an edit list plays pieces of it one after the other or at another speed; all its frames are read, at \
+             the time stamps that the camera gave them"
+                .into(),
+        );
+    }
+    let declared = u64::try_from(stream.nb_frames).ok().filter(|n| *n > 0);
+    let indexed = demuxer.indexed();
+    let mut details = details(parameters, layout);
+    if let (Some(all), Some((there, hidden))) = (declared, indexed)
+        && there - hidden < all
+    {
+        let shown = there - hidden;
+        details.push(("edit list".into(), format!("shows {shown} of the {all} frames; these are read")));
+    }
+    let claims = claims(demuxer, &mut warnings, &mut details);
     let info = SourceInfo {
         name: name.to_owned(),
         container: demuxer.container(),
@@ -48,13 +66,14 @@ pub(super) fn describe(
         height,
         format: layout.format,
         depth_bits: layout.depth_bits,
-        declared_frames: u64::try_from(stream.nb_frames).ok().filter(|n| *n > 0),
+        declared_frames: indexed.map(|(there, hidden)| there - hidden).or(declared),
         time_base,
         rate_hz,
         rate_origin,
+        claims,
         converted_from: layout.converted_from(),
         size_bytes: std::fs::metadata(name).ok().filter(|m| m.is_file()).map(|m| m.len()),
-        details: details(parameters, layout),
+        details,
         warnings,
     };
     Ok((info, orientation))

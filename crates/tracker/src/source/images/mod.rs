@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 use super::{OpenOptions, clock};
 use crate::error::{Error, Fault, Result};
-use crate::frame::{Ending, Frame, FrameSource, PixelFormat, RateOrigin, SourceInfo, TimeBase};
+use crate::frame::{Ending, Frame, FrameSource, PixelFormat, RateClaims, RateOrigin, SourceInfo, TimeBase};
 use crate::message::{Message, Setting};
 use picture::Picture;
 pub use stack::StackSource;
@@ -104,6 +104,7 @@ impl SequenceSource {
             time_base,
             rate_hz,
             rate_origin,
+            claims: RateClaims::default(),
             converted_from: first.converted_from,
             size_bytes: Some(size_bytes),
             details: Vec::new(),

@@ -8,7 +8,7 @@ use tiff::decoder::Decoder;
 use super::picture::{self, Picture};
 use super::{format, frame, rate};
 use crate::error::{Error, Fault, Result};
-use crate::frame::{Ending, Frame, FrameSource, SourceInfo};
+use crate::frame::{Ending, Frame, FrameSource, RateClaims, SourceInfo};
 use crate::source::OpenOptions;
 
 /// A multi-page TIFF.
@@ -45,6 +45,7 @@ impl StackSource {
             time_base,
             rate_hz,
             rate_origin,
+            claims: RateClaims::default(),
             converted_from: first.converted_from,
             size_bytes: std::fs::metadata(name).ok().map(|m| m.len()),
             details: Vec::new(),

@@ -17,7 +17,9 @@ use memmap2::{Advice, Mmap, MmapOptions};
 
 use super::{OpenOptions, clock};
 use crate::error::{Error, Fault, Result};
-use crate::frame::{Bytes, Ending, Frame, FrameSource, PixelFormat, RateOrigin, SourceInfo, TimeBase};
+use crate::frame::{
+    Bytes, Ending, Frame, FrameSource, PixelFormat, RateClaims, RateOrigin, SourceInfo, TimeBase,
+};
 use crate::message::Setting;
 use header::{Header, Packing};
 
@@ -255,6 +257,7 @@ fn info(name: &str, header: &Header, packing: &Packing, options: &OpenOptions) -
             .fps
             .or_else(|| known.then(|| time_base.denominator as f64 / time_base.numerator as f64)),
         rate_origin,
+        claims: RateClaims::default(),
         converted_from: (packing.shift > 0).then(|| "16 bit, significant bits on top".to_owned()),
         size_bytes: None,
         details,
