@@ -3,6 +3,7 @@
 
 mod film;
 
+mod aspect;
 mod cine;
 mod damage;
 mod ffmpeg;
@@ -13,4 +14,3 @@ mod mraw;
 mod opencv;
 mod pixels;
 mod program;
-mod times;
