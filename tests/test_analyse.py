@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
+import pydpend as dp
 import pytest
 from pydpend.analyse import Options, analyse, read_config, write_config
 from pydpend.analyse.folder import RunFolder
@@ -87,6 +88,29 @@ def test_another_frame_rate_is_tracked_anew(demo_run: Path, tmp_path: Path) -> N
     assert analyse(replace(film, fps=250.0), tmp_path / "run").stages["hanging/track"] == "done"
     second = read_nodes(tmp_path / "run" / "hanging" / "nodes.parquet")
     assert second.t_s[-1] == pytest.approx(4 * first.t_s[-1])
+
+
+def test_a_players_rate_is_said_with_its_factor(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    t = np.arange(60) / 30
+    phi = np.stack([0.4 * np.sin(3 * t), 0.5 * np.sin(2 * t)], axis=1)
+    film = dp.film(
+        "clean", tmp_path / "slow.mp4", motion=(t, phi), frames=60, rate_hz=30.0, speed="ultrafast"
+    )
+    rig = tmp_path / "rig.toml"
+    rig.write_text(film.rig_toml(), encoding="utf-8")
+    words = [
+        "analyse",
+        str(tmp_path / "slow.mp4"),
+        "--rig",
+        str(rig),
+        "--no-overlay",
+        "-o",
+        str(tmp_path / "run"),
+    ]
+    main(words)
+    said = "if it was filmed at 240 frames per s, every rate is 8 times too small"
+    assert [said in line for line in capsys.readouterr().err.splitlines()].count(True) == 1
+    assert said in (tmp_path / "run" / "report.html").read_text("utf-8")
 
 
 def command(options: Options, folder: Path) -> list[str]:

@@ -63,6 +63,31 @@ def test_errors_are_at_the_bound_and_as_stated(method: Method, seed: int) -> Non
     np.testing.assert_allclose((error / found.sigma_rad).std(axis=0), 1.0, atol=0.05)
 
 
+@pytest.mark.parametrize("tick_s", [1e-3, 1 / 90_000])
+@pytest.mark.parametrize("method", ["rigid", "linkage", "pairwise"])
+def test_half_a_tick_of_the_times_is_in_the_uncertainty(method: Method, tick_s: float) -> None:
+    # A variable rate of 70 to 130 per s: true instants, and the ticks to which the container rounds them.
+    rng = np.random.default_rng(9)
+    true_s = np.cumsum(rng.uniform(1 / 130, 1 / 70, 6000))
+    t = np.round(true_s / tick_s) * tick_s
+
+    def motion(at: Floats) -> Floats:
+        return np.stack([3 * np.sin(4.1 * at), 4 * np.sin(5.3 * at + 1)], axis=1)
+
+    nodes = rig.film(t, motion(true_s), 9)
+    silent = angles(nodes, method, zero="reference_frame")
+    time = {"kind": "variable", "sigma_s": tick_s / np.sqrt(12)}
+    found = angles(dataclasses.replace(nodes, meta={"time": time}), method, zero="reference_frame")
+    np.testing.assert_array_equal(found.phi_rad, silent.phi_rad)
+    assert found.meta["time"] == time
+    error = found.phi_rad - motion(t)
+    pull = ((error - error.mean(axis=0)) / found.sigma_rad).std(axis=0)
+    # 6000 frames: 0.9 % scatter of the standard deviation; the issue asks for 5 % elsewhere.
+    np.testing.assert_allclose(pull, 1.0, atol=0.05)
+    if tick_s == 1e-3 and method != "pairwise":
+        assert ((error - error.mean(axis=0)) / silent.sigma_rad).std(axis=0).min() > 3
+
+
 def test_linkage_gains_what_the_levers_promise() -> None:
     t, phi = tumbling(3000, 3)
     gain = bounds(phi, "rigid") / bounds(phi, "linkage")

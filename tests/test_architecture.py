@@ -13,7 +13,18 @@ PACKAGE = ROOT / "python" / "pydpend"
 
 # From left to right. A module may import from its own group and from those to its left.
 GROUPS: tuple[tuple[str, ...], ...] = (
-    ("errors", "crossing", "_tracker", "documents", "instants", "delimited", "columns", "arrays", "series"),
+    (
+        "errors",
+        "crossing",
+        "_tracker",
+        "kinds",
+        "documents",
+        "instants",
+        "delimited",
+        "columns",
+        "arrays",
+        "series",
+    ),
     ("nodes", "tracking", "filming", "scoring", "export", "components", "bearings"),
     ("coefficients", "model", "fit_options"),
     ("angles",),

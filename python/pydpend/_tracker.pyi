@@ -19,6 +19,8 @@ from pydpend.crossing import (
     OpenArguments,
     Row,
 )
+from pydpend.errors import Message
+from pydpend.kinds import Kind
 
 __all__ = [
     "VERSION",
@@ -29,7 +31,9 @@ __all__ = [
     "detect",
     "follow_motion",
     "info",
+    "kind_of",
     "learn_noise",
+    "misplaced",
     "overlay_film",
     "poincare_section",
     "read_meta",
@@ -62,7 +66,7 @@ def track(
     output: str | None,
     existing: str,
     progress: Callback,
-) -> tuple[Columns, list[str], BaseException | None]:
+) -> tuple[Columns, list[Message], BaseException | None]:
     """Columns, warnings, and the exception that stopped the run, if one did. `rig` is JSON."""
 
 def setup(
@@ -72,7 +76,7 @@ def setup(
     open: OpenArguments,
     picture: str | None,
     progress: Callback,
-) -> tuple[str, list[str], NDArray[np.uint8]]:
+) -> tuple[str, list[Message], NDArray[np.uint8]]:
     """The rig as JSON, warnings, and the reference frame with the rig drawn, (H, W, 3), red, green, blue."""
 
 def overlay_film(
@@ -98,7 +102,6 @@ def detect(
     settings: DetectArguments,
     area_px: tuple[float | None, float | None],
     depth_bits: int | None,
-    aspect: str | None,
 ) -> Found:
     """Centres (D, 2) in px; sigma in px, area in px, peak, elongation (D, 4); flags (D,)."""
 
@@ -131,6 +134,8 @@ def check_table(held: HeldColumns, meta: str) -> None:
 def arrow_reader(held: HeldColumns, rig: str) -> Any:
     """The rows as an Arrow stream; `rig` is JSON."""
 
+def kind_of(path: str) -> Kind: ...
+def misplaced(path: str, wanted: list[str]) -> Message | None: ...
 def read_rig(path: str) -> str:
     """A rig file as JSON."""
 

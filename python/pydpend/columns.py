@@ -15,9 +15,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from pydpend.delimited import Cells, Numbers, names_on_first_line, take_apart
+from pydpend.delimited import Cells, Numbers, names_on_first_line, no_column, take_apart
 from pydpend.documents import read_bytes, unreadable
-from pydpend.errors import Message, PydpendError, fault
+from pydpend.errors import Message, PydpendError, Setting, fault
 from pydpend.instants import NotInstants, is_instant, seconds_of_arrow, seconds_of_text
 
 PARQUET_FAULTS = (pa.ArrowException, OSError, UnicodeDecodeError, KeyError, MemoryError, OverflowError)
@@ -61,11 +61,13 @@ def read_columns(
     *,
     error: type[PydpendError],
     time: str | None = None,
+    naming: Setting | None = None,
 ) -> Columns:
     """Reads the named columns of a Parquet file (by its first four bytes) or else of a delimited text file.
 
     ``optional`` columns may be missing; ``None`` takes every column there is. The column ``time`` may hold dates, times
-    of day or durations: dates become seconds from the first, the others seconds.
+    of day or durations: dates become seconds from the first, the others seconds. ``naming``: the caller's setting
+    that names columns.
 
     In text the header is the first line that holds every required name, so notes above it do no harm, nor does a
     line of units below it, nor lines that begin with ``#``, ``%`` or ``//``. Fields are parted by commas, semicolons,
@@ -77,8 +79,8 @@ def read_columns(
     """
     data = read_bytes(path, error)
     if data[:4] == b"PAR1":
-        return _parquet(str(path), data, required, optional, error, time)
-    return _text(str(path), data, required, optional, error, time)
+        return _parquet(str(path), data, required, optional, error, time, naming)
+    return _text(str(path), data, required, optional, error, time, naming)
 
 
 def column_names(path: Path, error: type[PydpendError]) -> list[str]:
@@ -108,18 +110,13 @@ def _wanted(
     required: Sequence[str],
     optional: Sequence[str] | None,
     error: type[PydpendError],
+    naming: Setting | None,
     place: str = "",
 ) -> list[str]:
     """The names that are read, each once in the header."""
     missing = [c for c in required if c not in header]
     if missing:
-        raise error(
-            fault(
-                name,
-                f"there is no column {', '.join(missing)}",
-                f"The columns are {', '.join(header) or '(none)'}; name the right one",
-            )
-        )
+        raise error(no_column(name, missing, header, naming))
     more = header if optional is None else [c for c in optional if c in header]
     wanted = list(dict.fromkeys([*required, *more]))
     for column in wanted:
@@ -142,13 +139,14 @@ def _parquet(
     optional: Sequence[str] | None,
     error: type[PydpendError],
     time: str | None,
+    naming: Setting | None,
 ) -> Columns:
     try:
         file = pq.ParquetFile(pa.BufferReader(data))
         header = tuple(file.schema_arrow.names)
     except PARQUET_FAULTS as problem:
         raise error(damaged_parquet(name, problem)) from problem
-    wanted = _wanted(name, header, required, optional, error)
+    wanted = _wanted(name, header, required, optional, error, naming)
     try:
         table = file.read(columns=wanted)
         metadata = {
@@ -188,10 +186,11 @@ def _text(
     optional: Sequence[str] | None,
     error: type[PydpendError],
     time: str | None,
+    naming: Setting | None,
 ) -> Columns:
-    cells = take_apart(name, data, required, error)
+    cells = take_apart(name, data, required, error, naming)
     place = f"line {cells.header_line}"
-    wanted = _wanted(name, cells.header, required, optional, error, place)
+    wanted = _wanted(name, cells.header, required, optional, error, naming, place)
     fields, lines = cells.fields(wanted)
     values: dict[str, NDArray[np.float64]] = {}
     first_stamp = ""

@@ -16,7 +16,7 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from pydpend.errors import PydpendError, fault
+from pydpend.errors import Message, PydpendError, Setting, fault
 
 _EMPTY = frozenset({"", "nan", "na", "n/a", "null", "none"})
 """Fields (lower case, stripped) that mean "no value"."""
@@ -118,7 +118,23 @@ class Cells:
         self.refuse(problem, advice, f"line {line}")
 
 
-def take_apart(name: str, data: bytes, required: Sequence[str], error: type[PydpendError]) -> Cells:
+def no_column(name: str, missing: Sequence[str], header: Sequence[str], naming: Setting | None) -> Message:
+    """What is said of columns that a table has not. ``naming``: the caller's setting that names columns."""
+    advice = Message.of(f"The columns are {', '.join(header) or '(none)'}; name the right one")
+    return fault(
+        name,
+        f"there is no column {', '.join(missing)}",
+        advice if naming is None else advice + " with " + naming,
+    )
+
+
+def take_apart(
+    name: str,
+    data: bytes,
+    required: Sequence[str],
+    error: type[PydpendError],
+    naming: Setting | None = None,
+) -> Cells:
     """The text of a file and its header, the first line that holds every required name."""
     text = _decoded(data).replace("\r\n", "\n").replace("\r", "\n")
     if "\0" in text[:4096]:
@@ -129,7 +145,7 @@ def take_apart(name: str, data: bytes, required: Sequence[str], error: type[Pydp
         )
     if not text.strip():
         raise error(fault(name, "the file is empty", "Give a CSV file with a header line and rows"))
-    header, line, delimiter = _find_header(name, text, required, error)
+    header, line, delimiter = _find_header(name, text, required, error, naming)
     return Cells(name, text, header, line, delimiter, error)
 
 
@@ -155,7 +171,11 @@ def _decoded(data: bytes) -> str:
 
 
 def _find_header(
-    name: str, text: str, required: Sequence[str], error: type[PydpendError]
+    name: str,
+    text: str,
+    required: Sequence[str],
+    error: type[PydpendError],
+    naming: Setting | None,
 ) -> tuple[tuple[str, ...], int, str]:
     """Column names, the header's line (from 1) and the delimiter."""
     head = text.split("\n", _HEADER_WITHIN)[:_HEADER_WITHIN]
@@ -181,13 +201,7 @@ def _find_header(
             )
         )
     missing = [c for c in required if c not in found] or list(required)
-    raise error(
-        fault(
-            name,
-            f"there is no column {', '.join(missing)}",
-            f"The columns are {', '.join(found) or '(none)'}; name the right one",
-        )
-    )
+    raise error(no_column(name, missing, found, naming))
 
 
 def _names(line: str, delimiter: str) -> list[str]:

@@ -91,6 +91,8 @@ CHECK = Step("tracker check", "nodes.status")
 """Sums up what became of each node."""
 CALIBRATE = Step("pydpend calibrate", "dp.calibrate")
 """Makes the encoder's calibration."""
+ANALYSE = Step("pydpend analyse", "pydpend.analyse.analyse")
+"""Does everything from films to a report."""
 FIT = Step("pydpend fit", "dp.fit_damping")
 """Fits the damping."""
 FILM_TRUTH = Step("tracker film --truth", "dp.film(truth=...)")

@@ -13,11 +13,15 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from pydpend.errors import ArgumentError, TableError, fault
+from pydpend.errors import ArgumentError, Setting, TableError, fault
 from pydpend.nodes import STATUS_WORDS, Nodes
 
 LEAST_EVEN = 1e-6
 """A rate is one number, so steps of time may differ by so much of a step; time stamps in whole ticks do not."""
+
+
+SCALED = (".c3d", ".trc")
+"""Endings of the forms that have a unit of length."""
 
 
 def export(nodes: Nodes, path: str | os.PathLike[str], *, px_per_m: float | None = None) -> None:
@@ -39,7 +43,9 @@ def export(nodes: Nodes, path: str | os.PathLike[str], *, px_per_m: float | None
             fault(str(target), f"the ending is none of {', '.join(WRITERS)}", "Choose one of them")
         )
     if px_per_m is not None and not (np.isfinite(px_per_m) and px_per_m > 0):
-        raise ArgumentError(fault("px_per_m", f"{px_per_m} is no scale", "Give pixels per metre, above 0"))
+        raise ArgumentError(
+            fault(Setting("px_per_m"), f"{px_per_m} is no scale", "Give pixels per metre, above 0")
+        )
     nodes.check()
     # The libraries look at the ending, so the temporary name keeps it.
     temporary = target.with_name(f".{target.stem}.writing{target.suffix}")
@@ -71,10 +77,9 @@ def rate_hz(nodes: Nodes, name: str) -> float:
 
 
 def _upright(nodes: Nodes, px_per_m: float | None) -> tuple[NDArray[np.float64], str]:
-    """(T, N, 3): x right, y up, z 0, and the unit; pixels are square ones."""
+    """(T, N, 3): x right, y up, z 0, and the unit."""
     out = np.zeros((*nodes.status.shape, 3))
-    width, height = nodes.rig.pixel_aspect
-    out[..., 0] = nodes.xy_px[..., 0] * (width / height)
+    out[..., 0] = nodes.xy_px[..., 0]
     out[..., 1] = nodes.rig.image_px[1] - 1 - nodes.xy_px[..., 1]
     out[..., 2] = np.where(nodes.seen, 0.0, np.nan)
     return (out, "px") if px_per_m is None else (out * (1000 / px_per_m), "mm")
@@ -153,7 +158,6 @@ def _mat(nodes: Nodes, path: Path, px_per_m: float | None) -> None:
         "node": text,
         "body": bodies,
         "image_px": np.array(nodes.rig.image_px, dtype=float),
-        "pixel_aspect": np.array(nodes.rig.pixel_aspect, dtype=float),
         "rig_json": nodes.rig.to_json(),
     }
     savemat(path, content, do_compression=True)

@@ -27,8 +27,6 @@ Progress: TypeAlias = Callable[[str, int, int | None], object] | bool | None
 Polarity: TypeAlias = Literal["auto", "bright", "dark"]
 Centroid: TypeAlias = Literal["weighted", "contour"]
 Decoder: TypeAlias = Literal["auto", "ffmpeg", "opencv"]
-PixelAspect: TypeAlias = tuple[int, int] | str
-"""Width to height of a pixel: ``(16, 15)`` or ``"16:15"``."""
 
 DETECTION = np.dtype(
     [
@@ -73,19 +71,6 @@ def _threads(threads: int | None) -> int:
             fault("threads", f"{threads} is out of range", "Give 1 or more, or None for one a core")
         )
     return int(threads)
-
-
-def _aspect(aspect: PixelAspect | None) -> str | None:
-    """As the compiled half takes it; it knows what makes sense."""
-    if aspect is None or isinstance(aspect, str):
-        return aspect
-    try:
-        width, height = aspect
-    except (TypeError, ValueError):
-        raise ArgumentError(
-            fault("pixel_aspect", f"{aspect!r} is no width and height", "Give (16, 15) or '16:15'")
-        ) from None
-    return f"{width}:{height}"
 
 
 def _count(name: str, value: int) -> int:
@@ -152,7 +137,6 @@ def track(
     centroid: Centroid = "weighted",
     decoder: Decoder = "auto",
     allow_protocol: bool = False,
-    pixel_aspect: PixelAspect | None = None,
 ) -> Nodes:
     """Follows the markers of a recording.
 
@@ -172,7 +156,6 @@ def track(
         centroid: by intensity, or by OpenCV's contours as in the paper.
         decoder: what reads compressed film.
         allow_protocol: open network addresses and devices too.
-        pixel_aspect: width to height of a pixel, (16, 15) or "16:15", instead of what the recording says.
 
     Returns:
         The nodes. If the recording was damaged, `Nodes.complete` is False and `Nodes.meta` says how it ended; what
@@ -195,7 +178,7 @@ def track(
             _rig(rig),
             _frames(frames),
             (threshold, polarity, centroid),
-            (fps, decoder, allow_protocol, _threads(threads), _aspect(pixel_aspect)),
+            (fps, decoder, allow_protocol, _threads(threads)),
             None if output is None else os.fspath(output),
             existing,
             callback,
@@ -203,7 +186,7 @@ def track(
     finally:
         close()
     nodes = nodes_of(columns)
-    nodes.meta["warnings"] = warnings
+    nodes.meta["warnings"] = [str(warning) for warning in warnings]
     if stopped is not None:
         stopped.nodes = nodes  # type: ignore[attr-defined]
         raise stopped
@@ -236,7 +219,7 @@ def setup(
     threshold: float | None = None,
     polarity: Polarity = "auto",
     decoder: Decoder = "auto",
-    pixel_aspect: PixelAspect | None = None,
+    allow_protocol: bool = False,
 ) -> Setup:
     """Finds markers, bodies and joints of a recording.
 
@@ -244,7 +227,7 @@ def setup(
         path: the recording; it is read through.
         output: a rig file to write, to be looked at and edited.
         picture: an image file to write, for example .png: the reference frame with all that was found.
-        fps, frames, threads, progress, threshold, polarity, decoder, pixel_aspect: as in `track`.
+        fps, frames, threads, progress, threshold, polarity, decoder, allow_protocol: as in `track`.
 
     Raises:
         SourceError, DetectError, RigError, ArgumentError: as `track`.
@@ -257,7 +240,7 @@ def setup(
             os.fspath(path),
             _frames(frames),
             (threshold, polarity, "weighted"),
-            (fps, decoder, False, _threads(threads), _aspect(pixel_aspect)),
+            (fps, decoder, allow_protocol, _threads(threads)),
             None if picture is None else os.fspath(picture),
             callback,
         )
@@ -266,7 +249,7 @@ def setup(
     rig = Rig.from_json(text)
     if output is not None:
         rig.write(output)
-    return Setup(rig, warnings, drawn)
+    return Setup(rig, [str(warning) for warning in warnings], drawn)
 
 
 @dataclass(frozen=True, eq=False)
@@ -332,7 +315,7 @@ def overlay(
             nodes._columns(),
             nodes._meta_json(),
             os.fspath(output),
-            (None, decoder, allow_protocol, 0, None),
+            (None, decoder, allow_protocol, 0),
             _count("every", every),
             None if width is None else _count("width", width),
             _count("play_fps", play_fps),
@@ -346,25 +329,21 @@ def overlay(
 
 
 def info(
-    path: Path,
-    *,
-    fps: float | None = None,
-    decoder: Decoder = "auto",
-    pixel_aspect: PixelAspect | None = None,
+    path: Path, *, fps: float | None = None, decoder: Decoder = "auto", allow_protocol: bool = False
 ) -> dict[str, Any]:
     """What is known of a recording before it is read through.
 
     Returns:
-        `name`, `container`, `codec`, `width`, `height` (px), `pixel_aspect` (width to height of a pixel, "16:15"),
-        `pixel_aspect_origin` ("recording", or "user" where it was given), `depth_bits`, `declared_frames`, `rate_hz`,
+        `name`, `container`, `codec`, `width`, `height` (px), `depth_bits`, `declared_frames`, `rate_hz`,
         `rate_origin`, `time_base` (numerator and denominator of s per tick), `size_bytes`, `sha256_first_mib`,
-        `converted_from`, `warnings` and `details`; None where unknown.
+        `converted_from`, `warnings` and `details`; `frames` that are there by their packets, without decoding any, and
+        what its times are (`time`: `kind`, `rate_hz`, `sigma_s`, `gaps`, `notes`, ...); None where unknown. Of a long
+        recording only the first frames are looked at for these two.
 
     Raises:
-        SourceError: if it cannot be opened.
+        SourceError: if it cannot be opened, or its time stamps stand still.
     """
-    options = (fps, decoder, False, 0, _aspect(pixel_aspect))
-    known: dict[str, Any] = json.loads(_tracker.info(os.fspath(path), options))
+    known: dict[str, Any] = json.loads(_tracker.info(os.fspath(path), (fps, decoder, allow_protocol, 0)))
     return known
 
 
@@ -387,7 +366,6 @@ def detect(
     min_area_px: float | None = None,
     max_area_px: float | None = None,
     depth_bits: int | None = None,
-    pixel_aspect: PixelAspect | None = None,
 ) -> NDArray[np.void]:
     """Detects the markers of one image.
 
@@ -397,7 +375,6 @@ def detect(
         polarity, centroid: as in `track`.
         min_area_px, max_area_px: limits of a marker's area; None is learned.
         depth_bits: significant bits of a sample, for example 12 in a uint16; None is all.
-        pixel_aspect: width to height of a pixel, (16, 15) or "16:15": discs are as much narrower; None is square.
 
     Returns:
         One entry per detection, of dtype `DETECTION`, ordered by y, then x.
@@ -407,9 +384,7 @@ def detect(
         DetectError: if no threshold can be learned.
     """
     area = (min_area_px, max_area_px)
-    return _detections(
-        _tracker.detect(image, (threshold, polarity, centroid), area, depth_bits, _aspect(pixel_aspect))
-    )
+    return _detections(_tracker.detect(image, (threshold, polarity, centroid), area, depth_bits))
 
 
 @dataclass(frozen=True, eq=False)
@@ -419,7 +394,7 @@ class NodeRow:
     Attributes:
         frame: number of the image.
         xy_px: centres in px, (N, 2); x right, y down.
-        sigma_px: standard uncertainty of each coordinate in square px, (N,), as `Nodes.sigma_px`.
+        sigma_px: standard uncertainty of each coordinate in px, (N,).
         area_px: blob area in px, (N,).
         status: as `Nodes.status`, (N,).
     """

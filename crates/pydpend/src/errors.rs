@@ -33,7 +33,7 @@ pub fn to_python<'py>(py: Python<'py>, message: &Message) -> PyResult<Bound<'py,
         Piece::Setting { setting, value } => {
             errors.getattr("Setting")?.call1((setting.name(), value, i == 0))
         }
-        Piece::Step(step) => errors.getattr("Step")?.call1((step.command, step.call)),
+        Piece::Step(step) => errors.getattr("Step")?.call1((step.command.as_ref(), step.call.as_ref())),
     };
     let pieces = message.pieces().iter().enumerate().map(piece).collect::<PyResult<Vec<_>>>()?;
     errors.getattr("Message")?.call1((PyTuple::new(py, pieces)?,))

@@ -28,7 +28,9 @@ mod _tracker {
     #[pymodule_export]
     use super::smoothing::{learn_noise, smooth_angles};
     #[pymodule_export]
-    use super::tables::{arrow_reader, check_table, read_meta, read_rig, read_table, rig_toml, write_table};
+    use super::tables::{
+        arrow_reader, check_table, kind_of, misplaced, read_meta, read_rig, read_table, rig_toml, write_table,
+    };
     #[pymodule_export]
     use super::track::{info, overlay_film, setup, track};
 

@@ -4,7 +4,6 @@
 
 use pyo3::prelude::*;
 use tracker::detect::{Centroid, DetectSettings, Polarity, Threshold};
-use tracker::pixel_aspect::PixelAspect;
 use tracker::rig::Rig;
 use tracker::source::{Decoder, OpenOptions};
 
@@ -45,21 +44,14 @@ pub fn detect_settings(py: Python<'_>, given: &DetectArguments) -> PyResult<Dete
     })
 }
 
-/// How a recording is read: rate or `None`, decoder, whether addresses may be opened, threads, pixel aspect or `None`.
-pub type OpenArguments = (Option<f64>, String, bool, usize, Option<String>);
-
-/// Of `W:H`.
-pub fn pixel_aspect(py: Python<'_>, given: Option<&str>) -> PyResult<Option<PixelAspect>> {
-    let wrong = |problem| argument(py, "pixel_aspect", problem, "Give for example 16:15");
-    given.map(str::parse).transpose().map_err(wrong)
-}
+/// How a recording is read: rate or `None`, decoder, whether addresses may be opened, threads.
+pub type OpenArguments = (Option<f64>, String, bool, usize);
 
 /// Reading options of keyword arguments.
 pub fn open_options(py: Python<'_>, given: &OpenArguments) -> PyResult<OpenOptions> {
-    let (fps, decoder, allow_protocol, threads, aspect) = given;
+    let (fps, decoder, allow_protocol, threads) = given;
     Ok(OpenOptions {
         fps: *fps,
-        pixel_aspect: pixel_aspect(py, aspect.as_deref())?,
         decoder: word(
             py,
             "decoder",

@@ -14,10 +14,11 @@ use numpy::{
 use pyo3::prelude::*;
 use pyo3_arrow::PyRecordBatchReader;
 use tracker::error::{Error, Fault};
+use tracker::kind::{self, Kind};
 use tracker::rig::Rig;
 use tracker::table::{self, NodeTable, Rows, TableMeta};
 
-use crate::errors::{argument, raise};
+use crate::errors::{argument, raise, to_python};
 
 /// Columns as NumPy arrays, and the metadata as JSON.
 pub type Columns<'py> = (
@@ -143,6 +144,20 @@ pub fn rig_of_json(text: &str) -> tracker::error::Result<Rig> {
 pub fn read_rig(py: Python<'_>, path: PathBuf) -> PyResult<String> {
     let rig = Rig::read(&path).map_err(|e| raise(py, e))?;
     rig_json(&rig).map_err(|e| raise(py, e))
+}
+
+/// What a file or folder is: the name of a `tracker::kind::Kind`.
+#[pyfunction]
+pub fn kind_of(path: PathBuf) -> &'static str {
+    kind::kind_of(&path).name()
+}
+
+/// What to say of a file that is none of the kinds that are wanted.
+#[pyfunction]
+pub fn misplaced(py: Python<'_>, path: PathBuf, wanted: Vec<String>) -> PyResult<Option<Bound<'_, PyAny>>> {
+    let known = |name: &String| Kind::ALL.into_iter().find(|k| k.name() == name);
+    let wanted: Vec<Kind> = wanted.iter().filter_map(known).collect();
+    kind::misplaced(&path, &wanted).map(|fault| to_python(py, &fault.message())).transpose()
 }
 
 /// A rig as JSON.

@@ -101,15 +101,10 @@ pub fn setup<'py>(
         if let Some(path) = &picture {
             overlay::save(&found.picture, path)?;
         }
-        Ok((
-            rig_json(&found.rig)?,
-            found.warnings,
-            overlay::rgb(&found.picture)?,
-            overlay::size(&found.picture),
-        ))
+        Ok((rig_json(&found.rig)?, found.warnings, overlay::rgb(&found.picture)?, found.rig.image_px))
     });
-    let (rig, warnings, samples, [h, w]) = watch.done(py, outcome)?;
-    let picture = samples.into_pyarray(py).reshape([h, w, 3])?;
+    let (rig, warnings, samples, [w, h]) = watch.done(py, outcome)?;
+    let picture = samples.into_pyarray(py).reshape([h as usize, w as usize, 3])?;
     Ok((rig, messages(py, &warnings)?, picture))
 }
 
@@ -151,11 +146,18 @@ pub fn info(py: Python<'_>, input: String, open: OpenArguments) -> PyResult<Stri
     let options = open_options(py, &open)?;
     let mut watch = Watch::new(None);
     let known = py.detach(|| {
-        let source = pipeline::open(&input, &options, &mut watch)?;
+        let mut source = pipeline::open(&input, &options, &mut watch)?;
+        let surveyed = pipeline::survey(&mut *source)?;
         let info = source.info();
-        let mut value = json!(SourceFacts::of(info));
-        value["pixel_aspect"] = json!(info.pixel_aspect);
-        value["pixel_aspect_origin"] = json!(info.pixel_aspect_origin);
+        let (steps, is_whole) = surveyed.unwrap_or_default();
+        let (timing, _) = pipeline::times(info, &steps, 0)?;
+        let mut value = json!(SourceFacts {
+            rate_hz: timing.rate_hz,
+            rate_origin: timing.rate_origin,
+            ..SourceFacts::of(info)
+        });
+        value["time"] = json!(timing);
+        value["frames"] = json!(is_whole.then(|| steps.len()));
         value["details"] = json!(info.details.iter().cloned().collect::<std::collections::BTreeMap<_, _>>());
         Ok(value.to_string())
     });

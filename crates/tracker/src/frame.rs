@@ -1,6 +1,6 @@
 //! A frame, its time, and where frames come from.
 //!
-//! Owns: [`Frame`], [`PixelFormat`], [`TimeBase`], [`SourceInfo`], [`Ending`], the trait [`FrameSource`].
+//! Owns: [`Frame`], [`PixelFormat`], [`TimeBase`], [`SourceInfo`], [`RateClaims`], [`Ending`], the trait [`FrameSource`].
 //! Must not: decode, or look at a pixel's value beyond unpacking it.
 //!
 //! Image coordinates: x right, y down, pixel centres at integers, the first pixel is (0, 0).
@@ -9,7 +9,6 @@ use std::fmt;
 
 use crate::error::Result;
 use crate::message::Message;
-use crate::pixel_aspect::{AspectOrigin, PixelAspect};
 
 /// How the samples of one row are stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -111,10 +110,33 @@ pub enum RateOrigin {
     TimeStamps,
     /// The camera's header: record rate / save step.
     CameraHeader,
+    /// The camera's own tag of the rate at which it took the frames, in a file that may play slower.
+    CaptureTag,
     /// The container's claim, often a player's speed and not the camera's.
     Container,
     /// Nothing gives it; times are frame numbers.
     Unknown,
+}
+
+/// What a recording says of its rate beside the time stamps of its frames.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct RateClaims {
+    /// Rates that the container gives, the likeliest first: frames per second as numerator and denominator, both
+    /// above 0.
+    pub container: Vec<[u64; 2]>,
+    /// The rate at which the camera took the frames, by its own tag.
+    pub capture: Option<CaptureClaim>,
+    /// The camera's maker and model.
+    pub camera: Option<String>,
+}
+
+/// A camera's tag of its capture rate.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CaptureClaim {
+    /// The tag's name.
+    pub tag: String,
+    /// Frames per second, finite and above 0.
+    pub rate_hz: f64,
 }
 
 /// What is known of a recording before it is read through. `None` is unknown.
@@ -130,10 +152,6 @@ pub struct SourceInfo {
     pub width: u32,
     /// Height in pixels.
     pub height: u32,
-    /// Width to height of a pixel as handed to detection.
-    pub pixel_aspect: PixelAspect,
-    /// Where that comes from.
-    pub pixel_aspect_origin: AspectOrigin,
     /// Format of the frames handed out.
     pub format: PixelFormat,
     /// Significant bits of a sample.
@@ -146,6 +164,8 @@ pub struct SourceInfo {
     pub rate_hz: Option<f64>,
     /// Where the rate comes from.
     pub rate_origin: RateOrigin,
+    /// What else it says of its rate.
+    pub claims: RateClaims,
     /// Whether pixels were converted (no luma plane in the recording), and from what.
     pub converted_from: Option<String>,
     /// Bytes of the file or files, if they are files.
@@ -186,6 +206,16 @@ pub trait FrameSource: Send {
 
     /// How the recording ended. Before its end: `Complete`.
     fn ending(&self) -> Ending;
+
+    /// Time stamps of the frames in display order, without decoding any, and whether these are all: of a long
+    /// recording only the first are looked at. `None` where they are not to be had so. Does not disturb
+    /// [`FrameSource::next_frame`].
+    ///
+    /// # Errors
+    /// Where the recording cannot be read at all.
+    fn stamps(&mut self) -> Result<Option<(Vec<i64>, bool)>> {
+        Ok(None)
+    }
 
     /// Up to `count` decoded frames spread over the recording, for learning thresholds and noise; their
     /// indices mean nothing. Does not disturb [`FrameSource::next_frame`]. A pipe gives its first frames.

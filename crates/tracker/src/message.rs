@@ -5,6 +5,7 @@
 //! [`FrontEnd`]. Must not: know how a front
 //! end writes a setting.
 
+use std::borrow::Cow;
 use std::fmt;
 use std::ops::Add;
 
@@ -27,6 +28,8 @@ pub enum Setting {
     Fps,
     /// Which frames.
     Frames,
+    /// A film that is made has no colour planes; a switch.
+    GrayOnly,
     /// The largest area of a marker.
     MaxAreaPx,
     /// The smallest area of a marker.
@@ -35,8 +38,6 @@ pub enum Setting {
     Output,
     /// Where the annotated picture goes.
     Picture,
-    /// Width to height of a pixel.
-    PixelAspect,
     /// Frames a second at which a drawn film plays.
     PlayFps,
     /// Whether markers are brighter or darker than what is around them.
@@ -47,6 +48,8 @@ pub enum Setting {
     Resume,
     /// Nodes, bodies and joints.
     Rig,
+    /// How much time H.264 takes.
+    Speed,
     /// How many threads.
     Threads,
     /// What is bright enough to be a marker.
@@ -57,7 +60,7 @@ pub enum Setting {
 
 impl Setting {
     /// All of them.
-    pub const ALL: [Self; 21] = [
+    pub const ALL: [Self; 22] = [
         Self::AllowProtocol,
         Self::Bits,
         Self::Codec,
@@ -66,16 +69,17 @@ impl Setting {
         Self::Force,
         Self::Fps,
         Self::Frames,
+        Self::GrayOnly,
         Self::MaxAreaPx,
         Self::MinAreaPx,
         Self::Output,
         Self::Picture,
-        Self::PixelAspect,
         Self::PlayFps,
         Self::Polarity,
         Self::Quality,
         Self::Resume,
         Self::Rig,
+        Self::Speed,
         Self::Threads,
         Self::Threshold,
         Self::Width,
@@ -92,16 +96,17 @@ impl Setting {
             Self::Force => "force",
             Self::Fps => "fps",
             Self::Frames => "frames",
+            Self::GrayOnly => "gray_only",
             Self::MaxAreaPx => "max_area_px",
             Self::MinAreaPx => "min_area_px",
             Self::Output => "output",
             Self::Picture => "picture",
-            Self::PixelAspect => "pixel_aspect",
             Self::PlayFps => "play_fps",
             Self::Polarity => "polarity",
             Self::Quality => "quality",
             Self::Resume => "resume",
             Self::Rig => "rig",
+            Self::Speed => "speed",
             Self::Threads => "threads",
             Self::Threshold => "threshold",
             Self::Width => "width",
@@ -110,7 +115,7 @@ impl Setting {
 
     /// Whether it is on or off and has no value of its own.
     pub fn is_switch(self) -> bool {
-        matches!(self, Self::AllowProtocol | Self::Force | Self::Resume)
+        matches!(self, Self::AllowProtocol | Self::Force | Self::GrayOnly | Self::Resume)
     }
 
     /// The setting with a value: `Setting::Decoder.set_to("opencv")`.
@@ -165,25 +170,31 @@ impl FrontEnd for Bare {
 }
 
 /// A step of the work: what to type, and what to call in Python.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Step {
     /// What to type.
-    pub command: &'static str,
+    pub command: Cow<'static, str>,
     /// The function of the Python package.
-    pub call: &'static str,
+    pub call: Cow<'static, str>,
+}
+
+impl Step {
+    const fn known(command: &'static str, call: &'static str) -> Self {
+        Self { command: Cow::Borrowed(command), call: Cow::Borrowed(call) }
+    }
 }
 
 /// Looks at a recording.
-pub const INFO: Step = Step { command: "tracker info", call: "dp.info" };
+pub const INFO: Step = Step::known("tracker info", "dp.info");
 /// Finds the rig of a recording.
-pub const SETUP: Step = Step { command: "tracker setup", call: "dp.setup" };
+pub const SETUP: Step = Step::known("tracker setup", "dp.setup");
 /// Makes a node table.
-pub const TRACK: Step = Step { command: "tracker track", call: "dp.track" };
+pub const TRACK: Step = Step::known("tracker track", "dp.track");
 /// Shows a scene with all it may hold.
 pub const PRINT_SCENE: Step =
-    Step { command: "tracker film --preset clean --print-scene", call: "dp.Film('clean').scene" };
+    Step::known("tracker film --preset clean --print-scene", "dp.Film('clean').scene");
 /// Writes the truth of a film that is made.
-pub const FILM_TRUTH: Step = Step { command: "tracker film --truth", call: "dp.film(truth=...)" };
+pub const FILM_TRUTH: Step = Step::known("tracker film --truth", "dp.film(truth=...)");
 
 impl Message {
     /// The message's parts in order.
@@ -201,7 +212,7 @@ impl Message {
         let piece = |piece: &Piece| match piece {
             Piece::Text(text) => text.clone(),
             Piece::Setting { setting, value } => front.setting(*setting, value.as_deref()),
-            Piece::Step(step) => front.step(step.command, step.call),
+            Piece::Step(step) => front.step(&step.command, &step.call),
         };
         self.pieces.iter().map(piece).collect()
     }

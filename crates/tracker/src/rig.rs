@@ -7,8 +7,8 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Fault, Place, Result};
+use crate::kind::{self, Kind};
 use crate::message::SETUP;
-use crate::pixel_aspect::PixelAspect;
 
 /// Version of the rig file's form; a file with a higher one is refused.
 pub const RIG_SCHEMA: u32 = 1;
@@ -77,10 +77,6 @@ pub struct Rig {
     pub schema: u32,
     /// Width and height of the recording, px; a recording of another size is refused.
     pub image_px: [u32; 2],
-    /// Width to height of a pixel; a recording of other pixels is refused. All places here are in recorded pixels, and
-    /// bodies are rigid in square ones.
-    #[serde(default, skip_serializing_if = "PixelAspect::is_square")]
-    pub pixel_aspect: PixelAspect,
     /// Index of the frame in which every node is at its place; `None` if the places come from elsewhere.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reference_frame: Option<u64>,
@@ -107,6 +103,7 @@ impl Rig {
     /// # Errors
     /// [`Error::Rig`] naming the file and the line or key.
     pub fn read(path: &Path) -> Result<Self> {
+        kind::expect(path, &[Kind::Rig], Error::Rig)?;
         let name = path.display().to_string();
         let text = std::fs::read_to_string(path).map_err(|e| {
             Error::Rig(

@@ -78,7 +78,6 @@ fn frame_at(
     index: u64,
 ) -> Result<(Frame, Vec<Detection>)> {
     let mut source = source::open(input, open)?;
-    let detect = &DetectSettings { pixel_aspect: source.info().pixel_aspect, ..detect.clone() };
     let levels = Levels::learn(&source.sample(24)?, detect)?;
     let mut detections = Vec::new();
     while let Some(frame) = source.next_frame()? {

@@ -171,6 +171,17 @@ fn what_cannot_be_written_is_refused() {
     assert!(message("a.mraw", &eight).contains("8 bits per pixel cannot hold a film of 12 bits"));
     let text = WriteOptions { truth: Some(folder.path().join("t.txt")), ..WriteOptions::default() };
     assert!(message("a.mkv", &text).contains(".parquet or .csv"));
+    // Options that the form has not, and values that are none.
+    let speed = |word: &str| WriteOptions { speed: Some(word.into()), ..WriteOptions::default() };
+    let quality = WriteOptions { quality: Some(3), ..WriteOptions::default() };
+    let gray = WriteOptions { gray_only: true, ..WriteOptions::default() };
+    let codec = WriteOptions { codec: Some(Codec::Raw), ..WriteOptions::default() };
+    assert!(message("a.mkv", &speed("fast")).starts_with("speed: it is of H.264 films"));
+    assert!(message("a.mp4", &speed("fastest")).contains("Give one of ultrafast, superfast"));
+    assert!(message("a.mraw", &quality).starts_with("quality: it is of H.264 and MJPEG films"));
+    assert!(message("a.avi", &gray).starts_with("gray_only: it is of H.264 films"));
+    assert!(message("a.tif", &codec).starts_with("codec: it is of video files"));
+    assert!(message("a.mkv", &eight).starts_with("bits: it is of Photron's .mraw"));
 }
 
 /// An encoder moves whole markers by what it spares, which their pixels do not show: their bodies do.

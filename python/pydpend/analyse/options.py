@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ from pydpend.angles import parse_zero, roll_sigma
 from pydpend.documents import read_toml
 from pydpend.errors import OptionError, Setting, Step, fault, one_of
 from pydpend.fit_options import INTERVALS, METHODS, RATIOS, check_fit
+from pydpend.kinds import Kind, expect
 
 CHOICES = {
     "method": METHODS,
@@ -32,8 +34,6 @@ class Options:
     """Rig file for films; found in the film if not given."""
     fps: float | None = None
     """Frames per second of recorded time, where a film does not know."""
-    pixel_aspect: str | None = None
-    """Width to height of a film's pixels, e.g. ``16:15``, instead of what the film says."""
     encoder: str | None = None
     """Encoder file of the first recording: time_s and voltage_v (or an angle) as CSV, TDMS or NumPy."""
     column: str | None = None
@@ -60,7 +60,7 @@ class Options:
     pinned: bool = False
     """The elbow is pinned: a single pendulum. A recording of one link needs a one-link model instead."""
     ten_coefficients: bool = False
-    """Also the paper's ten, with a warning; needs ``--method energy --laws paper``."""
+    """Also the paper's ten, with a warning; needs the energy method and the paper's laws."""
     intervals: str = "covariance"
     """``covariance``: standard errors; ``profile``: 95 % intervals by profile likelihood too (takes much longer)."""
     comparison: bool | None = None
@@ -133,11 +133,25 @@ class Options:
                 )
 
 
+WANTED: Mapping[str, tuple[Kind, ...]] = {
+    "rig": ("rig",),
+    "encoder": ("encoder", "angles"),
+    "calibration": ("calibration", "tables", "encoder"),
+    "model": ("model",),
+    "zero": ("film", "pictures", "nodes"),
+}
+"""What a file that an option names may be."""
+
+
 def check_files(options: Options) -> None:
-    """Whether the files that options name are there. Raises OptionError, naming the option, before anything is done."""
-    for field in ("rig", "encoder", "calibration"):
+    """Whether the files that options name are there and what they are to be. Raises OptionError, naming the option,
+    before anything is done."""
+    for field, kinds in WANTED.items():
         name = getattr(options, field)
-        if name is not None and not Path(name).exists():
+        if name is None or (field == "zero" and parse_zero(name) is not None):
+            continue
+        expect(name, kinds, OptionError, field)
+        if field in ("rig", "encoder", "calibration") and not Path(name).exists():
             raise OptionError(fault(Setting(field), f"there is no file {name}", "Check the name"))
     if options.model not in ("derived", "published") and not Path(options.model).is_file():
         raise OptionError(
@@ -166,12 +180,17 @@ def flag_of(field: str) -> str:
     return "--" + field.removesuffix("_s").removesuffix("_deg").replace("_", "-")
 
 
-WRITE_CONFIG = Step("pydpend analyse --write-config", "dp.analyse.write_config(dp.Options())")
+WRITE_CONFIG = Step(
+    "pydpend analyse --write-config", "pydpend.analyse.write_config(pydpend.analyse.Options())"
+)
 """Prints every option with its default."""
+READ_CONFIG = Step("pydpend analyse --config THIS_FILE", "pydpend.analyse.read_config(THIS_FILE)")
+"""Uses a file of options."""
 
 
 def read_config(path: str | Path) -> Options:
     """Options from a TOML file as ``--write-config`` writes it. Unknown keys are errors."""
+    expect(path, ("config",), OptionError)
     raw = read_toml(Path(path), OptionError, "Start from what " + WRITE_CONFIG + " prints")
     known = {f.name: f for f in fields(Options)}
     values: dict[str, Any] = {}
@@ -195,7 +214,7 @@ def read_config(path: str | Path) -> Options:
 def write_config(options: Options) -> str:
     """The options as TOML, each with what it means; what is not set is commented out."""
     docs = _field_docs()
-    lines = ["# pydpend analyse --config THIS_FILE", ""]
+    lines = [f"# {READ_CONFIG}", ""]
     for f in fields(Options):
         value = getattr(options, f.name)
         lines += [f"# {line}" for line in docs[f.name].splitlines()]

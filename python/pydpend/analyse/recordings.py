@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,11 @@ from typing import Any
 from pydpend.analyse.folder import UNFINISHED, Digests
 from pydpend.analyse.options import Options
 from pydpend.columns import column_names
-from pydpend.errors import PydpendError, fault
+from pydpend.errors import OptionError, PydpendError, Setting, fault, listed
+from pydpend.kinds import expect, kind_of
+
+TABLES = (".parquet", ".csv", ".txt")
+"""Endings of tables."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +59,7 @@ def recordings(options: Options, digests: Digests) -> tuple[Recording, ...]:
                 name=name,
                 label=path.name,
                 path=str(path),
-                kind=kind_of(path),
+                kind=recording_kind(path),
                 digest=digests.of(path),
                 encoder=options.encoder if i == 0 else None,
             )
@@ -62,12 +67,46 @@ def recordings(options: Options, digests: Digests) -> tuple[Recording, ...]:
     return tuple(out)
 
 
-def kind_of(path: Path) -> str:
-    """``film``, ``nodes`` or ``angles``, from what the file says of itself."""
-    if path.is_dir():
-        return "angles" if any(path.glob("DPmean_data_RB*.npy")) else "film"
-    ending = path.suffix.lower()
-    if ending not in (".parquet", ".csv", ".txt"):
+APPLIES: Mapping[str, tuple[str, ...]] = {
+    "rig": ("film",),
+    "zero": ("film", "nodes"),
+    "estimator": ("film", "nodes"),
+    "bodies": ("film", "nodes"),
+    "mirrored": ("film", "nodes"),
+    "link_length_m": ("film", "nodes"),
+    "columns": ("angles",),
+    "hanging_deg": ("angles",),
+    "clockwise": ("angles",),
+    "unwrap": ("angles",),
+}
+"""Options and the kinds of input that they are of. Others are of all, or change no result."""
+
+NOUNS = {"film": "a film", "nodes": "a node table", "angles": "an angles table"}
+
+
+def check_options(options: Options, found: tuple[Recording, ...]) -> None:
+    """Raises OptionError for an option that does nothing with these inputs."""
+    kinds = {r.kind for r in found}
+    plain = Options()
+    for option, of in APPLIES.items():
+        if getattr(options, option) != getattr(plain, option) and not kinds & set(of):
+            raise OptionError(
+                fault(
+                    Setting(option),
+                    f"is of {listed(NOUNS[kind] for kind in of)}, and no input is one",
+                    "Leave it out",
+                )
+            )
+
+
+def recording_kind(path: Path) -> str:
+    """``film``, ``nodes`` or ``angles``, by what is in the file. Raises PydpendError for what is another thing."""
+    expect(path, ("film", "pictures", "nodes", "angles"), PydpendError)
+    kind = kind_of(path)
+    if kind in ("nodes", "angles"):
+        return kind
+    if kind in ("film", "pictures") or path.suffix.lower() not in TABLES:
         return "film"
-    columns = column_names(path, PydpendError)
-    return "nodes" if {"node", "x_px"} <= set(columns) else "angles"
+    # Columns under names of its own are an angles table's, if there are columns.
+    column_names(path, PydpendError)
+    return "angles"

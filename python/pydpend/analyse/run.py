@@ -17,7 +17,7 @@ from typing import Any
 from pydpend.analyse import provenance, stages
 from pydpend.analyse.folder import UNFINISHED, Digests, RunFolder, digest, write_whole
 from pydpend.analyse.options import Options, check_files
-from pydpend.analyse.recordings import Recording, recordings
+from pydpend.analyse.recordings import Recording, check_options, recordings
 from pydpend.errors import OptionError, PydpendError, Setting, fault
 
 Progress = Callable[[int, int, str, str], None]
@@ -77,6 +77,7 @@ def plan(options: Options, folder: Path, digests: Digests | None = None) -> list
     check_files(options)
     known = Digests() if digests is None else digests
     found = recordings(options, known)
+    check_options(options, found)
     out: list[Stage] = []
 
     def add(
@@ -169,7 +170,7 @@ def _plan_recording(
             f"Tracking {r.label}",
             (),
             r.name,
-            [r.digest, known.option(options.rig), options.fps, options.pixel_aspect],
+            [r.digest, known.option(options.rig), options.fps],
             lambda into, tell, resume: stages.track(r, options, into, tell, resume),
             ("nodes.parquet",),
         )

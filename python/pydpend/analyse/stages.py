@@ -68,13 +68,14 @@ def track(r: Recording, options: Options, into: Path, tell: Tell, resume: bool) 
         r.path,
         options.rig,
         fps=options.fps,
-        pixel_aspect=options.pixel_aspect,
         threads=options.threads,
         output=into / "nodes.parquet",
         resume=resume,
         force=True,
         progress=_share(tell),
     )
+    for note in nodes.meta.get("warnings", []):
+        tell(f"note: {note}")
     count = len(nodes.rig.nodes)
     return f"{nodes.frame.size} frames, {count} node{'s' if count > 1 else ''}"
 
@@ -119,7 +120,7 @@ def _nodes(here: Path, r: Recording) -> Nodes:
 
 def _hanging(r: Recording, options: Options, here: Path, into: Path) -> Any:
     """The ``zero`` of `angles.angles`, tracking a reference film if one is named."""
-    from pydpend.analyse.recordings import kind_of
+    from pydpend.analyse.recordings import recording_kind
     from pydpend.angles import parse_zero
     from pydpend.nodes import read_nodes
 
@@ -127,21 +128,14 @@ def _hanging(r: Recording, options: Options, here: Path, into: Path) -> Any:
     if said is not None:
         return said
     path = Path(options.zero)
-    if kind_of(path) == "nodes":
+    if recording_kind(path) == "nodes":
         return read_nodes(path)
     from pydpend.tracking import track as track_film
 
     # The same rig, so that the markers have the same names.
     rig = into / "zero_rig.toml"
     rig.write_text(_nodes(here, r).rig.to_toml(), encoding="utf-8")
-    return track_film(
-        path,
-        rig,
-        fps=options.fps,
-        pixel_aspect=options.pixel_aspect,
-        output=into / "zero.parquet",
-        progress=False,
-    )
+    return track_film(path, rig, fps=options.fps, output=into / "zero.parquet", progress=False)
 
 
 def angles(r: Recording, options: Options, here: Path, into: Path) -> str:

@@ -18,7 +18,7 @@ from pydpend.angles.unwrap import unwrap
 from pydpend.errors import CHECK, AnglesError, Setting, fault, one_of
 
 if TYPE_CHECKING:
-    from pydpend.nodes import Nodes, Rig
+    from pydpend.nodes import Nodes
 
 Method = Literal["rigid", "linkage", "pairwise"]
 ESTIMATORS: tuple[Method, ...] = get_args(Method)
@@ -58,14 +58,15 @@ def angles(
     refuse, or leave the link's angles out from there on and say so in ``meta["notes"]``.
 
     ``sigma_rad`` holds each frame's own standard error; that of the zero, common to all frames, is in
-    ``meta["zero"]``.
+    ``meta["zero"]``. Where the table says that its times are uncertain (a variable frame rate in coarse ticks), it
+    holds that too, times the link's speed; ``meta["time"]`` says what the times are.
 
     Raises :class:`~pydpend.errors.AnglesError`: a body never seen, or in one marker only; no rest found, or one in
     which the links are held and do not hang; a turn that may be lost; links that turn too little for a linkage.
     """
     markers = body_markers(nodes, bodies, mirrored)
     label = name if name is not None else _label(nodes)
-    raw = _estimate(markers, nodes.rig, estimator, mirrored, link_length_m, link_length_sigma_m)
+    raw = _estimate(markers, estimator, mirrored, link_length_m, link_length_sigma_m)
     notes: list[str] = list(raw.meta.pop("notes", ()))
     ending = nodes.meta.get("ending")
     if isinstance(ending, dict) and ending.get("kind") != "complete":
@@ -78,17 +79,37 @@ def angles(
         first = phi[np.flatnonzero(np.isfinite(phi[:, k]))[0], k]
         phi[:, k] -= 2 * np.pi * np.ceil((first - np.pi) / (2 * np.pi))
     meta = {"method": estimator, "mirrored": mirrored, **raw.meta, "zero": zero_meta, "notes": notes}
-    source = nodes.meta.get("source")
-    if source is not None:
-        meta["source"] = source
-    return LinkAngles(nodes.t_s, phi, raw.sigma, nodes.frame, meta, label)
+    for key in ("source", "time"):
+        if nodes.meta.get(key) is not None:
+            meta[key] = nodes.meta[key]
+    sigma = _with_time(nodes.t_s, phi, raw.sigma, _time_sigma_s(nodes))
+    return LinkAngles(nodes.t_s, phi, sigma, nodes.frame, meta, label)
+
+
+def _time_sigma_s(nodes: Nodes) -> float:
+    """Standard uncertainty of each frame's time in s, as the table says; 0 where it says nothing."""
+    time = nodes.meta.get("time")
+    return float(time.get("sigma_s", 0.0)) if isinstance(time, dict) else 0.0
+
+
+def _with_time(t_s: Floats, phi: Floats, sigma: Floats, time_sigma_s: float) -> Floats:
+    """Standard uncertainties of angles whose times have one too, each frame's own: a link that turns with w is at
+    another angle by ``w dt``. (T, L), rad."""
+    if time_sigma_s == 0.0:
+        return sigma
+    out = sigma.copy()
+    for k in range(phi.shape[1]):
+        seen = np.flatnonzero(np.isfinite(phi[:, k]))
+        if seen.size > 1:
+            rate = np.gradient(phi[seen, k], t_s[seen])
+            out[seen, k] = np.hypot(sigma[seen, k], rate * time_sigma_s)
+    return out
 
 
 def find_linkage(nodes: Nodes, *, bodies: Sequence[str] | None = None, mirrored: bool = False) -> Linkage:
     """Pivot, elbow, the places of the markers in their links and the link's length in px, with uncertainties.
 
-    Places are in the world's directions (y up) and in square pixels, as high as the recorded ones; ``to_image`` turns
-    them back. Raises
+    Places are in the world's directions (y up); ``to_image`` turns them back. Raises
     :class:`~pydpend.errors.AnglesError` if the links turn too little to find the joints.
     """
     poses = [fit_pose(m) for m in body_markers(nodes, bodies, mirrored)]
@@ -102,7 +123,6 @@ def _label(nodes: Nodes) -> str:
 
 def _estimate(
     markers: list[BodyMarkers],
-    rig: Rig,
     estimator: Method,
     mirrored: bool,
     length_m: float | None,
@@ -141,12 +161,12 @@ def _estimate(
         if length_m is not None:
             linked = fit_linkage(poses[0], lower)
             shape = linked.linkage.shape
-            meta["linkage"] = _linkage_meta(linked.linkage, rig, mirrored, length_m, length_sigma_m)
+            meta["linkage"] = _linkage_meta(linked.linkage, mirrored, length_m, length_sigma_m)
         else:
             shape = _shape_or_none(poses)
         return Raw(theta, sigma, [p.template_px for p in poses], shape, meta)
     linked = fit_linkage(poses[0], lower)
-    meta["linkage"] = _linkage_meta(linked.linkage, rig, mirrored, length_m, length_sigma_m)
+    meta["linkage"] = _linkage_meta(linked.linkage, mirrored, length_m, length_sigma_m)
     sigma, meta["notes"] = checked_sigma(linked, poses)
     shape = linked.linkage.shape
     templates = [shape.upper_px] if lower is None else [shape.upper_px, shape.lower_px]
@@ -177,17 +197,16 @@ def _body_meta(pose: Pose) -> dict[str, Any]:
 
 
 def _linkage_meta(
-    linkage: Linkage, rig: Rig, mirrored: bool, length_m: float | None, length_sigma_m: float
+    linkage: Linkage, mirrored: bool, length_m: float | None, length_sigma_m: float
 ) -> dict[str, Any]:
-    """Places in recorded pixels, lengths and the scale in square ones."""
     meta: dict[str, Any] = {
-        "pivot_px": to_image(linkage.shape.pivot_px, rig, mirrored).tolist(),
-        "pivot_sigma_px": np.abs(to_image(linkage.pivot_sigma_px, rig)).tolist(),
+        "pivot_px": to_image(linkage.shape.pivot_px, mirrored).tolist(),
+        "pivot_sigma_px": linkage.pivot_sigma_px.tolist(),
         "sigma_scale": linkage.sigma_scale,
     }
     if linkage.shape.links == 2:
         elbow = linkage.shape.pivot_px + linkage.shape.elbow_px
-        meta["elbow_in_reference_frame_px"] = to_image(elbow, rig, mirrored).tolist()
+        meta["elbow_in_reference_frame_px"] = to_image(elbow, mirrored).tolist()
         meta["link_length_px"] = linkage.length_px
         meta["link_length_sigma_px"] = linkage.length_sigma_px
         if length_m is not None:

@@ -21,6 +21,7 @@ from pydpend.arrays import read_npy
 from pydpend.columns import Columns, read_columns
 from pydpend.documents import parse_json, read_text
 from pydpend.errors import AnglesError, Setting, fault
+from pydpend.kinds import expect
 
 META_KEY = "pydpend_angles"
 """Key of the JSON that :func:`write_angles` puts into a Parquet file's metadata."""
@@ -50,6 +51,8 @@ def read_angles(
     Raises :class:`~pydpend.errors.AnglesError` naming file, line (or row) and column.
     """
     path = Path(path)
+    # What a folder lacks is told below.
+    expect(path, ("angles", "tables") if path.is_dir() else ("angles",), AnglesError)
     label = name if name is not None else (path.name if path.is_dir() else path.stem)
     if path.is_dir():
         t, phi, sigma = _read_published(path)
@@ -95,6 +98,7 @@ def _read_table(path: Path, columns: dict[str, str]) -> _TableParts:
         [theirs[c] for c in ours if c not in columns and c != "time_s"],
         error=AnglesError,
         time=theirs["time_s"],
+        naming=Setting("columns"),
     )
     if table.rows == 0:
         raise AnglesError(fault(str(path), "the table has a header and no rows", "Give one row per instant"))

@@ -91,13 +91,15 @@ def teller() -> Callable[[int, int, str, str], None]:
     def tell(number: int, of: int, title: str, what: str) -> None:
         nonlocal begun
         head = f"[{number}/{of}] {title}"
+        wipe = "\x1b[K" if moving else ""
         if what == "start":
             begun = time.monotonic()
             print(f"{head} ...", end="\r" if moving else "\n", file=sys.stderr, flush=True)
         elif what in ("done", "kept") or what.startswith(("not done", "does not apply")):
-            wipe = "\x1b[K" if moving else ""
             took = f" ({time.monotonic() - begun:.1f} s)" if what == "done" else ""
             print(f"{wipe}{head}: {what}{took}", file=sys.stderr, flush=True)
+        elif what.startswith("note: "):
+            print(f"{wipe}{head}: {what}", file=sys.stderr, flush=True)
         elif moving:
             print(f"\x1b[K{head}: {what}{_left(what, begun)}", end="\r", file=sys.stderr, flush=True)
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from pathlib import Path
 from typing import Any
 
 HELP = "node table in, link angles with uncertainties out"
@@ -110,7 +111,11 @@ def run(args: argparse.Namespace) -> int:
 
 def _zero(text: str) -> Any:
     from pydpend.angles import parse_zero
+    from pydpend.errors import OptionError, Setting, fault
     from pydpend.nodes import read_nodes
 
     said = parse_zero(text)
+    if said is None and not Path(text).exists():
+        advice = "Give rest, vertical, reference_frame, degrees of each link (180,180) or a node table"
+        raise OptionError(fault(Setting("zero"), f"{text} is no file and no degrees", advice))
     return read_nodes(text) if said is None else said

@@ -12,7 +12,7 @@ import argparse
 import json
 from pathlib import Path
 
-from pydpend.errors import ArgumentError, fault
+from pydpend.errors import ArgumentError, Setting, fault
 
 HELP = "write a node table as C3D, TRC, DLTdv CSV or MAT"
 
@@ -28,11 +28,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Writes it."""
-    from pydpend.export import export
+    from pydpend.export import SCALED, WRITERS, export
     from pydpend.nodes import read_nodes
 
     if Path(args.output).exists() and not args.force:
         raise ArgumentError(fault(args.output, "it is there already", "Choose another name, or add --force"))
+    ending = Path(args.output).suffix.lower()
+    if args.px_per_m is not None and ending in WRITERS and ending not in SCALED:
+        raise ArgumentError(
+            fault(Setting("px_per_m"), f"{ending} files are in px", "Leave it out, or write .c3d or .trc")
+        )
     nodes = read_nodes(args.nodes)
     export(nodes, args.output, px_per_m=args.px_per_m)
     if args.json:

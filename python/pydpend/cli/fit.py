@@ -155,10 +155,16 @@ def read(path: str, args: argparse.Namespace) -> LinkAngles:
 def load_model(name: str) -> Model:
     """``derived``, ``published`` or a TOML file."""
     from pydpend import model
+    from pydpend.errors import OptionError, Setting, fault
 
     if name == "derived":
         return model.derived("A")
-    return model.published() if name == "published" else model.Model.from_toml(name)
+    if name == "published":
+        return model.published()
+    if not Path(name).exists():
+        advice = "Give derived, published or a pendulum's TOML file"
+        raise OptionError(fault(Setting("model"), f"there is no file {name}", advice))
+    return model.Model.from_toml(name)
 
 
 def progress(label: str, quiet: bool) -> Callable[[int, int, float], None] | None:

@@ -54,7 +54,13 @@ class CommandLine:
     def _owner(self, keyword: str) -> tuple[str, str]:
         """The command that has the flag of a keyword, this one if it can be, and the flag."""
         for command, parser in self._commands.items():
-            named = [a.option_strings[-1] for a in parser._actions if a.dest == keyword and a.option_strings]
+            named = [
+                word
+                for a in parser._actions
+                if a.dest == keyword
+                for word in a.option_strings
+                if word.startswith("--") and not word.startswith("--no-")
+            ]
             for flag in (*named, *flags_of(keyword)):
                 if flag in options_of(parser):
                     return f"pydpend {command}", flag

@@ -17,6 +17,7 @@ from pydpend.damping.recording import prepare
 from pydpend.damping.result import DampingFit
 from pydpend.documents import read_json
 from pydpend.errors import FIT, FitError, ModelError, Setting, fault
+from pydpend.kinds import expect
 from pydpend.model import Model
 from pydpend.model.file import MOST
 
@@ -92,6 +93,7 @@ def load_fit(path: str | Path) -> StoredFit:
     """Reads ``fit.json`` from a folder of ``pydpend fit`` (or the file itself). Raises FitError when it is
     none."""
     path = Path(path)
+    expect(path, ("fit",), FitError)
     if path.is_dir():
         path = path / "fit.json"
     content = read_json(path, FitError, "Give the folder that " + FIT + " wrote")

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from pydpend.documents import read_json
 from pydpend.encoder.holds import Hold
 from pydpend.errors import CALIBRATE, EncoderError, fault
+from pydpend.kinds import expect
 
 Floats = NDArray[np.float64]
 
@@ -136,6 +137,7 @@ def read_calibration(path: str | Path) -> Calibration:
 
     Raises :class:`EncoderError` naming the file, and the key that is missing or not what it must be.
     """
+    expect(path, ("calibration",), EncoderError)
     value = read_json(Path(path), EncoderError, "Make one with " + CALIBRATE)
     holds = value.tables("holds")
     low, high = value.array("range_v", 2)

@@ -9,7 +9,7 @@ from pydpend.angles.table import LinkAngles
 from pydpend.angles.unwrap import unwrap
 from pydpend.encoder.calibration import Calibration
 from pydpend.encoder.signal import EncoderSignal
-from pydpend.errors import EncoderError, fault
+from pydpend.errors import CALIBRATE, EncoderError, Setting, fault
 
 Floats = NDArray[np.float64]
 
@@ -34,6 +34,10 @@ def encoder_angles(signal: EncoderSignal, calibration: Calibration | None = None
     readings unusable, or a gap in which an encoder of a single turn may have lost one.
     """
     if signal.unit == "rad":
+        if calibration is not None:
+            raise EncoderError(
+                fault(Setting("calibration"), f"{signal.name} is an angle already, not volts", "Leave it out")
+            )
         from pydpend.series import highpass_noise
 
         noise = highpass_noise(signal.value)
@@ -46,7 +50,9 @@ def encoder_angles(signal: EncoderSignal, calibration: Calibration | None = None
     if calibration is None:
         raise EncoderError(
             fault(
-                signal.name, "it is in volts and there is no calibration", "Make one with `pydpend calibrate`"
+                signal.name,
+                "it is in volts and there is no calibration",
+                "Give " + Setting("calibration") + "; make one with " + CALIBRATE,
             )
         )
     volts = signal.value

@@ -11,7 +11,8 @@ import numpy as np
 
 from pydpend.columns import read_columns
 from pydpend.encoder.signal import EncoderSignal, Unit, read_encoder
-from pydpend.errors import EncoderError, fault
+from pydpend.errors import EncoderError, Setting, fault
+from pydpend.kinds import expect
 from pydpend.series import correlation_time
 
 ENDINGS = (".csv", ".tdms", ".npy", ".parquet", ".txt")
@@ -36,7 +37,11 @@ class Hold:
 def hold_of(signal: EncoderSignal, angle_rad: float) -> Hold:
     """The hold of a recording made at one known angle. Raises :class:`EncoderError` unless it is in volts."""
     if signal.unit != "v":
-        raise EncoderError(fault(signal.name, "a hold must be in volts", "Name the voltage's column"))
+        raise EncoderError(
+            fault(
+                signal.name, "a hold must be in volts", "Name the voltage's column with " + Setting("column")
+            )
+        )
     n = signal.value.size
     std = float(np.std(signal.value, ddof=1)) if n > 1 else 0.0
     together = correlation_time(signal.value - signal.value.mean())
@@ -87,6 +92,7 @@ def read_holds(
     """
     files: list[Path] = []
     for path in map(Path, paths):
+        expect(path, ("encoder", "tables"), EncoderError)
         if path.is_dir():
             inside = [p for p in sorted(path.iterdir()) if p.suffix.lower() in ENDINGS]
             if not inside:
@@ -101,6 +107,13 @@ def read_holds(
             fault("calibration", "no hold recordings were given", "Name the files or their folder")
         )
     if len(files) == 1 and angles_deg is None:
+        for name, value in (("time_column", time_column), ("rate_hz", rate_hz), ("unit", unit)):
+            if value is not None:
+                raise EncoderError(
+                    fault(
+                        Setting(name), f"{files[0]} is one table of holds, which has no times", "Leave it out"
+                    )
+                )
         return _holds_of_table(files[0], column or "voltage_v")
     if angles_deg is None:
         angles = angles_from_names([f.stem for f in files])
@@ -109,14 +122,16 @@ def read_holds(
                 fault(
                     "calibration",
                     f"the angles of the {len(files)} holds are neither given nor in the files' names",
-                    "Give them in the files' order, or name the files like hold_-360deg.csv",
+                    "Give "
+                    + Setting("angles_deg")
+                    + " in the files' order, or name the files like hold_-360deg.csv",
                 )
             )
     else:
         angles = [float(np.radians(a)) for a in angles_deg]
     if len(angles) != len(files):
         raise EncoderError(
-            fault("calibration", f"{len(angles)} angles for {len(files)} holds", "Give one for each")
+            fault(Setting("angles_deg"), f"{len(angles)} angles for {len(files)} holds", "Give one for each")
         )
     return [
         hold_of(read_encoder(f, column=column, time_column=time_column, rate_hz=rate_hz, unit=unit), a)
@@ -125,7 +140,9 @@ def read_holds(
 
 
 def _holds_of_table(path: Path, column: str) -> list[Hold]:
-    table = read_columns(path, [column], ["angle_deg", "angle_rad", "std_v", "n"], error=EncoderError)
+    table = read_columns(
+        path, [column], ["angle_deg", "angle_rad", "std_v", "n"], error=EncoderError, naming=Setting("column")
+    )
     if ("angle_deg" in table.values) == ("angle_rad" in table.values):
         raise EncoderError(
             fault(

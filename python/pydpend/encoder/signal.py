@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from pydpend.arrays import MAGIC, read_npy
 from pydpend.columns import Columns, read_columns
 from pydpend.documents import unreadable
-from pydpend.errors import EncoderError, fault
+from pydpend.errors import EncoderError, Setting, fault
 from pydpend.instants import seconds_of_numpy
+from pydpend.kinds import expect
 
 Floats = NDArray[np.float64]
 Unit = Literal["v", "rad", "deg"]
@@ -83,9 +84,18 @@ def read_encoder(
     are missing, repeated or falling, and columns that are not there.
     """
     path = Path(path)
+    expect(path, ("encoder", "angles"), EncoderError)
+    if rate_hz is not None and time_column is not None:
+        raise EncoderError(
+            fault(
+                Setting("rate_hz"),
+                "the times are also to be a column's",
+                "Leave it or " + Setting("time_column") + " out",
+            )
+        )
     if rate_hz is not None and not (np.isfinite(rate_hz) and rate_hz > 0):
         raise EncoderError(
-            fault(str(path), f"a rate of {rate_hz} Hz cannot be", "Give the samples per second")
+            fault(Setting("rate_hz"), f"a rate of {rate_hz} Hz cannot be", "Give the samples per second")
         )
     try:
         with path.open("rb") as file:
@@ -99,6 +109,11 @@ def read_encoder(
 
         t, value, label, notes = read_tdms(path, column, time_column, rate_hz)
     elif magic == MAGIC:
+        for option, given in (("column", column), ("time_column", time_column)):
+            if given is not None:
+                raise EncoderError(
+                    fault(Setting(option), f"{path} is an array without names", "Leave it out")
+                )
         t, value, label = _read_numpy(path, rate_hz)
     else:
         t, value, label, table = _read_table(path, column, time_column, rate_hz)
@@ -114,15 +129,28 @@ def _read_table(
     required = [*when, *([column] if column else [])]
     optional = () if column else KNOWN_COLUMNS
     if not required:
-        raise EncoderError(fault(str(path), "with rate_hz the column must be named", "Give column=..."))
-    table = read_columns(path, required, optional, error=EncoderError, time=when[0] if when else None)
+        raise EncoderError(
+            fault(
+                str(path),
+                "without times its columns are not told apart",
+                "Name the encoder's with " + Setting("column"),
+            )
+        )
+    table = read_columns(
+        path,
+        required,
+        optional,
+        error=EncoderError,
+        time=when[0] if when else None,
+        naming=Setting("column" if column else "time_column"),
+    )
     found = [column] if column else [c for c in KNOWN_COLUMNS if c in table.values]
     if len(found) != 1:
         raise EncoderError(
             fault(
                 str(path),
                 f"which column is the encoder's? ({', '.join(found) or 'none that is known'})",
-                f"Name one of {', '.join(table.header)}",
+                f"Name one of {', '.join(table.header)} with " + Setting("column"),
             )
         )
     value = table.values[found[0]]
@@ -141,7 +169,7 @@ def _read_numpy(path: Path, rate_hz: float | None) -> tuple[Floats, Floats, str]
             fault(
                 str(path),
                 f"an array of shape {array.shape}",
-                "Save (T, 2) with the time in s first, or (T,) and give rate_hz",
+                "Save (T, 2) with the time in s first, or (T,) and give " + Setting("rate_hz"),
             )
         )
     return array[:, 0].copy(), array[:, 1].copy(), "value"
@@ -173,7 +201,9 @@ def _checked(
             fault(
                 str(path),
                 f"the time {t[i]:.9g} s does not come after {t[i - 1]:.9g} s ({bad.size} such)",
-                "Sort by time and remove repeats, or give the rate (rate_hz) if the stamps are coarse",
+                "Sort by time and remove repeats, or give "
+                + Setting("rate_hz")
+                + " if the stamps are coarse",
                 place=place(i, "time"),
             )
         )
@@ -183,7 +213,7 @@ def _checked(
     keep = np.isfinite(value)
     if not keep.any():
         raise EncoderError(
-            fault(str(path), "no sample has a value", "Check the column", place=f"column {label}")
+            fault(str(path), "no sample has a value", "Check " + Setting("column"), place=f"column {label}")
         )
     if not keep.all():
         first = int(np.flatnonzero(~keep)[0])

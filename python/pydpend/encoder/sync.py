@@ -15,7 +15,7 @@ import scipy
 from numpy.typing import NDArray
 
 from pydpend.angles.table import LinkAngles
-from pydpend.errors import EncoderError, fault
+from pydpend.errors import EncoderError, fault, one_of
 from pydpend.series import correlation_time, highpass_noise
 
 Floats = NDArray[np.float64]
@@ -166,7 +166,7 @@ def synchronise(
             fault(encoder.name, f"only {t.size} readings have an angle", "Check range and column")
         )
     if clocks not in ("estimate", "given"):
-        raise EncoderError(fault("clocks", f"{clocks!r} is not known", "Use 'estimate' or 'given'"))
+        raise EncoderError(one_of("clocks", clocks, ("estimate", "given")))
     given = clocks == "given"
     fits = []
     for shift, sense in [(0.0, 1.0), (0.0, -1.0)] if given else _coarse(course, t, phi):

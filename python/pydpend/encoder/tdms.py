@@ -11,7 +11,7 @@ from nptdms import TdmsFile
 from nptdms.timestamp import TimestampArray
 from numpy.typing import NDArray
 
-from pydpend.errors import EncoderError, fault
+from pydpend.errors import EncoderError, Setting, fault
 
 Floats = NDArray[np.float64]
 T = TypeVar("T")
@@ -54,7 +54,11 @@ def _read(
         t = _times(path, times, notes)
         if t.size != value.size:
             raise EncoderError(
-                fault(str(path), f"{t.size} times for {value.size} values", "Name the right channel")
+                fault(
+                    str(path),
+                    f"{t.size} times for {value.size} values",
+                    "Name the right channels with " + Setting("column") + " and " + Setting("time_column"),
+                )
             )
         return t, value, str(data.name), notes
     if rate_hz is not None:
@@ -67,7 +71,10 @@ def _read(
                 "the channel has no waveform increment (wf_increment)"
                 if step is None
                 else f"its waveform increment (wf_increment) is {step:g} s",
-                "Name the channel of the times, or give rate_hz",
+                "Name the channel of the times with "
+                + Setting("time_column")
+                + ", or give "
+                + Setting("rate_hz"),
                 place=f"channel {data.name}",
             )
         )
@@ -86,7 +93,10 @@ def _property(path: Path, channel: Any, key: str, absent: float | None) -> float
             fault(
                 str(path),
                 f"{key} is {value}, not a number of seconds",
-                "Name the channel of the times, or give rate_hz",
+                "Name the channel of the times with "
+                + Setting("time_column")
+                + ", or give "
+                + Setting("rate_hz"),
                 place=f"channel {channel.name}",
             )
         )

@@ -12,6 +12,7 @@ import numpy as np
 from pydpend.components import Balls, Cage, Configuration, Part, Quantity, Races, Rigid
 from pydpend.documents import Table, read_toml
 from pydpend.errors import ModelError, fault
+from pydpend.kinds import expect
 from pydpend.model.pendulum import CONSTANTS, Model, uniform_bar
 from pydpend.model.reduce import constants_of, from_parts
 
@@ -52,6 +53,7 @@ _KIND = {
 def read_model(path: str | Path) -> Model:
     """The model of a TOML file. Raises ModelError naming the file and the key or part."""
     path = Path(path)
+    expect(path, ("model",), ModelError)
     data = read_toml(path, ModelError, "docs/model.md has examples")
     if ("constants" in data) == ("part" in data):
         raise ModelError(

@@ -16,7 +16,8 @@ from pydpend.columns import read_columns
 from pydpend.damping.stored import load_fit
 from pydpend.documents import Table, read_json
 from pydpend.encoder import read_calibration
-from pydpend.errors import PydpendError, Setting, fault
+from pydpend.errors import ANALYSE, PydpendError, Setting, fault, listed
+from pydpend.kinds import expect
 from pydpend.nodes import read_nodes
 from pydpend.plots.angles import angles_figure
 from pydpend.plots.damping import (
@@ -33,7 +34,7 @@ from pydpend.plots.nodes import nodes_figure
 Floats = NDArray[np.float64]
 
 
-AGAIN = "Do pydpend analyse again"
+AGAIN = "Do " + ANALYSE + " again"
 
 
 class FigureError(PydpendError):
@@ -230,18 +231,17 @@ DRAWINGS = {
 def recordings_of(run: str | Path) -> list[Stored]:
     """The recordings of a run folder. Raises FigureError if it is none."""
     path = Path(run)
+    expect(path, ("run",), FigureError)
     record = path / "run.json"
     if not record.is_file():
         raise FigureError(
-            fault(str(path), "is not a run folder (it has no run.json)", "Make one with pydpend analyse")
+            fault(str(path), "is not a run folder (it has no run.json)", "Make one with " + ANALYSE)
         )
     out = []
     for i, facts in enumerate(_json(record).table("facts").tables("recordings")):
         name = facts.text("name")
         if "/" in name or name in ("", ".", ".."):
-            facts.refuse(
-                "name", f"{name!r} is no folder of the run", "Make the run again with pydpend analyse"
-            )
+            facts.refuse("name", f"{name!r} is no folder of the run", "Make the run again with " + ANALYSE)
         for key in ("label", "path", "kind"):
             facts.text(key)
         out.append(Stored(i, path / name, path, facts.values))
@@ -281,7 +281,11 @@ def figure_of(name: str, run: str | Path, recording: str | None = None) -> Figur
 
     Raises FigureError if the folder has nothing for it or is no run folder.
     """
+    if name not in DRAWINGS:
+        raise FigureError(fault(name, "is not a figure", f"Give {listed(DRAWINGS)}"))
     drawing = DRAWINGS[name]
+    if recording is not None and not drawing.each:
+        raise FigureError(fault(Setting("recording"), f"{name} is of the whole run", "Leave it out"))
     r = chosen(run, recording) if drawing.each else recordings_of(run)[0]
     if not _file(r, drawing).exists():
         there = available(r)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pydpend.coefficients import RATIO_UNITS
 from pydpend.documents import read_json
-from pydpend.errors import PydpendError
+from pydpend.errors import PydpendError, Setting
 from pydpend.plots.damping import coefficients_figure, shares_figure
 from pydpend.plots.folder import AGAIN, read_table, table_of_fit
 from pydpend.plots.style import inline_svg
@@ -86,8 +86,8 @@ def warnings(fit: dict[str, Any]) -> list[str]:
     if fit["method"] == "energy" and fit["chi2"] > 1 + 4 * math.sqrt(2 / fit["n"]):
         out.append(
             f"These laws do not take out the energy that was lost: chi-square of its {fit['n']} values is "
-            f"{digits(fit['chi2'], 3)}, where noise alone would give 1. The standard errors carry that; --laws full or "
-            "the trajectory fit may tell what is missing."
+            f"{digits(fit['chi2'], 3)}, where noise alone would give 1. The standard errors carry that; "
+            f"{Setting('laws', 'full')} or the trajectory fit may tell what is missing."
         )
     for given in fit["inputs"]:
         off = [

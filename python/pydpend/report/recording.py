@@ -287,15 +287,14 @@ def read(folder: Path, facts: dict[str, Any], stages: set[str]) -> Part:
         seen = np.isin(nodes.status, (1, 2))
         rows += [
             ("frames", str(nodes.frame.size)),
-            *_times(nodes.t_s),
-            *_pixels(nodes),
+            *_times(nodes.t_s, nodes.meta.get("time")),
             ("markers, bodies", f"{len(nodes.rig.nodes)}, {len(nodes.rig.bodies)}"),
             ("markers seen, of all frames", f"{100 * seen.mean():.1f} %"),
             ("median uncertainty of a centre", f"{digits(float(np.nanmedian(nodes.sigma_px)))} px"),
         ]
-        source = nodes.meta.get("source")
-        if isinstance(source, dict):
-            part.warnings += [f"{part.label}: {w}" for w in _doubts_of_time(source)]
+        time = nodes.meta.get("time")
+        if isinstance(time, dict):
+            part.warnings += [f"{part.label}: {w}" for w in time.get("notes", [])]
         part.warnings += [f"{part.label}: {w}" for w in nodes.meta.get("warnings", [])]
         ending = nodes.meta.get("ending")
         if isinstance(ending, dict) and ending.get("early"):
@@ -352,34 +351,20 @@ def _zero_in_words(zero: dict[str, Any]) -> str:
     return f"{zero['from']}, ± {' and '.join(digits(math.degrees(s)) for s in sigmas)} deg"
 
 
-def _times(t_s: NDArray[np.float64]) -> list[tuple[str, str]]:
+def _times(t_s: NDArray[np.float64], time: Any = None) -> list[tuple[str, str]]:
+    """Duration and rate; ``time`` is what the node table says of its times."""
     step = float(np.median(np.diff(t_s))) if t_s.size > 1 else math.nan
-    return [("duration", f"{t_s[-1] - t_s[0]:.3f} s"), ("rate", f"{1 / step:.6g} per s")]
+    rate = f"{1 / step:.6g} per s"
+    if isinstance(time, dict) and time.get("kind") == "variable":
+        slowest, fastest = time["range_hz"]
+        # Between clocks of cameras alone: no more than rounding shows.
+        uneven = fastest - slowest > 1e-3 * fastest
+        rate = rate if not uneven else f"variable, {slowest:.3g} to {fastest:.3g} per s"
+    return [("duration", f"{t_s[-1] - t_s[0]:.3f} s"), ("rate", rate)]
 
 
-def _pixels(nodes: Nodes) -> list[tuple[str, str]]:
-    """How wide a pixel is, where it is not square."""
-    width, height = nodes.rig.pixel_aspect
-    if width == height:
-        return []
-    source = nodes.meta.get("source")
-    given = isinstance(source, dict) and source.get("pixel_aspect_origin") == "user"
-    origin = "as given" if given else "as the recording says"
-    return [("pixels", f"{width / height:.4f} wide ({width}:{height}), {origin}")]
+def _columns(path: Path) -> dict[str, NDArray[np.float64]]:
+    import pyarrow.parquet as pq
 
-
-PLAYERS_RATE_HZ = 60.0
-"""Up to this rate films are made for players; cameras for motion are faster."""
-
-
-def _doubts_of_time(source: dict[str, Any]) -> list[str]:
-    """Warnings where the frame rate may not be the camera's: every rate and coefficient scales with it."""
-    origin, rate = source.get("rate_origin"), source.get("rate_hz")
-    if origin == "unknown":
-        return ["nothing gives its frame rate, so times count frames. Give the camera's with --fps"]
-    if origin == "container" and rate is not None and rate <= PLAYERS_RATE_HZ:
-        return [
-            f"its {rate:g} frames a second are what the file tells a player. If the camera took them at another "
-            "rate, give that with --fps: every time and rate here hinges on it"
-        ]
-    return []
+    table = pq.read_table(path)
+    return {n: table.column(n).to_numpy().astype(np.float64) for n in table.column_names}

@@ -5,7 +5,6 @@
 use nalgebra::{Isometry2, Vector2};
 
 use super::circle::Circle;
-use crate::pixel_aspect::PixelAspect;
 use crate::rig::{Body, Joint, Node, RIG_SCHEMA, Rig};
 use crate::rigid::body::Link;
 use crate::rigid::forecast::hung_at;
@@ -109,14 +108,8 @@ fn joint(a: &Found, b: Option<&Found>) -> Option<Turning> {
 }
 
 /// The rig of the bodies: joints found, bodies ordered and named, nodes ordered along them, placed as in frame
-/// `reference` of the sample and in recorded pixels, while those of the bodies are square.
-pub fn arrange(
-    found: &[Found],
-    reference: usize,
-    reference_frame: Option<u64>,
-    image_px: [u32; 2],
-    pixel_aspect: PixelAspect,
-) -> Rig {
+/// `reference` of the sample.
+pub fn arrange(found: &[Found], reference: usize, reference_frame: Option<u64>, image_px: [u32; 2]) -> Rig {
     let n = found.len();
     let mut found = found.to_vec();
     // What each body hangs on: the ground first, then bodies already hung.
@@ -187,7 +180,6 @@ pub fn arrange(
     let mut rig = Rig {
         schema: RIG_SCHEMA,
         image_px,
-        pixel_aspect,
         reference_frame,
         region: None,
         lens: None,
@@ -210,7 +202,6 @@ pub fn arrange(
             link.template.iter().map(|&t| (axis.dot(&t), place(&pose(b), t))).collect();
         along.sort_by(|a, b| a.0.total_cmp(&b.0));
         for (_, p) in along {
-            let p = pixel_aspect.to_recorded(p);
             rig.nodes.push(Node {
                 name: format!("n{}", rig.nodes.len()),
                 body: names[k].clone(),
@@ -237,7 +228,6 @@ pub fn arrange(
                 (name, vec![names[on].clone(), names[k].clone()], p)
             }
         };
-        let p = pixel_aspect.to_recorded(p);
         rig.joints.push(Joint { name, bodies, x_px: p.x, y_px: p.y });
     }
     rig

@@ -16,7 +16,6 @@ use rayon::prelude::*;
 
 use crate::error::{Error, Fault, Result};
 use crate::message::{Message, SETUP, Setting};
-use crate::pixel_aspect::PixelAspect;
 use crate::rig::Rig;
 use crate::rigid::body::Link;
 use crate::rigid::pose::place;
@@ -35,7 +34,7 @@ pub struct Discovery {
     pub warnings: Vec<Message>,
 }
 
-/// Finds the rig of a recording of `image_px` (width, height) pixels; its places are in these.
+/// Finds the rig of a recording of `image_px` (width, height) pixels.
 ///
 /// # Errors
 /// [`Error::Rig`] if there are no markers or none moves.
@@ -69,8 +68,7 @@ pub fn discover(store: &DetectionStore, image_px: [u32; 2]) -> Result<Discovery>
         ));
     }
     if let Some((a, b)) = bodies::alike(&links) {
-        let (a, b) =
-            (place_words(&found[a], store.pixel_aspect()), place_words(&found[b], store.pixel_aspect()));
+        let (a, b) = (place_words(&found[a]), place_words(&found[b]));
         return Err(Error::Rig(
             Fault::new(
                 "recording",
@@ -81,14 +79,13 @@ pub fn discover(store: &DetectionStore, image_px: [u32; 2]) -> Result<Discovery>
             ),
         ));
     }
-    let aspect = store.pixel_aspect();
-    let (reference, whole) = reference(&sample, &found, image_px, aspect);
+    let (reference, whole) = reference(&sample, &found, image_px);
     if !whole {
         warnings
             .push("no frame shows every marker: their places are put together from several frames".into());
     }
     let index = store.stamp(sample.frames[reference]).index;
-    let rig = arrange::arrange(&found, reference, Some(index), image_px, aspect);
+    let rig = arrange::arrange(&found, reference, Some(index), image_px);
     rig.check("discovered rig")?;
     if !standing.is_empty() {
         let n = standing.len();
@@ -102,8 +99,7 @@ pub fn discover(store: &DetectionStore, image_px: [u32; 2]) -> Result<Discovery>
             .into(),
         );
     }
-    let standing = standing.iter().map(|p| aspect.to_recorded(*p).into()).collect();
-    Ok(Discovery { rig, standing, warnings })
+    Ok(Discovery { rig, standing: standing.iter().map(|p| [p.x, p.y]).collect(), warnings })
 }
 
 /// Bodies with their poses. Those that do not move are no bodies: their points are counted among the standing.
@@ -143,12 +139,9 @@ fn moving_bodies(sample: &mut Sample) -> Vec<Found> {
 }
 
 /// The frame of the sample in which most nodes are seen, the first of those, and whether it shows all.
-fn reference(sample: &Sample, found: &[Found], image_px: [u32; 2], aspect: PixelAspect) -> (usize, bool) {
+fn reference(sample: &Sample, found: &[Found], image_px: [u32; 2]) -> (usize, bool) {
     let [w, h] = image_px.map(f64::from);
-    let inside = |square: Vector2<f64>| {
-        let p = aspect.to_recorded(square);
-        p.x > 0.0 && p.y > 0.0 && p.x < w - 1.0 && p.y < h - 1.0
-    };
+    let inside = |p: Vector2<f64>| p.x > 0.0 && p.y > 0.0 && p.x < w - 1.0 && p.y < h - 1.0;
     let all: usize = found.iter().map(|f| f.link.nodes.len()).sum();
     let mut best = (0, 0);
     for (k, frame) in sample.moving.iter().enumerate() {
@@ -177,7 +170,7 @@ fn reference(sample: &Sample, found: &[Found], image_px: [u32; 2], aspect: Pixel
 }
 
 /// Where a body was found, for a message.
-fn place_words(found: &Found, aspect: PixelAspect) -> String {
-    let at = aspect.to_recorded(found.link.home + found.link.template[0]);
+fn place_words(found: &Found) -> String {
+    let at = found.link.home + found.link.template[0];
     format!("one with a marker at ({:.0}, {:.0}) px", at.x, at.y)
 }

@@ -87,6 +87,14 @@ impl VideoWriter {
             return Err(fault(&name, "the frame rate is too fine a fraction".into(), "Give a rounder rate"));
         };
         let time_base = Rational(numerator, denominator);
+        if keeps_milliseconds(path) && i64::from(denominator) > 1000 * i64::from(numerator) {
+            let rate = f64::from(denominator) / f64::from(numerator);
+            return Err(fault(
+                &name,
+                format!("it keeps time stamps in milliseconds, too coarse for {rate} frames per s"),
+                "Name it .mp4, .mov or .avi, which keep every rate",
+            ));
+        }
         let mut output = format::output(path).map_err(failed(&name, "making the file"))?;
         let codec = encoder::find_by_name(codec_name).ok_or_else(|| {
             fault(&name, format!("this FFmpeg has no encoder {codec_name}"), "Install FFmpeg with it")
@@ -215,6 +223,13 @@ impl VideoWriter {
         self.drain()?;
         self.output.write_trailer().map_err(failed(&self.name, "writing the end"))
     }
+}
+
+/// Whether a file's ending stands for Matroska, as FFmpeg writes it: time stamps in milliseconds, and the exact time
+/// from frame to frame beside them only where that is longer.
+fn keeps_milliseconds(path: &Path) -> bool {
+    let ending = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+    matches!(ending.as_deref(), Some("mkv" | "mk3d" | "webm"))
 }
 
 /// The encoder's name and what it takes.

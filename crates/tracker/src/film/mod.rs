@@ -25,6 +25,7 @@ mod spline;
 mod truth;
 mod truth_table;
 mod write;
+mod write_options;
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -34,11 +35,11 @@ pub use presets::{PRESETS, paper_layout, preset};
 pub use scene::Scene;
 pub use truth::{FrameTruth, NodeTruth};
 pub use truth_table::{Truth, TruthWriter};
-pub use write::{WriteOptions, write};
+pub use write::write;
+pub use write_options::WriteOptions;
 
 use crate::error::Result;
 use crate::frame::{Frame, PixelFormat, TimeBase};
-use crate::pixel_aspect::PixelAspect;
 use crate::rig::{Body, Joint, Node, RIG_SCHEMA, Rig};
 use motion::{Mechanism, bar};
 use scene::{Glint, within};
@@ -254,7 +255,6 @@ impl Film {
         Rig {
             schema: RIG_SCHEMA,
             image_px: scene.image_px,
-            pixel_aspect: PixelAspect::SQUARE,
             reference_frame: Some(index),
             region: None,
             lens: None,

@@ -9,6 +9,7 @@ use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 
 use super::motion::MotionTable;
 use crate::error::{Error, Fault, Place, Result};
+use crate::kind::{self, Kind};
 
 impl MotionTable {
     /// Reads `time_s`, `phi1_rad`, `phi2_rad`, ... and, for free bodies, `x1_px`, `y1_px`, ...; other columns are
@@ -17,6 +18,7 @@ impl MotionTable {
     /// # Errors
     /// [`Error::Film`] naming the file and the column, line or row.
     pub fn read(path: &Path) -> Result<Self> {
+        kind::expect(path, &[Kind::Angles], Error::Film)?;
         let name = path.display().to_string();
         let (header, columns) = match path.extension().and_then(|e| e.to_str()) {
             Some("csv") => read_csv(path, &name)?,

@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Fault, Place, Result};
 use crate::frame::TimeBase;
+use crate::kind::{self, Kind};
 use crate::message::PRINT_SCENE;
 
 /// Version of the scene's form; a file with a higher one is refused.
@@ -325,6 +326,7 @@ impl Scene {
     /// # Errors
     /// [`Error::Film`] naming the file and the line or key.
     pub fn read(path: &Path) -> Result<Self> {
+        kind::expect(path, &[Kind::Scene], Error::Film)?;
         let name = path.display().to_string();
         let text = std::fs::read_to_string(path).map_err(|e| {
             Error::Film(

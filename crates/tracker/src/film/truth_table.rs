@@ -28,6 +28,7 @@ use parquet::file::properties::WriterProperties;
 use super::Film;
 use super::truth::FrameTruth;
 use crate::error::{Error, Fault, Place, Result};
+use crate::kind::{self, Kind};
 use crate::message::FILM_TRUTH;
 
 /// Frames per record batch.
@@ -213,6 +214,7 @@ impl Truth {
     /// # Errors
     /// [`Error::Film`] naming the file and the column or row at fault.
     pub fn read(path: &Path) -> Result<Self> {
+        kind::expect(path, &[Kind::Truth], Error::Film)?;
         let name = path.display().to_string();
         let mut rows = match path.extension().and_then(|e| e.to_str()) {
             Some("csv") => read_csv(path, &name)?,

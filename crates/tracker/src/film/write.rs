@@ -10,7 +10,7 @@
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use rayon::prelude::*;
 
@@ -18,24 +18,8 @@ use super::Film;
 use super::camera_raw::MrawWriter;
 use super::encode::{Codec, ImageKind, VideoSettings, VideoWriter, encode_image};
 use super::truth_table::TruthWriter;
+use super::write_options::{WriteOptions, codec_of, ending};
 use crate::error::{Error, Fault, Place, Result};
-
-/// How a film is written. The default follows the name's ending.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct WriteOptions {
-    /// Codec of a video file.
-    pub codec: Option<Codec>,
-    /// H.264: constant rate factor 0 to 51; MJPEG: 1 to 31; smaller is better and larger.
-    pub quality: Option<u32>,
-    /// H.264: x264's preset, e.g. `fast`.
-    pub speed: Option<String>,
-    /// H.264: no colour planes.
-    pub gray_only: bool,
-    /// Bits per pixel of a Photron recording: 8, 10, 12 or 16.
-    pub bits: Option<u32>,
-    /// Where the truth goes, Parquet or CSV by the ending.
-    pub truth: Option<PathBuf>,
-}
 
 /// What frames are written to.
 enum Sink {
@@ -58,6 +42,7 @@ pub fn write(
     options: &WriteOptions,
     progress: &mut dyn FnMut(u64) -> Result<()>,
 ) -> Result<()> {
+    options.check(path)?;
     let mut truth = options.truth.as_deref().map(|p| TruthWriter::create(p, film)).transpose()?;
     let mut sink = Sink::create(film, path, options)?;
     let batch = 4 * threads::count() as u64;
@@ -97,14 +82,10 @@ impl Sink {
         if name == "-" {
             return y4m(film, Box::new(std::io::stdout()), "standard output".into());
         }
-        let ending = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
+        let ending = ending(path);
         let kind = match ending.as_str() {
             "mp4" | "mov" | "mkv" | "avi" => {
-                let codec = options.codec.unwrap_or(match ending.as_str() {
-                    "mkv" => Codec::Ffv1,
-                    "avi" => Codec::Raw,
-                    _ => Codec::H264,
-                });
+                let codec = codec_of(path, options.codec).unwrap_or(Codec::H264);
                 let [width, height] = scene.image_px;
                 return Ok(Self::Video(VideoWriter::create(
                     path,

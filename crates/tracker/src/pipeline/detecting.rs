@@ -218,10 +218,10 @@ impl Inbox<'_> {
     }
 }
 
-/// Index and time must grow: a table whose time stands still is worth nothing.
+/// Index must grow, and time must not go back. Equal stamps may be those of an even grid, rounded.
 fn forward(stamp: &FrameStamp, newest: &mut Option<(u64, i64)>, recording: &str) -> Result<()> {
     if let Some((index, ticks)) = *newest
-        && (stamp.index <= index || stamp.ticks <= ticks)
+        && (stamp.index <= index || stamp.ticks < ticks)
     {
         return Err(Error::Source(
             Fault::new(recording, format!("tick {} comes after tick {ticks} of frame {index}", stamp.ticks))

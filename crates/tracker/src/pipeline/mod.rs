@@ -8,6 +8,7 @@ mod detecting;
 mod observer;
 mod opening;
 mod state;
+mod times;
 
 use std::ops::Range;
 use std::path::PathBuf;
@@ -18,10 +19,11 @@ use serde_json::json;
 pub use observer::{Observer, Silent, Stage};
 pub use opening::open;
 pub use state::partial_path;
+pub use times::{survey, times};
 
 use crate::detect::{DetectSettings, Levels};
 use crate::discover::{Discovery, discover};
-use crate::error::{Error, Fault, Place, Result};
+use crate::error::{Error, Fault, Result};
 use crate::frame::{Ending, FrameSource, SourceInfo};
 use crate::message::{Message, SETUP, Setting};
 use crate::rig::Rig;
@@ -30,6 +32,7 @@ use crate::store::DetectionStore;
 use crate::table::{
     Form, NodeSummary, NodeTable, Rows, RunEnding, SCHEMA_VERSION, SourceFacts, TableMeta, TableWriter, Tally,
 };
+use crate::timing::{self, Clock, Steps, Timing};
 use crate::track::track_recording;
 use state::State;
 
@@ -166,6 +169,7 @@ fn check(settings: &RunSettings) -> Result<()> {
 /// What is asked of a recording, once it is open.
 struct Request {
     facts: SourceFacts,
+    info: SourceInfo,
     detect: DetectSettings,
     state: State,
 }
@@ -174,14 +178,13 @@ impl Request {
     fn new(settings: &RunSettings, info: &SourceInfo) -> Result<Self> {
         let facts = SourceFacts::of(info);
         let mut detect = settings.detect.clone();
-        detect.pixel_aspect = facts.pixel_aspect;
         if let Some(rig) = &settings.rig {
             fits(rig, &facts)?;
             detect.region = detect.region.or_else(|| rig.region.clone());
             detect.lens = detect.lens.or_else(|| rig.lens.clone());
         }
         let state = State::new(settings, &facts, &detect);
-        Ok(Self { facts, detect, state })
+        Ok(Self { facts, info: info.clone(), detect, state })
     }
 }
 
@@ -204,8 +207,7 @@ fn already_done(settings: &RunSettings, request: &Request) -> Result<Option<RunS
     }
     request.state.made(&table.meta, output)?;
     let rig = (table.meta.settings["rig"] == "given").then_some(&table.meta.rig);
-    let asked = settings.rig.as_ref().map(|r| Rig { pixel_aspect: request.facts.pixel_aspect, ..r.clone() });
-    if rig != asked.as_ref() {
+    if rig != settings.rig.as_ref() {
         return Err(Error::Table(
             Fault::new(output.display(), "its run is complete and had another rig")
                 .advice("Give " + Setting::Rig + " as it was then, or begin anew with " + Setting::Force),
@@ -226,6 +228,7 @@ struct Run<'a> {
     settings: &'a RunSettings,
     detect: DetectSettings,
     facts: SourceFacts,
+    info: SourceInfo,
     levels: Arc<Levels>,
     store: DetectionStore,
     resumed: u64,
@@ -242,20 +245,16 @@ impl<'a> Run<'a> {
         source: Box<dyn FrameSource>,
         observer: &mut dyn Observer,
     ) -> Result<(Self, Box<dyn FrameSource>)> {
-        let Request { facts, detect, state } = request;
-        let mut warnings = source.info().warnings.clone();
-        let aspect = facts.pixel_aspect;
-        if !aspect.is_square() {
-            warnings.push(format!("{}, {}", aspect.words(), facts.pixel_aspect_origin.words()).into());
-        }
+        let Request { facts, info, detect, state } = request;
+        let warnings = source.info().warnings.clone();
         if settings.existing == Existing::Resume
             && let Some(output) = &settings.output
             && let Some(earlier) = state.resume(output)?
         {
-            let store = DetectionStore::on_spool(earlier.spool)?.of_pixels(aspect);
+            let store = DetectionStore::on_spool(earlier.spool)?;
             let (resumed, levels) = (store.len() as u64, Arc::new(earlier.levels));
             let finished = earlier.ending;
-            let run = Self { settings, detect, facts, levels, store, resumed, finished, warnings };
+            let run = Self { settings, detect, facts, info, levels, store, resumed, finished, warnings };
             return Ok((run, source));
         }
         observer.stage(Stage::Learn, None);
@@ -268,10 +267,9 @@ impl<'a> Run<'a> {
         let store = match &settings.output {
             Some(output) => DetectionStore::on_spool(state.create(output, &levels)?)?,
             None => DetectionStore::new(),
-        }
-        .of_pixels(aspect);
+        };
         let levels = Arc::new(levels);
-        let run = Self { settings, detect, facts, levels, store, resumed: 0, finished: None, warnings };
+        let run = Self { settings, detect, facts, info, levels, store, resumed: 0, finished: None, warnings };
         Ok((run, source))
     }
 
@@ -332,9 +330,10 @@ impl<'a> Run<'a> {
         if self.store.is_empty() {
             return Err(self.no_frames(ending));
         }
+        let (timing, clock) = self.times()?;
+        self.warnings.extend(timing::notes(&timing));
         let rig = match &self.settings.rig {
-            // The same but for rounding, or it would have been refused.
-            Some(rig) => Rig { pixel_aspect: self.facts.pixel_aspect, ..rig.clone() },
+            Some(rig) => rig.clone(),
             None => {
                 let mut found = self.find(observer)?;
                 self.warnings.append(&mut found.warnings);
@@ -349,13 +348,12 @@ impl<'a> Run<'a> {
         };
         let mut rows = self.settings.collect.then(Rows::default);
         let mut tally = Tally::new(&rig);
-        let time_base = self.facts.time_base();
         // A run that was stopped while it read is only stopped here if the user does not want to wait.
         let mut stop = ending.is_none();
         let reading_was_stopped = stop;
         let mut done = 0;
         let tracked = track_recording(&self.store, &rig, &mut |stamp, observations| {
-            let time_s = time_base.seconds(stamp.ticks);
+            let time_s = clock.seconds(done, stamp.ticks);
             if let Some(writer) = &mut writer {
                 writer.push(stamp.index, time_s, observations)?;
             }
@@ -384,7 +382,12 @@ impl<'a> Run<'a> {
             schema_version: SCHEMA_VERSION,
             tool: TableMeta::this_tool(),
             settings: self.settings_json(),
-            source: self.facts.clone(),
+            source: SourceFacts {
+                rate_hz: timing.rate_hz,
+                rate_origin: timing.rate_origin,
+                ..self.facts.clone()
+            },
+            time: Some(timing),
             ending: match ending {
                 _ if stop => RunEnding::Interrupted,
                 Some(Ending::Early { frames, byte, reason }) => {
@@ -408,6 +411,17 @@ impl<'a> Run<'a> {
             table: rows.map(|rows| NodeTable { meta: meta.clone(), rows }),
             meta,
         })
+    }
+
+    /// What the frames' times are, from all their stamps.
+    fn times(&self) -> Result<(Timing, Clock)> {
+        let mut steps = Steps::default();
+        for i in 0..self.store.len() {
+            steps.push(self.store.stamp(i).ticks);
+        }
+        let first = self.store.stamp(0).index;
+        self.store.check()?;
+        times(&self.info, &steps, first)
     }
 
     fn no_frames(&self, ending: Option<Ending>) -> Error {
@@ -445,7 +459,7 @@ impl<'a> Run<'a> {
     }
 }
 
-/// Whether a rig belongs to a recording of this size and of these pixels.
+/// Whether a rig belongs to a recording of this size.
 fn fits(rig: &Rig, facts: &SourceFacts) -> Result<()> {
     let image_px = [facts.width, facts.height];
     if rig.image_px != image_px {
@@ -459,25 +473,6 @@ fn fits(rig: &Rig, facts: &SourceFacts) -> Result<()> {
                 ),
             )
             .advice("Make one for this recording with " + SETUP),
-        ));
-    }
-    if !rig.pixel_aspect.agrees(facts.pixel_aspect) {
-        let origin = facts.pixel_aspect_origin.words();
-        return Err(Error::Rig(
-            Fault::new(
-                "rig",
-                format!(
-                    "it is for pixels of {} (width:height), the recording's are {}, {origin}",
-                    rig.pixel_aspect, facts.pixel_aspect
-                ),
-            )
-            .at(Place::Key("pixel_aspect".into()))
-            .advice(
-                "Make one for this recording with "
-                    + SETUP
-                    + ", or say what is true with "
-                    + Setting::PixelAspect,
-            ),
         ));
     }
     Ok(())

@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use super::RunSettings;
 use crate::detect::{DetectSettings, Levels};
 use crate::error::{Error, Fault, Place, Result};
-use crate::frame::Ending;
+use crate::frame::{Ending, RateOrigin};
 use crate::message::{Message, Setting};
 use crate::store::{Finished, Spool};
 use crate::table::{SourceFacts, TableMeta};
@@ -42,11 +42,17 @@ struct Header {
     levels: Levels,
 }
 
+/// What tells one recording from another. Its rate, known for certain only when it was read through, follows from
+/// that.
+fn identity(facts: &SourceFacts) -> SourceFacts {
+    SourceFacts { rate_hz: None, rate_origin: RateOrigin::Unknown, ..facts.clone() }
+}
+
 impl State {
     pub fn new(settings: &RunSettings, facts: &SourceFacts, detect: &DetectSettings) -> Self {
         let identity = json!({
             "program": TableMeta::this_tool(),
-            "recording": facts,
+            "recording": identity(facts),
             "detection settings": detect,
             "decoder": settings.open.decoder,
             "fps": settings.open.fps,
@@ -59,7 +65,7 @@ impl State {
     pub fn made(&self, meta: &TableMeta, output: &Path) -> Result<()> {
         let before = json!({
             "program": meta.tool,
-            "recording": meta.source,
+            "recording": identity(&meta.source),
             "detection settings": meta.settings["detect"],
             "decoder": meta.settings["decoder"],
             "fps": meta.settings["fps"],

@@ -16,6 +16,7 @@ use std::io::Read;
 use std::path::Path;
 
 use crate::error::{Error, Fault, Result};
+use crate::kind::{self, Kind};
 use crate::message::Setting;
 pub(crate) use options::cores;
 pub use options::{Decoder, OpenOptions};
@@ -83,7 +84,14 @@ impl Input {
 /// [`Error::Source`] if there is no such file or nothing here reads it; [`Error::Argument`] for options that
 /// make no sense.
 pub fn open(name: &str, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
+    kind::expect(Path::new(name), &[Kind::Film, Kind::Pictures], Error::Source)?;
     if Path::new(name).is_dir() || images::names::is_pattern(name) && !Path::new(name).exists() {
+        if options.decoder == Decoder::Opencv {
+            return Err(Error::Source(
+                Fault::new(name, "pictures are read without OpenCV's decoder")
+                    .advice("Leave out " + Setting::Decoder.set_to("opencv")),
+            ));
+        }
         return Ok(Box::new(images::SequenceSource::open(name, options)?));
     }
     let input = Input::of(name, options)?;
@@ -115,7 +123,7 @@ pub fn open(name: &str, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
         return Ok(Box::new(source));
     }
     match input {
-        Input::File(_) => Ok(Box::new(opencv::OpencvSource::open(name, &input, &source, options)?)),
+        Input::File(_) => Ok(Box::new(opencv::OpencvSource::open(name, &input, source.info(), options)?)),
         _ => Err(Error::Source(
             Fault::new(name, "OpenCV's decoder reads files only")
                 .advice("Leave out " + Setting::Decoder.set_to("opencv")),

@@ -2,15 +2,14 @@
 //!
 //! Owns: [`OpencvSource`]. OpenCV makes blue, green and red of every picture and we make brightness of these,
 //! so it costs more and gives 8 bits only. Its times of frames are wrong at the end of streams with reordered
-//! frames (version 4.6 gives 0), so times are the container's. It turns films of 90 and 270 degrees the wrong way
-//! (version 4.6 again) and mirrors none, so pictures are turned here.
+//! frames (version 4.6 gives 0), so times are the container's.
 
 use opencv::core::Mat;
 use opencv::imgproc;
 use opencv::prelude::{MatTraitConst, MatTraitConstManual, VideoCaptureTrait, VideoCaptureTraitConst};
 use opencv::videoio::{self, VideoCapture};
 
-use super::ffmpeg::{FfmpegSource, Orientation, display_times};
+use super::ffmpeg::display_times;
 use super::{Input, OpenOptions};
 use crate::error::{Error, Fault, Result};
 use crate::frame::{Ending, Frame, FrameSource, PixelFormat, SourceInfo};
@@ -19,7 +18,6 @@ use crate::message::Setting;
 /// A recording read through OpenCV.
 pub struct OpencvSource {
     info: SourceInfo,
-    orientation: Orientation,
     capture: VideoCapture,
     color: Mat,
     next: u64,
@@ -29,17 +27,11 @@ pub struct OpencvSource {
 }
 
 impl OpencvSource {
-    /// Opens a file; `first` is what FFmpeg knows of it.
+    /// Opens a file; `known` is what FFmpeg says of it.
     ///
     /// # Errors
     /// [`Error::Source`] if OpenCV cannot open it or would throw bits away.
-    pub(crate) fn open(
-        name: &str,
-        input: &Input,
-        first: &FfmpegSource,
-        options: &OpenOptions,
-    ) -> Result<Self> {
-        let known = first.info();
+    pub(crate) fn open(name: &str, input: &Input, known: &SourceInfo, options: &OpenOptions) -> Result<Self> {
         if known.depth_bits > 8 {
             return Err(Error::Source(
                 Fault::new(
@@ -49,54 +41,41 @@ impl OpencvSource {
                 .advice("Leave out " + Setting::Decoder.set_to("opencv")),
             ));
         }
-        let orientation = first.orientation();
-        let capture = open(name, orientation)?;
+        let capture = open(name)?;
         let info = SourceInfo {
             codec: format!("{} (OpenCV)", known.codec),
             converted_from: Some("BGR".into()),
             format: PixelFormat::Gray8,
             depth_bits: 8,
+            warnings: Vec::new(),
             ..known.clone()
         };
-        let times = if options.fps.is_some() { Vec::new() } else { display_times(name, input)? };
-        Ok(Self {
-            info,
-            orientation,
-            capture,
-            color: Mat::default(),
-            next: 0,
-            times,
-            ending: Ending::Complete,
-        })
+        let times = if options.fps.is_some() {
+            Vec::new()
+        } else {
+            display_times(name, input, usize::MAX, u64::MAX)?.0
+        };
+        Ok(Self { info, capture, color: Mat::default(), next: 0, times, ending: Ending::Complete })
     }
 }
 
-fn open(name: &str, orientation: Orientation) -> Result<VideoCapture> {
+fn open(name: &str) -> Result<VideoCapture> {
     let failed = |why: String| {
         Error::Source(
             Fault::new(name, format!("OpenCV does not open it{why}"))
                 .advice("Leave out " + Setting::Decoder.set_to("opencv")),
         )
     };
-    let mut capture = VideoCapture::from_file(name, videoio::CAP_FFMPEG)
+    let capture = VideoCapture::from_file(name, videoio::CAP_FFMPEG)
         .map_err(|e| failed(format!(" ({})", e.message)))?;
-    if !capture.is_opened().unwrap_or(false) {
-        return Err(failed(String::new()));
+    match capture.is_opened() {
+        Ok(true) => Ok(capture),
+        _ => Err(failed(String::new())),
     }
-    let told = capture.set(videoio::CAP_PROP_ORIENTATION_AUTO, 0.0).unwrap_or(false);
-    if !told && orientation != Orientation::default() {
-        return Err(failed(" as it is: this version turns pictures by itself".into()));
-    }
-    Ok(capture)
 }
 
-/// The next picture, turned, as gray bytes, if its size is the recording's; the outer `None` is the end.
-fn read(
-    capture: &mut VideoCapture,
-    color: &mut Mat,
-    info: &SourceInfo,
-    orientation: Orientation,
-) -> Result<Option<Option<Vec<u8>>>> {
+/// The next picture as gray bytes, if its size is the recording's; the outer `None` is the end.
+fn read(capture: &mut VideoCapture, color: &mut Mat, info: &SourceInfo) -> Result<Option<Option<Vec<u8>>>> {
     let fault = |e: opencv::Error| Error::Source(Fault::new(&info.name, format!("OpenCV: {}", e.message)));
     if !capture.read(color).map_err(fault)? {
         return Ok(None);
@@ -107,13 +86,9 @@ fn read(
     } else {
         imgproc::cvt_color_def(color, &mut gray, imgproc::COLOR_BGR2GRAY).map_err(fault)?;
     }
-    let (width, height) = orientation.size(info.width, info.height);
-    let fits = (i64::from(gray.cols()), i64::from(gray.rows())) == (width.into(), height.into());
-    if !fits {
-        return Ok(Some(None));
-    }
-    let samples = gray.data_bytes().map_err(fault)?.to_vec();
-    Ok(Some(Some(orientation.apply(samples, width as usize, height as usize, 1).0)))
+    let fits = (i64::from(gray.cols()), i64::from(gray.rows())) == (info.width.into(), info.height.into());
+    let plane = if fits { Some(gray.data_bytes().map_err(fault)?.to_vec()) } else { None };
+    Ok(Some(plane))
 }
 
 fn frame(info: &SourceInfo, index: u64, ticks: i64, plane: Option<Vec<u8>>) -> Frame {
@@ -135,7 +110,7 @@ impl FrameSource for OpencvSource {
     }
 
     fn next_frame(&mut self) -> Result<Option<Frame>> {
-        let Some(plane) = read(&mut self.capture, &mut self.color, &self.info, self.orientation)? else {
+        let Some(plane) = read(&mut self.capture, &mut self.color, &self.info)? else {
             if self.next == 0 {
                 return Err(Error::Source(
                     Fault::new(&self.info.name, "OpenCV decodes no frame of it")
@@ -162,9 +137,13 @@ impl FrameSource for OpencvSource {
         self.ending.clone()
     }
 
+    fn stamps(&mut self) -> Result<Option<(Vec<i64>, bool)>> {
+        Ok(Some((self.times.clone(), true)).filter(|t| !t.0.is_empty()))
+    }
+
     fn sample(&mut self, count: usize) -> Result<Vec<Frame>> {
         // OpenCV seeks by frame number, which is not exact; for statistics any frames will do.
-        let mut capture = open(&self.info.name, self.orientation)?;
+        let mut capture = open(&self.info.name)?;
         let frames = capture.get(videoio::CAP_PROP_FRAME_COUNT).unwrap_or(0.0).max(0.0);
         let mut color = Mat::default();
         let mut samples = Vec::new();
@@ -173,7 +152,7 @@ impl FrameSource for OpencvSource {
             if at > 0.0 {
                 let _ = capture.set(videoio::CAP_PROP_POS_FRAMES, at);
             }
-            let Some(plane) = read(&mut capture, &mut color, &self.info, self.orientation)? else { continue };
+            let Some(plane) = read(&mut capture, &mut color, &self.info)? else { continue };
             samples.extend(Some(frame(&self.info, k as u64, 0, plane)).filter(|f| f.plane.is_some()));
         }
         Ok(samples)

@@ -1,7 +1,5 @@
 //! What a user may say about reading a recording.
 
-use crate::pixel_aspect::{AspectOrigin, PixelAspect};
-
 /// Which decoder reads compressed film.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -20,24 +18,12 @@ pub enum Decoder {
 pub struct OpenOptions {
     /// Frames per second of recorded time; replaces all time stamps of the recording.
     pub fps: Option<f64>,
-    /// Width to height of a pixel as seen after turning; replaces what the recording says.
-    pub pixel_aspect: Option<PixelAspect>,
     /// Decoder.
     pub decoder: Decoder,
     /// Whether network addresses and devices may be opened.
     pub allow_protocol: bool,
     /// Decoding threads; 0 is one for each core.
     pub threads: usize,
-}
-
-impl OpenOptions {
-    /// What pixels are, with what the recording says of them, and where that comes from.
-    pub(crate) fn aspect(&self, recorded: PixelAspect) -> (PixelAspect, AspectOrigin) {
-        match self.pixel_aspect {
-            Some(given) => (given, AspectOrigin::User),
-            None => (recorded, AspectOrigin::Recording),
-        }
-    }
 }
 
 /// How many threads `threads` stands for: 0 is one for each core.

@@ -5,8 +5,7 @@ use std::sync::Arc;
 use super::{Ending, FrameSource, SourceInfo};
 use crate::error::Result;
 use crate::film::{Film, Scene};
-use crate::frame::{Frame, PixelFormat, RateOrigin};
-use crate::pixel_aspect::{AspectOrigin, PixelAspect};
+use crate::frame::{Frame, PixelFormat, RateClaims, RateOrigin};
 
 /// Frames of a [`Film`], made when they are asked for.
 #[derive(Debug)]
@@ -38,14 +37,13 @@ impl SyntheticSource {
             },
             width: scene.image_px[0],
             height: scene.image_px[1],
-            pixel_aspect: PixelAspect::SQUARE,
-            pixel_aspect_origin: AspectOrigin::Recording,
             format: film.format(),
             depth_bits: scene.camera.depth_bits,
             declared_frames: Some(scene.frames),
             time_base,
             rate_hz: Some(time_base.denominator as f64 / time_base.numerator as f64),
             rate_origin: RateOrigin::TimeStamps,
+            claims: RateClaims::default(),
             converted_from: None,
             size_bytes: None,
             details: Vec::new(),

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 
 use super::{NodeTable, Rows, TableMeta, csv, csv_read, parquet, parquet_read};
 use crate::error::{Error, Fault, Result};
+use crate::kind::{self, Kind};
 use crate::message::{Setting, TRACK};
 use crate::observation::Observation;
 use crate::rig::Rig;
@@ -155,6 +156,7 @@ impl TableWriter {
 /// # Errors
 /// [`Error::Table`] naming the row, line or column at fault, [`Error::Rig`] if the rig in it is wrong.
 pub fn read_table(path: &Path) -> Result<NodeTable> {
+    kind::expect(path, &[Kind::NodeTable], Error::Table)?;
     let name = path.display().to_string();
     let table = match Form::of(path)? {
         Form::Parquet => parquet_read::read(path)?,

@@ -13,8 +13,8 @@ use sha2::{Digest, Sha256};
 use crate::error::{Error, Fault, Place, Result};
 use crate::frame::{RateOrigin, SourceInfo, TimeBase};
 use crate::message::TRACK;
-use crate::pixel_aspect::{AspectOrigin, PixelAspect};
 use crate::rig::Rig;
+use crate::timing::Timing;
 
 /// Version of the table's form. A file with a higher one is refused.
 pub const SCHEMA_VERSION: u32 = 1;
@@ -32,17 +32,11 @@ pub struct SourceFacts {
     pub width: u32,
     /// Height in px.
     pub height: u32,
-    /// Width to height of a pixel; not written where it is 1.
-    #[serde(default, skip_serializing_if = "PixelAspect::is_square")]
-    pub pixel_aspect: PixelAspect,
-    /// Where that comes from; written where the user said it.
-    #[serde(default, skip_serializing_if = "AspectOrigin::is_recording")]
-    pub pixel_aspect_origin: AspectOrigin,
     /// Significant bits of a sample.
     pub depth_bits: u32,
     /// Frames that the header declares.
     pub declared_frames: Option<u64>,
-    /// Frames per second of recorded time.
+    /// Frames per second of recorded time; of a finished run what [`TableMeta::time`] says.
     pub rate_hz: Option<f64>,
     /// Where the rate comes from; `user` is an override by `--fps`.
     pub rate_origin: RateOrigin,
@@ -68,8 +62,6 @@ impl SourceFacts {
             codec: info.codec.clone(),
             width: info.width,
             height: info.height,
-            pixel_aspect: info.pixel_aspect,
-            pixel_aspect_origin: info.pixel_aspect_origin,
             depth_bits: info.depth_bits,
             declared_frames: info.declared_frames,
             rate_hz: info.rate_hz,
@@ -130,6 +122,9 @@ pub struct TableMeta {
     pub rig: Rig,
     /// The recording.
     pub source: SourceFacts,
+    /// What its times are and how well they are known; tables of earlier versions do not say it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub time: Option<Timing>,
     /// What was asked for and what was learned from the recording, by name.
     pub settings: serde_json::Value,
     /// How the run ended.
@@ -137,7 +132,7 @@ pub struct TableMeta {
 }
 
 /// Keys of the Parquet metadata, `pydpend.` before each; a CSV's `.json` has the same without it.
-pub(super) const KEYS: [&str; 6] = ["schema_version", "tool", "rig", "source", "settings", "ending"];
+pub(super) const KEYS: [&str; 7] = ["schema_version", "tool", "rig", "source", "time", "settings", "ending"];
 
 impl TableMeta {
     /// The program and version that this is.
@@ -213,11 +208,11 @@ impl TableMeta {
         let fault = |e: serde_json::Error| Error::Table(Fault::new("table metadata", e.to_string()));
         let value = serde_json::to_value(self).map_err(fault)?;
         KEYS.iter()
-            .map(|&key| {
-                let text = match value.get(key) {
-                    Some(serde_json::Value::String(s)) => s.clone(),
-                    Some(v) => serde_json::to_string(v).map_err(fault)?,
-                    None => String::new(),
+            .filter_map(|&key| Some((key, value.get(key)?)))
+            .map(|(key, value)| {
+                let text = match value {
+                    serde_json::Value::String(s) => s.clone(),
+                    v => serde_json::to_string(v).map_err(fault)?,
                 };
                 Ok((key, text))
             })

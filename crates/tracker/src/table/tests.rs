@@ -4,14 +4,12 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::frame::RateOrigin;
-use crate::pixel_aspect::PixelAspect;
 use crate::rig::{Body, Joint, Node, Rig};
 
 pub(crate) fn meta(names: &[(String, usize)], bodies: &[String]) -> TableMeta {
     let rig = Rig {
         schema: 1,
         image_px: [640, 480],
-        pixel_aspect: PixelAspect::SQUARE,
         reference_frame: Some(0),
         region: None,
         lens: None,
@@ -43,8 +41,6 @@ pub(crate) fn meta(names: &[(String, usize)], bodies: &[String]) -> TableMeta {
             codec: "packed 12 bit".into(),
             width: 640,
             height: 480,
-            pixel_aspect: PixelAspect::SQUARE,
-            pixel_aspect_origin: crate::pixel_aspect::AspectOrigin::Recording,
             depth_bits: 12,
             declared_frames: Some(9),
             rate_hz: Some(1000.0),
@@ -55,6 +51,7 @@ pub(crate) fn meta(names: &[(String, usize)], bodies: &[String]) -> TableMeta {
             sha256_first_mib: Some("00".into()),
             warnings: vec!["a \"quoted\" warning, with a comma".into()],
         },
+        time: None,
         settings: serde_json::json!({"detect": {"threshold": 0.1}}),
         ending: RunEnding::Early { frames: 9, byte: Some(77), reason: "cut".into() },
     }

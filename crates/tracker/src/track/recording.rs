@@ -11,9 +11,8 @@ use super::partly::Partly;
 use super::rows::{Returns, observations, partly};
 use super::seen::BodySeen;
 use crate::detect::Detection;
-use crate::error::{Error, Fault, Result};
+use crate::error::Result;
 use crate::observation::{Observation, Status};
-use crate::pixel_aspect::PixelAspect;
 use crate::rig::Rig;
 use crate::rigid::body::Mechanism;
 use crate::rigid::forecast::Motion;
@@ -52,17 +51,10 @@ struct Pending {
 /// Those of the sink, and [`crate::error::Error::Rig`] for a rig that is not valid.
 pub fn track_recording(store: &DetectionStore, rig: &Rig, sink: &mut Sink<'_>) -> Result<TrackSummary> {
     rig.check("rig")?;
-    if rig.pixel_aspect != store.pixel_aspect() {
-        return Err(Error::Rig(
-            Fault::new("rig", format!("it is for pixels of {}", rig.pixel_aspect))
-                .advice(format!("Give the detections' own, {}", store.pixel_aspect())),
-        ));
-    }
     let mechanism = Mechanism::new(rig, 0.3);
     let habits = Habits::unknown(&mechanism, 0.05);
     let n = mechanism.nodes;
     let mut out = Output {
-        pixel_aspect: rig.pixel_aspect,
         partly: Partly::default(),
         returns: Returns::new(n),
         summary: TrackSummary {
@@ -154,7 +146,6 @@ fn start_frame(store: &DetectionStore, rig: &Rig) -> usize {
 }
 
 struct Output {
-    pixel_aspect: PixelAspect,
     partly: Partly,
     returns: Returns,
     summary: TrackSummary,
@@ -178,7 +169,6 @@ impl Output {
 
     fn hand_out(&mut self, end: bool, sink: &mut Sink<'_>) -> Result<()> {
         while let Some((stamp, mut row)) = self.partly.pop(end) {
-            row.iter_mut().for_each(|o| *o = o.to_recorded(self.pixel_aspect));
             self.returns.mark(&mut row);
             let s = &mut self.summary;
             s.frames += 1;

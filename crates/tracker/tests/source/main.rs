@@ -3,7 +3,6 @@
 
 mod film;
 
-mod aspect;
 mod cine;
 mod damage;
 mod ffmpeg;
@@ -14,3 +13,4 @@ mod mraw;
 mod opencv;
 mod pixels;
 mod program;
+mod times;

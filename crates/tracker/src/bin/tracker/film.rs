@@ -59,8 +59,8 @@ pub struct Args {
     #[arg(long, value_name = "PRESET")]
     speed: Option<String>,
     /// H.264: no colour planes; smaller, but not every player shows it.
-    #[arg(long)]
-    gray: bool,
+    #[arg(long, alias = "gray")]
+    gray_only: bool,
     /// Bits per pixel of an .mraw: 8, 10, 12 or 16.
     #[arg(long)]
     bits: Option<u32>,
@@ -86,7 +86,7 @@ impl Args {
         let mut scene = match (&self.scene, &self.preset) {
             (Some(path), _) => Scene::read(path)?,
             (None, Some(name)) => preset(name, self.seed.unwrap_or(0))?,
-            (None, None) => anyhow::bail!("give a scene or --preset"),
+            (None, None) => anyhow::bail!("a scene is missing. Give one, or --preset"),
         };
         scene.seed = self.seed.unwrap_or(scene.seed);
         scene.frames = self.frames.unwrap_or(scene.frames);
@@ -136,7 +136,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         codec: args.codec(),
         quality: args.quality,
         speed: args.speed.clone(),
-        gray_only: args.gray,
+        gray_only: args.gray_only,
         bits: args.bits,
         truth: args.truth.clone(),
     };

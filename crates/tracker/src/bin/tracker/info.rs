@@ -6,9 +6,10 @@ use std::process::ExitCode;
 use rayon::prelude::*;
 use serde_json::{Value, json};
 use tracker::brightest::brightest;
-use tracker::frame::{Ending, Frame, FrameSource, PixelFormat, RateOrigin, SourceInfo};
-use tracker::pixel_aspect::AspectOrigin;
+use tracker::frame::{Ending, Frame, FrameSource, PixelFormat};
+use tracker::pipeline;
 use tracker::source::{OpenOptions, open};
+use tracker::timing::{Steps, Timing, notes, rate_words, times_words};
 
 use crate::reading::DecodeArgs;
 use crate::words::CommandLine;
@@ -38,12 +39,22 @@ pub struct Args {
 
 /// What reading some or all frames told.
 struct Seen {
-    times_s: Vec<f64>,
+    /// Time stamps of the first frames.
+    first: Vec<i64>,
+    /// Time stamps of all frames that were looked at, and whether these are all there are.
+    steps: Steps,
+    is_whole: bool,
     counted: Option<(u64, u64)>,
     /// The greatest sample of all frames.
     brightest: Option<u16>,
     ending: Option<Ending>,
-    last_s: Option<f64>,
+}
+
+/// What the recording's times are.
+struct Times {
+    timing: Timing,
+    first_s: Vec<f64>,
+    duration_s: Option<f64>,
 }
 
 /// Runs the subcommand.
@@ -51,29 +62,59 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let options = args.decode.options(args.fps, OpenOptions::default().threads);
     let mut source = open(&args.input, &options)?;
     let seen = look(&mut *source, args.count)?;
-    let text = if args.json { format!("{:#}\n", as_json(&*source, &seen)) } else { as_text(&*source, &seen) };
+    let times = times(&*source, &seen)?;
+    let text = if args.json {
+        format!("{:#}\n", as_json(&*source, &seen, &times))
+    } else {
+        as_text(&*source, &seen, &times)
+    };
     std::io::stdout().lock().write_all(text.as_bytes())?;
     let early = matches!(seen.ending, Some(Ending::Early { .. }));
     Ok(ExitCode::from(u8::from(early)))
 }
 
+/// Decides what the times are by all stamps that were seen.
+fn times(source: &dyn FrameSource, seen: &Seen) -> anyhow::Result<Times> {
+    let info = source.info();
+    let (timing, clock) = pipeline::times(info, &seen.steps, 0)?;
+    let first_s: Vec<f64> = seen.first.iter().zip(0..).map(|(&t, i)| clock.seconds(i, t)).collect();
+    let last = seen.steps.len().checked_sub(1).filter(|_| seen.is_whole);
+    let span =
+        last.zip(first_s.first()).map(|(place, first)| clock.seconds(place, seen.steps.last()) - first);
+    let duration_s = match (span, timing.rate_hz) {
+        (Some(span), rate) => Some(span + rate.map_or(0.0, |r| 1.0 / r)),
+        (None, rate) => info.declared_frames.zip(rate).map(|(n, r)| n as f64 / r),
+    };
+    Ok(Times { timing, first_s, duration_s })
+}
+
 fn look(source: &mut dyn FrameSource, count: bool) -> anyhow::Result<Seen> {
-    let time_base = source.info().time_base;
-    let mut seen = Seen { times_s: Vec::new(), counted: None, brightest: None, ending: None, last_s: None };
+    let mut seen = Seen {
+        first: Vec::new(),
+        steps: Steps::default(),
+        is_whole: false,
+        counted: None,
+        brightest: None,
+        ending: None,
+    };
+    let surveyed = if count { None } else { pipeline::survey(source)? };
+    let stamped = surveyed.is_some();
+    (seen.steps, seen.is_whole) = surveyed.unwrap_or_default();
     let (mut frames, mut lost) = (0u64, 0u64);
     let mut batch: Vec<Frame> = Vec::new();
     let mut bytes = 0;
-    while count || seen.times_s.len() < FIRST {
+    while count || seen.first.len() < FIRST {
         let Some(frame) = source.next_frame()? else {
             seen.ending = Some(source.ending());
             break;
         };
         frames += 1;
         lost += u64::from(frame.plane.is_none());
-        let time = time_base.seconds(frame.ticks);
-        seen.last_s = Some(time);
-        if seen.times_s.len() < FIRST {
-            seen.times_s.push(time);
+        if !stamped {
+            seen.steps.push(frame.ticks);
+        }
+        if seen.first.len() < FIRST {
+            seen.first.push(frame.ticks);
         }
         bytes += frame.plane.as_ref().map_or(0, |p| p.bytes().len());
         batch.push(frame);
@@ -84,6 +125,7 @@ fn look(source: &mut dyn FrameSource, count: bool) -> anyhow::Result<Seen> {
     }
     if seen.ending.is_some() {
         seen.counted = Some((frames, lost));
+        seen.is_whole = true;
         seen.brightest = seen.brightest.max(brightest_of(&mut batch));
     }
     Ok(seen)
@@ -103,33 +145,6 @@ fn format_name(format: PixelFormat) -> &'static str {
     }
 }
 
-fn origin_words(origin: RateOrigin) -> &'static str {
-    match origin {
-        RateOrigin::User => "as given with --fps",
-        RateOrigin::TimeStamps => "from the frames' time stamps",
-        RateOrigin::CameraHeader => "from the camera's header",
-        RateOrigin::Container => "as the container says, which may be a player's speed and not the camera's",
-        RateOrigin::Unknown => "unknown",
-    }
-}
-
-fn aspect_words(info: &SourceInfo) -> String {
-    match (info.pixel_aspect.is_square(), info.pixel_aspect_origin) {
-        (true, AspectOrigin::Recording) => "1:1, square".to_owned(),
-        (_, origin) => format!("{}, {}", info.pixel_aspect.words(), origin.words()),
-    }
-}
-
-/// Length in s: of what was counted, else of what is declared.
-fn duration_s(source: &dyn FrameSource, seen: &Seen) -> Option<f64> {
-    let rate = source.info().rate_hz.filter(|r| *r > 0.0);
-    if seen.counted.is_some() {
-        let span = seen.last_s? - seen.times_s.first()?;
-        return Some(span + rate.map_or(0.0, |r| 1.0 / r));
-    }
-    Some(source.info().declared_frames? as f64 / rate?)
-}
-
 fn ending_words(ending: &Ending) -> String {
     match ending {
         Ending::Complete => "complete".to_owned(),
@@ -140,7 +155,7 @@ fn ending_words(ending: &Ending) -> String {
     }
 }
 
-fn as_text(source: &dyn FrameSource, seen: &Seen) -> String {
+fn as_text(source: &dyn FrameSource, seen: &Seen, times: &Times) -> String {
     let info = source.info();
     let mut rows: Vec<(String, String)> = Vec::new();
     let mut row = |word: &str, value: String| rows.push((word.to_owned(), value));
@@ -148,12 +163,14 @@ fn as_text(source: &dyn FrameSource, seen: &Seen) -> String {
     row("container", info.container.clone());
     row("codec", info.codec.clone());
     row("size", format!("{} x {} px", info.width, info.height));
-    row("pixel aspect", aspect_words(info));
     row("pixels", format!("{}, {} bit", format_name(info.format), info.depth_bits));
     if let Some(from) = &info.converted_from {
         row("converted", format!("from {from}, once for each frame"));
     }
     row("declared", info.declared_frames.map_or("not said".to_owned(), |n| format!("{n} frames")));
+    if let Some(frames) = packets(seen) {
+        row("frames", format!("{frames}, by the packets in the file"));
+    }
     if let Some((frames, lost)) = seen.counted {
         let lost = if lost > 0 { format!(", of these {lost} cannot be decoded") } else { String::new() };
         row("decoded", format!("{frames} frames{lost}"));
@@ -161,13 +178,19 @@ fn as_text(source: &dyn FrameSource, seen: &Seen) -> String {
     if let Some(brightest) = seen.brightest {
         row("brightest", format!("{brightest} of {}", (1u32 << info.depth_bits) - 1));
     }
-    let rate = info.rate_hz.map_or(String::new(), |r| format!("{r} frames per second, "));
-    row("rate", format!("{rate}{}", origin_words(info.rate_origin)));
+    let (timing, words) = (&times.timing, CommandLine::of("info"));
+    row("rate", words.say(&rate_words(timing)));
+    let of = if seen.is_whole {
+        String::new()
+    } else {
+        format!("; by the first {} frames, --count looks at all", seen.steps.len())
+    };
+    row("times", format!("{}{of}", times_words(timing)));
     row("time base", format!("{}/{} s", info.time_base.numerator, info.time_base.denominator));
-    if let Some(duration) = duration_s(source, seen) {
+    if let Some(duration) = times.duration_s {
         row("duration", format!("{duration:.9} s"));
     }
-    let stamps: Vec<String> = seen.times_s.iter().map(|t| format!("{t:.9}")).collect();
+    let stamps: Vec<String> = times.first_s.iter().map(|t| format!("{t:.9}")).collect();
     row("first times", format!("{} s", stamps.join(", ")));
     if let Some(bytes) = info.size_bytes {
         row("bytes", bytes.to_string());
@@ -178,13 +201,21 @@ fn as_text(source: &dyn FrameSource, seen: &Seen) -> String {
     if let Some(ending) = &seen.ending {
         row("end", ending_words(ending));
     }
+    for note in &notes(timing) {
+        row("note", words.say(note));
+    }
     for warning in &info.warnings {
-        row("warning", CommandLine::of("info").say(warning));
+        row("warning", words.say(warning));
     }
     rows.iter().map(|(word, value)| format!("{word:<14} {value}\n")).collect()
 }
 
-fn as_json(source: &dyn FrameSource, seen: &Seen) -> Value {
+/// Frames that there are without decoding them.
+fn packets(seen: &Seen) -> Option<u64> {
+    (seen.is_whole && seen.counted.is_none()).then(|| seen.steps.len())
+}
+
+fn as_json(source: &dyn FrameSource, seen: &Seen, times: &Times) -> Value {
     let info = source.info();
     let details: serde_json::Map<String, Value> =
         info.details.iter().map(|(k, v)| (k.clone(), Value::from(v.clone()))).collect();
@@ -200,8 +231,6 @@ fn as_json(source: &dyn FrameSource, seen: &Seen) -> Value {
         "codec": info.codec,
         "width_px": info.width,
         "height_px": info.height,
-        "pixel_aspect": info.pixel_aspect,
-        "pixel_aspect_origin": info.pixel_aspect_origin,
         "pixel_format": format_name(info.format),
         "depth_bits": info.depth_bits,
         "converted_from": info.converted_from,
@@ -209,11 +238,13 @@ fn as_json(source: &dyn FrameSource, seen: &Seen) -> Value {
         "decoded_frames": seen.counted.map(|(frames, lost)| frames - lost),
         "undecodable_frames": seen.counted.map(|(_, lost)| lost),
         "brightest": seen.brightest,
-        "rate_hz": info.rate_hz,
-        "rate_origin": info.rate_origin,
+        "frames": packets(seen).or(seen.counted.map(|c| c.0)),
+        "rate_hz": times.timing.rate_hz,
+        "rate_origin": times.timing.rate_origin,
+        "time": times.timing,
         "time_base": {"numerator": info.time_base.numerator, "denominator": info.time_base.denominator},
-        "duration_s": duration_s(source, seen),
-        "first_times_s": seen.times_s,
+        "duration_s": times.duration_s,
+        "first_times_s": times.first_s,
         "size_bytes": info.size_bytes,
         "details": details,
         "warnings": info.warnings.iter().map(|w| CommandLine::of("info").say(w)).collect::<Vec<_>>(),

@@ -9,6 +9,7 @@ mod film;
 mod info;
 mod overlay;
 mod reading;
+mod refusal;
 mod score;
 mod setup;
 mod track;
@@ -21,7 +22,14 @@ use clap::Parser;
 use tracker::error::Error;
 
 fn main() -> ExitCode {
-    let cli = args::Cli::parse();
+    let cli = match args::Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => {
+            let Some(line) = refusal::line(&error) else { error.exit() };
+            eprintln!("tracker: {line}");
+            return ExitCode::from(2);
+        }
+    };
     let front = words::CommandLine::of(cli.subcommand());
     match cli.run() {
         Ok(status) => status,

@@ -182,12 +182,7 @@ impl<const N: usize> Job for Equations<'_, N> {
                 let rho = (dx * dx + dy * dy).max(least).sqrt();
                 let inverse = one.div(rho);
                 let (c, s) = (dx * inverse, dy * inverse);
-                let direction = if model.table.square {
-                    c.abs().min(s.abs())
-                } else {
-                    (s.abs() - c.abs() + one) * all(0.5)
-                };
-                found.spot = model.table.spot(token, r - rho, direction);
+                found.spot = model.table.spot(token, r - rho, c.abs().min(s.abs()));
                 found.normal = [c.array(), s.array()];
             }
         };

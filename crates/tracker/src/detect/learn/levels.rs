@@ -15,10 +15,22 @@ use crate::detect::settings::{DetectSettings, Polarity, Threshold};
 use crate::detect::side::Side;
 use crate::error::{Error, Fault, Place, Result};
 use crate::frame::Frame;
-use crate::message::{INFO, Setting};
+use crate::message::{INFO, Message, Setting};
 
 /// Frames that are looked at; more would change nothing.
 const MOST_FRAMES: usize = 12;
+
+/// What to try where no marker is found: what is not given yet, or other values of what is.
+fn other_than(settings: &DetectSettings) -> Message {
+    let lit = ", or check that markers are lit; " + INFO + " says which container and depth was read";
+    let given = match (settings.threshold, settings.polarity) {
+        (Threshold::Auto, Polarity::Auto) => "Give " + Setting::Threshold + " or " + Setting::Polarity,
+        (Threshold::Auto, _) => "Give " + Setting::Threshold + " or the other " + Setting::Polarity,
+        (_, Polarity::Auto) => "Give another " + Setting::Threshold + " or " + Setting::Polarity,
+        _ => "Give another " + Setting::Threshold + " or the other " + Setting::Polarity,
+    };
+    given + lit
+}
 
 impl Levels {
     /// Learns from frames spread over a recording. What the settings give is taken from them.
@@ -90,18 +102,14 @@ impl Levels {
             Polarity::Bright => &[Side::Bright],
             Polarity::Dark => &[Side::Dark],
         };
-        let pixel_sides = settings.pixel_aspect.sides();
-        let field =
-            candidates::Field { images: &images, width, height, pixel_sides, background: &background, read };
+        let field = candidates::Field { images: &images, width, height, background: &background, read };
         let fixed = match settings.threshold {
             Threshold::Auto => None,
             Threshold::Raw(t) => Some(t),
         };
         let Some(best) = candidates::best(&field, sides, fixed) else {
-            return Err(Error::Detect(
-                Fault::new("recording", "nothing like a marker stands out from the background")
-                    .advice("Give a threshold and a polarity, or check that markers are lit"),
-            ));
+            let what = "nothing like a marker stands out from the background";
+            return Err(Error::Detect(Fault::new("recording", what).advice(other_than(settings))));
         };
 
         // Step 4: saturation, limits, typical marker.
@@ -113,7 +121,7 @@ impl Levels {
         let area_px = [settings.min_area_px.unwrap_or(low), settings.max_area_px.unwrap_or(high)];
         if !(area_px[0] >= 0.0 && area_px[0] <= area_px[1]) {
             return Err(Error::Detect(
-                Fault::new("area limits", format!("least {} px, greatest {} px", area_px[0], area_px[1]))
+                Fault::of(Setting::MinAreaPx, format!("least {} px, greatest {} px", area_px[0], area_px[1]))
                     .advice("Give a least area below the greatest"),
             ));
         }
@@ -124,14 +132,13 @@ impl Levels {
             .filter(|b| b.area >= area_px[0] && b.area <= area_px[1])
             .map(|b| Sample { pixels: planes[b.image], blob: b.blob })
             .collect();
-        let (marker, noise) = match marker::learn(&samples, best.side, noise, saturation, pixel_sides) {
+        let (marker, noise) = match marker::learn(&samples, best.side, noise, saturation) {
             Some((marker, noise)) => (Some(marker), noise),
             None => (None, noise),
         };
         Ok(Self {
             side: best.side,
             image_px: [known.width, known.height],
-            pixel_aspect: settings.pixel_aspect,
             depth_bits: known.depth_bits,
             background,
             height: best.height,

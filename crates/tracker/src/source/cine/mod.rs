@@ -11,7 +11,7 @@ use memmap2::Mmap;
 use super::ffmpeg::FfmpegSource;
 use super::{Input, OpenOptions};
 use crate::error::{Error, Fault, Result};
-use crate::frame::{Ending, Frame, FrameSource, RateOrigin, SourceInfo, TimeBase};
+use crate::frame::{Ending, Frame, FrameSource, RateClaims, RateOrigin, SourceInfo, TimeBase};
 use crate::message::Setting;
 use header::{Header, TICKS_PER_S};
 
@@ -43,6 +43,8 @@ impl CineSource {
         drop(map);
         let inner = FfmpegSource::open(name, input, options)?;
         let mut info = inner.info().clone();
+        // The header and the stamps say what FFmpeg's demuxer can only guess.
+        info.claims = RateClaims::default();
         info.container = "Phantom CINE".into();
         info.declared_frames = Some(header.frames);
         let stamps = match (options.fps, header.stamps()) {
@@ -138,6 +140,10 @@ impl FrameSource for CineSource {
             }
             (ending, _) => ending,
         }
+    }
+
+    fn stamps(&mut self) -> Result<Option<(Vec<i64>, bool)>> {
+        Ok(self.stamps.as_ref().map(|(ticks, _)| (ticks.clone(), true)))
     }
 
     fn sample(&mut self, count: usize) -> Result<Vec<Frame>> {

@@ -3,10 +3,12 @@
 //! Owns: [`Demuxer`], [`Packet`]. Must not: decode, or decide what a lost packet means.
 
 use std::ffi::{CStr, CString};
+use std::path::Path;
 use std::ptr;
 
 use ffmpeg_next::ffi;
 
+use super::boxes::Boxes;
 use super::message;
 use crate::error::{Error, Fault, Result};
 
@@ -17,6 +19,7 @@ const PLAYLISTS: [&str; 5] = ["hls", "concat", "dash", "image2", "imf"];
 pub(super) struct Demuxer {
     context: *mut ffi::AVFormatContext,
     stream: usize,
+    boxes: Boxes,
 }
 
 // SAFETY: the context is owned by this value alone and libavformat binds it to no thread.
@@ -48,6 +51,11 @@ impl Demuxer {
             // SAFETY: all strings are valid and zero-terminated; av_dict_set copies them.
             unsafe { ffi::av_dict_set(&mut options, c"protocol_whitelist".as_ptr(), list.as_ptr(), 0) };
         }
+        let boxes = url.strip_prefix("file:").map_or_else(Boxes::default, |p| Boxes::of(Path::new(p)));
+        if boxes.edits_change_time {
+            // SAFETY: as above. Only the reader of MP4 and QuickTime knows it.
+            unsafe { ffi::av_dict_set(&mut options, c"ignore_editlist".as_ptr(), c"1".as_ptr(), 0) };
+        }
         let mut context: *mut ffi::AVFormatContext = ptr::null_mut();
         // SAFETY: `context` is null, so it is allocated; on failure it is freed and set to null by the call.
         let code =
@@ -57,7 +65,7 @@ impl Demuxer {
         if code < 0 {
             return Err(failed(code));
         }
-        let mut demuxer = Self { context, stream: 0 };
+        let mut demuxer = Self { context, stream: 0, boxes };
         let container = demuxer.container();
         if PLAYLISTS.iter().any(|p| container.split(',').any(|c| c == *p)) {
             return Err(Error::Source(
@@ -109,16 +117,6 @@ impl Demuxer {
         unsafe { &*self.stream().codecpar }
     }
 
-    /// Width to height of a pixel: the container's, else the codec's; and the codec's own. 0 is not said.
-    pub(super) fn pixel_aspect(&self) -> [ffi::AVRational; 2] {
-        // SAFETY: the context is open and the stream one of its own; without a frame the codec's parameters are asked.
-        let told = unsafe {
-            let stream = *(*self.context).streams.add(self.stream);
-            ffi::av_guess_sample_aspect_ratio(self.context, stream, ptr::null_mut())
-        };
-        [told, self.parameters().sample_aspect_ratio]
-    }
-
     /// Short names of the container, comma-separated.
     pub(super) fn container(&self) -> String {
         // SAFETY: an open context has an input format, whose name is a static string.
@@ -127,8 +125,47 @@ impl Demuxer {
 
     /// The rate that the container claims, frames per second.
     pub(super) fn rate(&self) -> Option<ffi::AVRational> {
+        self.rates().next()
+    }
+
+    /// Rates that the container gives, frames per second, the likeliest first.
+    pub(super) fn rates(&self) -> impl Iterator<Item = ffi::AVRational> + use<> {
         let stream = self.stream();
-        [stream.avg_frame_rate, stream.r_frame_rate].into_iter().find(|r| r.num > 0 && r.den > 0)
+        [stream.avg_frame_rate, stream.r_frame_rate].into_iter().filter(|r| r.num > 0 && r.den > 0)
+    }
+
+    /// What the file's boxes say, if it has such.
+    pub(super) fn boxes(&self) -> &Boxes {
+        &self.boxes
+    }
+
+    /// The value of a metadata key of the file or of the stream.
+    pub(super) fn tag(&self, key: &CStr) -> Option<String> {
+        // SAFETY: the context is open; null dictionaries are allowed.
+        let of_file = unsafe { ffi::av_dict_get((*self.context).metadata, key.as_ptr(), ptr::null(), 0) };
+        // SAFETY: the same, of the stream.
+        let of_stream = unsafe { ffi::av_dict_get(self.stream().metadata, key.as_ptr(), ptr::null(), 0) };
+        let entry = [of_file, of_stream].into_iter().find(|e| !e.is_null())?;
+        // SAFETY: an entry that was found has a zero-terminated value, which lives as long as the context.
+        Some(unsafe { CStr::from_ptr((*entry).value) }.to_string_lossy().into_owned())
+    }
+
+    /// Frames of the stream by its index, and how many of them an edit list hides; `None` without an index that is
+    /// complete from the start.
+    pub(super) fn indexed(&self) -> Option<(u64, u64)> {
+        if self.stream().nb_frames <= 0 || !self.container().contains("mp4") {
+            return None;
+        }
+        let stream: *const ffi::AVStream = self.stream();
+        // SAFETY: the stream is valid.
+        let count = unsafe { ffi::avformat_index_get_entries_count(stream) };
+        let hidden = (0..count).filter(|&i| {
+            // SAFETY: the stream is valid and only read; the index is below the count, and null is checked.
+            let entry = unsafe { ffi::avformat_index_get_entry(stream.cast_mut(), i).as_ref() };
+            entry.is_some_and(|e| e.flags() & ffi::AVINDEX_DISCARD_FRAME != 0)
+        });
+        let hidden = hidden.count() as u64;
+        u64::try_from(count).ok().filter(|n| *n > 0).map(|n| (n, hidden))
     }
 
     /// Length of the whole recording by the container, in ticks of the stream's time base.

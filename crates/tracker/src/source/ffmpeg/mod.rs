@@ -4,6 +4,8 @@
 //! a frame that could not be decoded held: it comes without a plane, and so do frames predicted from it, up to
 //! the next key frame.
 
+mod boxes;
+mod claims;
 mod decode;
 mod demux;
 mod describe;
@@ -22,8 +24,7 @@ use ffmpeg_next::ffi;
 use decode::{Decoder, Picture, Received};
 use demux::{Demuxer, Packet, Read};
 use describe::{describe, step};
-use layout::Layout;
-pub(crate) use layout::Orientation;
+use layout::{Layout, Orientation};
 use order::{Order, Sent};
 use stamps::Stamps;
 pub(crate) use stamps::display_times;
@@ -94,6 +95,10 @@ pub struct FfmpegSource {
 
 /// How far decoding order and display order can differ (H.264's and HEVC's limit of 16 frames).
 const REORDER: i64 = 16;
+
+/// Packets, and bytes of them, whose time stamps are looked at without decoding.
+const SURVEYED_FRAMES: usize = 20_000;
+const SURVEYED_BYTES: u64 = 256 << 20;
 
 impl FfmpegSource {
     /// Opens what `input` stands for; `name` is the user's, for messages.
@@ -171,11 +176,6 @@ impl FfmpegSource {
             user_clock: options.fps.is_some(),
             ending: Ending::Complete,
         })
-    }
-
-    /// How its pictures are turned.
-    pub(crate) fn orientation(&self) -> Orientation {
-        self.orientation
     }
 
     /// Whether the end was reached.
@@ -345,6 +345,15 @@ impl FrameSource for FfmpegSource {
 
     fn ending(&self) -> Ending {
         self.ending.clone()
+    }
+
+    fn stamps(&mut self) -> Result<Option<(Vec<i64>, bool)>> {
+        if !self.can_reopen || self.user_clock {
+            return Ok(None);
+        }
+        let input = Input::File(self.url.clone());
+        let found = display_times(&self.info.name, &input, SURVEYED_FRAMES, SURVEYED_BYTES)?;
+        Ok(Some(found).filter(|(times, _)| !times.is_empty()))
     }
 
     fn sample(&mut self, count: usize) -> Result<Vec<Frame>> {

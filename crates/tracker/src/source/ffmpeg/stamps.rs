@@ -80,26 +80,49 @@ impl Stamps {
     }
 }
 
-/// Display times of all frames of a file in ticks, rising, without decoding; for a decoder that does not tell them.
+/// Packets by which decoding order and display order differ at most.
+const REORDER: usize = 16;
+
+/// Display times of the frames of a file in ticks, in order, without decoding, and whether these are all. Reading ends
+/// after `most` packets or `most_bytes` of them. Empty if the stream has no times.
 ///
 /// # Errors
 /// [`Error::Source`] if the file cannot be read.
-pub(crate) fn display_times(name: &str, input: &Input) -> Result<Vec<i64>> {
+pub(crate) fn display_times(
+    name: &str,
+    input: &Input,
+    most: usize,
+    most_bytes: u64,
+) -> Result<(Vec<i64>, bool)> {
     let (Input::File(url) | Input::Pipe(url) | Input::Address(url)) = input;
     let mut demuxer = Demuxer::open(url, name, Some("file"))?;
     let mut packet = Packet::new(name)?;
     let mut times = Vec::new();
     let mut unstamped = false;
+    let mut is_whole = true;
+    let mut bytes = 0u64;
     while let Read::Packet = demuxer.read(&mut packet) {
+        let fields = packet.get();
+        bytes = bytes.saturating_add(u64::try_from(fields.size).unwrap_or(0));
         if packet.has(ffi::AV_PKT_FLAG_DISCARD) {
             continue;
         }
-        let fields = packet.get();
+        if times.len() == most || bytes > most_bytes {
+            is_whole = false;
+            break;
+        }
         unstamped |= fields.pts == ffi::AV_NOPTS_VALUE;
         times.push((fields.pts, fields.dts));
     }
     // Decoding times rise as display times do, if there are no others.
     let mut times: Vec<i64> = times.into_iter().map(|(p, d)| if unstamped { d } else { p }).collect();
+    if times.contains(&ffi::AV_NOPTS_VALUE) {
+        return Ok((Vec::new(), false));
+    }
     times.sort_unstable();
-    Ok(times)
+    if !is_whole {
+        // Frames shown before the last of these may still be to come.
+        times.truncate(times.len().saturating_sub(REORDER));
+    }
+    Ok((times, is_whole))
 }

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 use super::{OpenOptions, clock};
 use crate::error::{Error, Fault, Result};
-use crate::frame::{Ending, Frame, FrameSource, PixelFormat, RateOrigin, SourceInfo, TimeBase};
+use crate::frame::{Ending, Frame, FrameSource, PixelFormat, RateClaims, RateOrigin, SourceInfo, TimeBase};
 use crate::message::{Message, Setting};
 use picture::Picture;
 pub use stack::StackSource;
@@ -92,21 +92,19 @@ impl SequenceSource {
         let (time_base, rate_hz, rate_origin) = rate(options, &mut warnings)?;
         let ending = path.extension().map_or(String::new(), |e| e.to_string_lossy().to_lowercase());
         let size_bytes = files.iter().flatten().map(|f| std::fs::metadata(f).map_or(0, |m| m.len())).sum();
-        let (pixel_aspect, pixel_aspect_origin) = options.aspect(first.aspect(&mut warnings));
         let info = SourceInfo {
             name: name.to_owned(),
             container: "pictures".into(),
             codec: ending,
             width: first.width,
             height: first.height,
-            pixel_aspect,
-            pixel_aspect_origin,
             format: format(first.depth_bits),
             depth_bits: first.depth_bits,
             declared_frames: Some(files.len() as u64),
             time_base,
             rate_hz,
             rate_origin,
+            claims: RateClaims::default(),
             converted_from: first.converted_from,
             size_bytes: Some(size_bytes),
             details: Vec::new(),

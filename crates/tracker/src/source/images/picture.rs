@@ -10,12 +10,7 @@ use opencv::core::{CV_8U, CV_16U};
 use opencv::imgcodecs;
 use opencv::prelude::{MatTraitConst, MatTraitConstManual};
 use tiff::ColorType;
-use tiff::decoder::ifd::Value;
 use tiff::decoder::{Decoder, DecodingResult};
-use tiff::tags::Tag;
-
-use crate::message::{Message, Setting};
-use crate::pixel_aspect::PixelAspect;
 
 /// A decoded picture.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -26,39 +21,10 @@ pub struct Picture {
     pub height: u32,
     /// 8, or 16 for little-endian pairs.
     pub depth_bits: u32,
-    /// What it says of its pixels.
-    pub pixel: Option<PixelSize>,
     /// Samples, row by row without gaps.
     pub samples: Vec<u8>,
     /// What the samples were before they were made brightness, if they were anything else.
     pub converted_from: Option<String>,
-}
-
-/// Width and height of a pixel, in units of their own.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct PixelSize {
-    /// Width and height.
-    pub sides: [u64; 2],
-    /// Whether they may as well be the other way round.
-    pub doubtful: bool,
-}
-
-impl Picture {
-    /// Width to height of a pixel by what it says, where that can be believed.
-    pub(super) fn aspect(&self, warnings: &mut Vec<Message>) -> PixelAspect {
-        let Some(PixelSize { sides: [w, h], doubtful }) = self.pixel else { return PixelAspect::SQUARE };
-        let aspect = PixelAspect::said(w, h, warnings);
-        if !doubtful || aspect.is_square() {
-            return aspect;
-        }
-        let said = format!(
-            "it says without a unit that its pixels are {aspect} (width:height), and FFmpeg writes that the other way round \
-             ({}): they are taken for square. Give what is true with ",
-            aspect.turned()
-        );
-        warnings.push(Message::from(said) + Setting::PixelAspect);
-        PixelAspect::SQUARE
-    }
 }
 
 /// Reads a picture file; an error is a clause without a full stop.
@@ -102,8 +68,7 @@ pub fn read(path: &Path) -> Result<Picture, String> {
     let size = |n: i32| u32::try_from(n).map_err(|e| e.to_string());
     // OpenCV's 16-bit samples are in this machine's order; all machines that we are built for are little-endian.
     let samples = gray.data_bytes().map_err(|e| short(&e.message))?.to_vec();
-    let (width, height) = (size(gray.cols())?, size(gray.rows())?);
-    Ok(Picture { width, height, depth_bits, pixel: png_pixel(&mut file), samples, converted_from })
+    Ok(Picture { width: size(gray.cols())?, height: size(gray.rows())?, depth_bits, samples, converted_from })
 }
 
 /// Reads the page at which a TIFF decoder stands; an error is a clause without a full stop.
@@ -135,50 +100,7 @@ pub fn page<R: Read + Seek>(decoder: &mut Decoder<R>) -> Result<Picture, String>
         ),
         _ => return Err("it is cut, or its samples are not 8 or 16 bit".to_owned()),
     };
-    let pixel = tiff_pixel(decoder);
-    Ok(Picture { width, height, depth_bits, pixel, samples, converted_from })
-}
-
-/// Width and height of a pixel by the page's resolutions, which are pixels for one length.
-fn tiff_pixel<R: Read + Seek>(decoder: &mut Decoder<R>) -> Option<PixelSize> {
-    let mut resolution = |tag| match decoder.find_tag(tag) {
-        Ok(Some(Value::Rational(n, d))) => Some([u64::from(n), u64::from(d)]),
-        _ => None,
-    };
-    let ([xn, xd], [yn, yd]) = (resolution(Tag::XResolution)?, resolution(Tag::YResolution)?);
-    // Products of 32 bits fit into 64.
-    Some(PixelSize { sides: [yn * xd, xn * yd], doubtful: false })
-}
-
-/// Chunks of a PNG file before its pixels that are looked at, at most.
-const CHUNKS: usize = 64;
-
-/// Width and height of a pixel by a PNG file's `pHYs`, which has pixels for one length and then its unit. Without one only
-/// their ratio counts, for which FFmpeg writes width and height of a pixel.
-fn png_pixel(file: &mut File) -> Option<PixelSize> {
-    let mut start = [0; 8];
-    file.seek(SeekFrom::Start(0)).ok()?;
-    file.read_exact(&mut start).ok()?;
-    if &start != b"\x89PNG\r\n\x1a\n" {
-        return None;
-    }
-    let number = |b: &[u8]| b.first_chunk().map_or(0, |b| u32::from_be_bytes(*b));
-    for _ in 0..CHUNKS {
-        let mut head = [0; 8];
-        file.read_exact(&mut head).ok()?;
-        match &head[4..] {
-            b"pHYs" => {
-                let mut value = [0; 9];
-                file.read_exact(&mut value).ok()?;
-                let sides = [number(&value[4..]).into(), number(&value).into()];
-                return Some(PixelSize { sides, doubtful: value[8] == 0 });
-            }
-            b"IDAT" => return None,
-            // A checksum follows each chunk.
-            _ => file.seek(SeekFrom::Current(i64::from(number(&head)) + 4)).ok()?,
-        };
-    }
-    None
+    Ok(Picture { width, height, depth_bits, samples, converted_from })
 }
 
 /// Red, green and blue weighted as by OpenCV (ITU-R BT.601, over 2^14).

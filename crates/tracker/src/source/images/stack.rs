@@ -8,7 +8,7 @@ use tiff::decoder::Decoder;
 use super::picture::{self, Picture};
 use super::{format, frame, rate};
 use crate::error::{Error, Fault, Result};
-use crate::frame::{Ending, Frame, FrameSource, SourceInfo};
+use crate::frame::{Ending, Frame, FrameSource, RateClaims, SourceInfo};
 use crate::source::OpenOptions;
 
 /// A multi-page TIFF.
@@ -33,21 +33,19 @@ impl StackSource {
         })?;
         let mut warnings = Vec::new();
         let (time_base, rate_hz, rate_origin) = rate(options, &mut warnings)?;
-        let (pixel_aspect, pixel_aspect_origin) = options.aspect(first.aspect(&mut warnings));
         let info = SourceInfo {
             name: name.to_owned(),
             container: "TIFF".into(),
             codec: format!("{} bit pages", first.depth_bits),
             width: first.width,
             height: first.height,
-            pixel_aspect,
-            pixel_aspect_origin,
             format: format(first.depth_bits),
             depth_bits: first.depth_bits,
             declared_frames: None,
             time_base,
             rate_hz,
             rate_origin,
+            claims: RateClaims::default(),
             converted_from: first.converted_from,
             size_bytes: std::fs::metadata(name).ok().map(|m| m.len()),
             details: Vec::new(),

@@ -2,11 +2,11 @@
 //!
 //! Owns: [`Header`], [`Packing`]. Must not: open files.
 
-use super::super::clock;
 use super::{cih, cihx};
 use crate::error::{Error, Fault, Place, Result};
 use crate::frame::{PixelFormat, TimeBase};
 use crate::message::Message;
+use crate::timing::rational;
 
 /// Where the significant bits of a sample lie in its 16 bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -235,7 +235,7 @@ impl Header {
     /// Seconds per saved frame: save step over record rate. `None` if the header gives no rate.
     pub fn time_base(&self) -> Option<TimeBase> {
         let rate = self.record_rate_hz.filter(|r| r.is_finite() && *r > 0.0 && *r <= 1e9)?;
-        let (p, q) = clock::rational(rate);
+        let (p, q) = rational(rate);
         Some(TimeBase { numerator: q.checked_mul(self.save_step.max(1))?, denominator: p })
     }
 

@@ -17,9 +17,10 @@ use memmap2::{Advice, Mmap, MmapOptions};
 
 use super::{OpenOptions, clock};
 use crate::error::{Error, Fault, Result};
-use crate::frame::{Bytes, Ending, Frame, FrameSource, PixelFormat, RateOrigin, SourceInfo, TimeBase};
+use crate::frame::{
+    Bytes, Ending, Frame, FrameSource, PixelFormat, RateClaims, RateOrigin, SourceInfo, TimeBase,
+};
 use crate::message::Setting;
-use crate::pixel_aspect::PixelAspect;
 use header::{Header, Packing};
 
 /// Bytes mapped at a time: what was read is given back, so memory does not grow with the recording.
@@ -237,7 +238,6 @@ fn info(name: &str, header: &Header, packing: &Packing, options: &OpenOptions) -
     say("sensor depth", sensor);
     say("comment", header.comment.clone());
     let known = rate_origin != RateOrigin::Unknown;
-    let (pixel_aspect, pixel_aspect_origin) = options.aspect(PixelAspect::SQUARE);
     Ok(SourceInfo {
         name: name.to_owned(),
         container: "Photron MRAW".into(),
@@ -249,8 +249,6 @@ fn info(name: &str, header: &Header, packing: &Packing, options: &OpenOptions) -
         },
         width: header.width,
         height: header.height,
-        pixel_aspect,
-        pixel_aspect_origin,
         format: packing.format,
         depth_bits: packing.depth_bits,
         declared_frames: header.total_frames,
@@ -259,6 +257,7 @@ fn info(name: &str, header: &Header, packing: &Packing, options: &OpenOptions) -
             .fps
             .or_else(|| known.then(|| time_base.denominator as f64 / time_base.numerator as f64)),
         rate_origin,
+        claims: RateClaims::default(),
         converted_from: (packing.shift > 0).then(|| "16 bit, significant bits on top".to_owned()),
         size_bytes: None,
         details,

@@ -7,7 +7,6 @@ use rand_distr::{Distribution, Normal, Poisson};
 
 use crate::detect::{Detection, Flags};
 use crate::observation::{Observation, Status};
-use crate::pixel_aspect::PixelAspect;
 use crate::rig::{Body, Joint, Node, Rig};
 use crate::store::{DetectionStore, FrameStamp};
 use crate::track::track_recording;
@@ -217,7 +216,6 @@ impl Swing {
         Rig {
             schema: 1,
             image_px: [1280, 1024],
-            pixel_aspect: PixelAspect::SQUARE,
             reference_frame: Some(reference as u64),
             region: None,
             lens: None,

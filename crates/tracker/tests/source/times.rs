@@ -1,0 +1,348 @@
+//! When frames were taken: coarse ticks, variable rates, gaps, edit lists, slow motion, by files of the real `ffmpeg`.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use serde_json::Value;
+use tracker::frame::RateOrigin;
+use tracker::source::{OpenOptions, open};
+use tracker::table::{NodeTable, read_table};
+use tracker::timing::{Clock, Doubt, Steps, Timing, TimingKind, decide};
+
+use crate::film::{have_ffmpeg, read_all};
+use crate::info::info;
+
+/// Runs `ffmpeg`.
+fn ffmpeg(arguments: &[&str]) {
+    assert!(Command::new("ffmpeg").args(["-v", "error", "-y"]).args(arguments).status().unwrap().success());
+}
+
+/// A film of `count` small pictures at `rate` frames per second.
+fn made(folder: &Path, name: &str, rate: &str, count: u32, more: &[&str]) -> PathBuf {
+    let path = folder.join(name);
+    let source = format!("testsrc=size=64x48:rate={rate}");
+    let count = count.to_string();
+    let mut arguments = vec!["-f", "lavfi", "-i", &source, "-frames:v", &count];
+    arguments.extend(more);
+    arguments.push(path.to_str().unwrap());
+    ffmpeg(&arguments);
+    path
+}
+
+fn again(folder: &Path, name: &str, from: &Path, more: &[&str]) -> PathBuf {
+    let path = folder.join(name);
+    let mut arguments = vec!["-i", from.to_str().unwrap()];
+    arguments.extend(more);
+    arguments.push(path.to_str().unwrap());
+    ffmpeg(&arguments);
+    path
+}
+
+/// What a recording's times are and the times themselves, by reading it through.
+fn timed(path: &Path) -> (Timing, Vec<f64>) {
+    let mut source = open(path.to_str().unwrap(), &OpenOptions::default()).unwrap();
+    let ticks: Vec<i64> = read_all(&mut *source).iter().map(|f| f.ticks).collect();
+    let mut steps = Steps::default();
+    for &t in &ticks {
+        steps.push(t);
+    }
+    let info = source.info();
+    let (timing, clock): (Timing, Clock) =
+        decide(&steps, info.time_base, info.rate_origin, &info.claims, info.rate_hz).unwrap();
+    let times = ticks.iter().zip(0..).map(|(&t, i)| clock.seconds(i, t)).collect();
+    (timing, times)
+}
+
+/// Root mean square of times minus the truth, less a common offset.
+fn rms_s(times: &[f64], truth: impl Fn(usize) -> f64) -> f64 {
+    let off: Vec<f64> = times.iter().enumerate().map(|(k, t)| t - truth(k)).collect();
+    let mean = off.iter().sum::<f64>() / off.len() as f64;
+    (off.iter().map(|o| (o - mean).powi(2)).sum::<f64>() / off.len() as f64).sqrt()
+}
+
+#[test]
+fn coarse_ticks_give_the_true_times() {
+    if !have_ffmpeg() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let x264 = ["-c:v", "libx264", "-pix_fmt", "yuv420p"];
+    for (name, rate, more) in [
+        ("a.mkv", "600", &[][..]),
+        ("b.mkv", "1500", &[]),
+        ("c.webm", "240", &["-c:v", "libvpx", "-deadline", "realtime"]),
+        ("d.mov", "240", &["-video_track_timescale", "600"]),
+        ("e.mp4", "480", &["-video_track_timescale", "1000"]),
+        ("f.mp4", "960", &["-video_track_timescale", "1000"]),
+        ("g.flv", "600", &[]),
+        ("h.mkv", "30000/1001", &[]),
+        ("i.mkv", "2400", &["-c:v", "ffv1"]),
+        ("j.mkv", "600", &["-output_ts_offset", "12.3456"]),
+        ("k.ts", "240", &[]),
+    ] {
+        let arguments = [&x264[..], more].concat();
+        let path = made(folder.path(), name, rate, 600, &arguments);
+        let (timing, times) = timed(&path);
+        let (n, d) = rate.split_once('/').unwrap_or((rate, "1"));
+        let rate: f64 = n.parse::<f64>().unwrap() / d.parse::<f64>().unwrap();
+        assert_eq!(times.len(), 600);
+        let rms = rms_s(&times, |k| k as f64 / rate);
+        // A millionth of a second is a thousandth of Matroska's tick.
+        assert!(rms < 1e-6, "{name}: {rms} s, {timing:?}");
+        assert_ne!(timing.kind, TimingKind::Variable, "{name}");
+        assert!((timing.rate_hz.unwrap() / rate - 1.0).abs() < 1e-5, "{name}: {timing:?}");
+        let (status, out, _) = info(&[path.to_str().unwrap(), "--json"], Stdio::null());
+        let value: Value = serde_json::from_str(&out).unwrap();
+        assert_eq!((status, &value["frames"]), (0, &Value::from(600)), "{name}");
+        assert!((value["rate_hz"].as_f64().unwrap() / rate - 1.0).abs() < 1e-5, "{name}: {out}");
+    }
+}
+
+#[test]
+fn short_films_take_the_rate_that_the_container_gives() {
+    if !have_ffmpeg() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    for count in [1, 2, 3, 5] {
+        let path = made(folder.path(), &format!("{count}.mkv"), "600", count, &["-c:v", "ffv1"]);
+        let (timing, times) = timed(&path);
+        assert_eq!(times.len(), count as usize);
+        assert!(rms_s(&times, |k| k as f64 / 600.0) < 1e-9, "{times:?}");
+        assert_eq!(timing.rate_hz, Some(600.0));
+    }
+}
+
+#[test]
+fn dropped_frames_are_counted_and_keep_their_places() {
+    if !have_ffmpeg() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let drop = "select='not(between(n,50,52)+eq(n,200)+between(n,300,309))'";
+    let there = |n: &usize| !((50..=52).contains(n) || *n == 200 || (300..=309).contains(n));
+    for (name, rate, more) in [
+        ("a.mp4", 60.0, &["-c:v", "libx264"][..]),
+        ("b.mkv", 60.0, &["-c:v", "libx264"]),
+        ("c.mkv", 600.0, &["-c:v", "ffv1"]),
+        ("d.mov", 240.0, &["-c:v", "mjpeg", "-video_track_timescale", "600"]),
+    ] {
+        let arguments = [&["-vf", drop, "-fps_mode", "vfr"][..], more].concat();
+        let path = made(folder.path(), name, &rate.to_string(), 400, &arguments);
+        let (timing, times) = timed(&path);
+        assert_eq!((timing.gaps, timing.lacking), (3, 14), "{name}: {timing:?}");
+        let truth: Vec<usize> = (0..414).filter(there).collect();
+        assert!(rms_s(&times, |k| truth[k] as f64 / rate) < 1e-6, "{name}");
+        let (_, out, _) = info(&[path.to_str().unwrap()], Stdio::null());
+        assert!(out.contains("3 gaps, where 14 frames lack"), "{out}");
+    }
+}
+
+#[test]
+fn a_variable_rate_is_said_with_its_range() {
+    if !have_ffmpeg() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    // 30 frames a second, then slower down to 22.
+    let slower = "settb=1/90000,setpts='90000*(N/30+if(gt(N,100),(N-100)*(N-100)*0.00006,0))'";
+    for name in ["a.mp4", "b.mkv", "c.mov"] {
+        let more =
+            ["-vf", slower, "-fps_mode", "passthrough", "-enc_time_base", "1/90000", "-c:v", "libx264"];
+        let path = made(folder.path(), name, "30", 200, &more);
+        let (timing, times) = timed(&path);
+        assert_eq!(timing.kind, TimingKind::Variable, "{name}: {timing:?}");
+        let truth = |k: usize| {
+            let late = k.saturating_sub(100) as f64;
+            k as f64 / 30.0 + late * late * 0.00006
+        };
+        // What is rounded to whole ticks is spread over one: a standard deviation of a tick over sqrt(12).
+        let rms = rms_s(&times, truth);
+        assert!(rms < 1.5 * timing.sigma_s, "{name}: {rms}, {timing:?}");
+        assert!((timing.sigma_s * 12f64.sqrt() / timing.tick_s - 1.0).abs() < 1e-12);
+        let (_, out, _) = info(&[path.to_str().unwrap()], Stdio::null());
+        assert!(out.contains("variable frame rate, 2") && out.contains(" to 30"), "{out}");
+    }
+}
+
+#[test]
+fn an_edit_list_leaves_the_frames_that_are_read() {
+    if !have_ffmpeg() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let long = made(
+        folder.path(),
+        "long.mp4",
+        "60",
+        240,
+        &["-c:v", "libx264", "-g", "60", "-bf", "0", "-pix_fmt", "yuv420p"],
+    );
+    let name = folder.path().join("cut.mov");
+    ffmpeg(&["-ss", "1.5", "-i", long.to_str().unwrap(), "-t", "1", "-c", "copy", name.to_str().unwrap()]);
+    let (status, out, _) = info(&[name.to_str().unwrap(), "--json"], Stdio::null());
+    let value: Value = serde_json::from_str(&out).unwrap();
+    let (timing, times) = timed(&name);
+    assert_eq!((status, &value["frames"]), (0, &Value::from(times.len())), "{out}");
+    assert_eq!(value["declared_frames"], Value::from(times.len()));
+    assert!(value["details"]["edit list"].as_str().unwrap().contains("of the"), "{out}");
+    assert_eq!(timing.rate_hz, Some(60.0));
+    assert!(rms_s(&times, |k| k as f64 / 60.0) < 1e-6);
+
+    // Played at half and at an eighth of the speed, as slow motion is exported: all frames, at the camera's times.
+    for speed in [0x8000u32, 0x2000] {
+        let mut bytes = std::fs::read(&long).unwrap();
+        let at = bytes.windows(4).position(|w| w == b"elst").unwrap() + 20;
+        assert_eq!(bytes[at..at + 4], [0, 1, 0, 0]);
+        bytes[at..at + 4].copy_from_slice(&speed.to_be_bytes());
+        // The piece is played for longer.
+        let duration = u32::from_be_bytes(bytes[at - 8..at - 4].try_into().unwrap());
+        let longer = (u64::from(duration) * 0x1_0000 / u64::from(speed)) as u32;
+        bytes[at - 8..at - 4].copy_from_slice(&longer.to_be_bytes());
+        let name = folder.path().join("slow.mov");
+        std::fs::write(&name, bytes).unwrap();
+        let (timing, times) = timed(&name);
+        assert_eq!((times.len(), timing.rate_hz), (240, Some(60.0)));
+        assert!(rms_s(&times, |k| k as f64 / 60.0) < 1e-6);
+        let (_, out, _) = info(&[name.to_str().unwrap()], Stdio::null());
+        assert!(out.contains("an edit list plays pieces"), "{out}");
+    }
+}
+
+#[test]
+fn a_capture_tag_gives_the_rate_or_is_said_not_to() {
+    if !have_ffmpeg() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let film = made(folder.path(), "plain.mp4", "30", 60, &["-c:v", "libx264", "-pix_fmt", "yuv420p"]);
+    for (tag, rate, said) in [
+        (
+            "240",
+            240.0,
+            "240 frames per s by the camera's own tag com.android.capture.fps; the file plays at 30",
+        ),
+        ("120.000000", 120.0, "120 frames per s by the camera's own tag"),
+        ("30", 30.0, ""),
+        ("24", 30.0, "says 24 frames per s, the time stamps 30: the tag is not used"),
+        ("0", 30.0, "is \"0\", which is no rate; it is not used"),
+        ("-240", 30.0, "is \"-240\", which is no rate"),
+        ("NaN", 30.0, "is \"NaN\", which is no rate"),
+        ("inf", 30.0, "is \"inf\", which is no rate"),
+        ("fast", 30.0, "is \"fast\", which is no rate"),
+    ] {
+        let tagged = format!("com.android.capture.fps={tag}");
+        let more = ["-c", "copy", "-movflags", "use_metadata_tags", "-metadata", &tagged];
+        let path = again(folder.path(), "tagged.mp4", &film, &more);
+        let (timing, times) = timed(&path);
+        assert!(rms_s(&times, |k| k as f64 / rate) < 1e-12, "{tag}: {timing:?}");
+        let (_, out, _) = info(&[path.to_str().unwrap()], Stdio::null());
+        assert!(out.contains(said) && out.contains(&format!("{rate} frames per second")), "{tag}: {out}");
+        // The user's word is the last.
+        let (_, out, _) = info(&[path.to_str().unwrap(), "--fps", "1000", "--json"], Stdio::null());
+        let value: Value = serde_json::from_str(&out).unwrap();
+        assert_eq!((&value["rate_hz"], &value["rate_origin"]), (&Value::from(1000.0), &Value::from("user")));
+    }
+    let (timing, _) = timed(&film);
+    assert_eq!(timing.doubt, Some(Doubt::Player));
+}
+
+#[test]
+fn android_s_number_and_sony_s_xml_are_read_from_their_boxes() {
+    if !have_ffmpeg() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let film =
+        made(folder.path(), "plain.mp4", "30000/1001", 60, &["-c:v", "libx264", "-pix_fmt", "yuv420p"]);
+    // Phones write the tag as a 32-bit float, of type 23; ffmpeg writes four characters of type 1.
+    let more = ["-c", "copy", "-movflags", "use_metadata_tags", "-metadata", "com.android.capture.fps=QQQQ"];
+    let path = again(folder.path(), "float.mp4", &film, &more);
+    let mut bytes = std::fs::read(&path).unwrap();
+    let at = bytes.windows(4).position(|w| w == b"QQQQ").unwrap();
+    bytes[at - 8..at - 4].copy_from_slice(&23u32.to_be_bytes());
+    bytes[at..at + 4].copy_from_slice(&239.76f32.to_be_bytes());
+    std::fs::write(&path, bytes).unwrap();
+    let (timing, times) = timed(&path);
+    assert_eq!(timing.rate_origin, RateOrigin::CaptureTag, "{timing:?}");
+    assert!(rms_s(&times, |k| k as f64 * 1001.0 / 240_000.0) < 1e-6);
+
+    let xml = br#"<?xml version="1.0"?><NonRealTimeMeta><VideoFormat><VideoFrame videoCodec="AVC_1920_1080_HP@L42" captureFps="119.88p" formatFps="29.97p"/></VideoFormat></NonRealTimeMeta>"#;
+    let boxed = |name: &[u8], body: &[u8]| [&(body.len() as u32 + 8).to_be_bytes()[..], name, body].concat();
+    let handler = boxed(b"hdlr", b"\0\0\0\0\0\0\0\0nrtm\0\0\0\0\0\0\0\0\0\0\0\0\0");
+    let meta = [&[0; 4][..], &handler, &boxed(b"xml ", &[&[0; 4][..], xml].concat())].concat();
+    let sony = [std::fs::read(&film).unwrap(), boxed(b"meta", &meta)].concat();
+    let path = folder.path().join("sony.mp4");
+    std::fs::write(&path, sony).unwrap();
+    let (timing, times) = timed(&path);
+    assert_eq!(timing.capture.as_ref().map(|c| (c.tag.as_str(), c.rate_hz)), Some(("captureFps", 119.88)));
+    assert!(rms_s(&times, |k| k as f64 * 1001.0 / 120_000.0) < 1e-12, "{timing:?}");
+}
+
+#[test]
+fn a_table_of_coarse_ticks_is_that_of_fine_ones() {
+    if !have_ffmpeg() {
+        return;
+    }
+    // A marker that is hidden at the end gives status 1.
+    let tracker = |arguments: &[&str], allowed: &[i32]| {
+        let done = Command::new(env!("CARGO_BIN_EXE_tracker")).args(arguments).output().unwrap();
+        let error = String::from_utf8_lossy(&done.stderr).into_owned();
+        assert!(allowed.contains(&done.status.code().unwrap()), "{arguments:?}: {error}");
+        error
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let word = |name: &str| at(name).to_str().unwrap().to_owned();
+    let film = |name: &str, fps: &str, status: i32| {
+        let (to, rig) = (word(name), word("rig.toml"));
+        tracker(
+            &["film", "--preset", "clean", "--frames", "40", "--fps", fps, "-q", "--rig", &rig, "-o", &to],
+            &[status],
+        )
+    };
+    // Above 1000 frames a second FFmpeg's Matroska says nothing of the rate.
+    let error = film("fast.mkv", "1500", 2);
+    assert!(error.contains("too coarse for 1500 frames per s. Name it .mp4, .mov or .avi"), "{error}");
+    assert!(!at("fast.mkv").exists());
+    film("fine.mp4", "600", 0);
+    let fine = at("fine.mp4");
+    again(folder.path(), "coarse.mkv", &fine, &["-c", "copy"]);
+    let tags = ["-movflags", "use_metadata_tags", "-metadata", "com.android.capture.fps=600"];
+    let slow = ["-bsf:v", "setts=pts=20*PTS:dts=20*DTS"];
+    again(folder.path(), "slow.mp4", &fine, &[&["-c", "copy"][..], &slow, &tags].concat());
+    let mut tables = Vec::new();
+    for (name, notes) in
+        [("fine.mp4", &[][..]), ("coarse.mkv", &["rounded to 1 ms"]), ("slow.mp4", &["plays at 30"])]
+    {
+        let (from, to, rig) = (word(name), word("nodes.parquet"), word("rig.toml"));
+        let error = tracker(&["track", &from, "--rig", &rig, "-o", &to, "--force"], &[0, 1]);
+        for note in notes {
+            assert!(error.contains(note), "{name}: {error}");
+        }
+        tables.push(read_table(&at("nodes.parquet")).unwrap());
+    }
+    let kinds: Vec<_> = tables.iter().map(|t| t.meta.time.as_ref().unwrap().kind).collect();
+    assert_eq!(kinds, [TimingKind::Even, TimingKind::Grid, TimingKind::Even]);
+    for table in &tables {
+        assert_eq!(table.meta.source.rate_hz, Some(600.0));
+        assert!(rms_s(&table.rows.time_s, |k| k as f64 / 600.0) < 1e-9);
+        // Bit for bit, and so NaN too.
+        let bits = |t: &NodeTable| t.rows.xy_px.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+        assert_eq!(bits(table), bits(&tables[0]));
+    }
+
+    // Without the tag it is doubted.
+    again(folder.path(), "plain.mp4", &fine, &[&["-c", "copy"][..], &slow].concat());
+    let (from, to, rig) = (word("plain.mp4"), word("plain.parquet"), word("rig.toml"));
+    let error = tracker(&["track", &from, "--rig", &rig, "-o", &to], &[0, 1]);
+    assert!(error.contains("every rate is 8 times too small") && error.contains("with --fps"), "{error}");
+
+    // A finished table is gone on with, and the camera's rate by the user replaces all.
+    let (from, to, rig) = (word("slow.mp4"), word("nodes.parquet"), word("rig.toml"));
+    let error = tracker(&["track", &from, "--rig", &rig, "-o", &to, "--resume"], &[0, 1]);
+    assert!(error.contains("was complete already"), "{error}");
+    tracker(&["track", &from, "--rig", &rig, "-o", &to, "--force", "--fps", "1200"], &[0, 1]);
+    let table = read_table(&at("nodes.parquet")).unwrap();
+    assert!(rms_s(&table.rows.time_s, |k| k as f64 / 1200.0) < 1e-12);
+}

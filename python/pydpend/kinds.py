@@ -1,0 +1,51 @@
+"""What a file or folder is, by what is in it; `tracker::kind` of the compiled half decides, for both programs."""
+
+from __future__ import annotations
+
+import os
+from typing import Literal, TypeAlias
+
+from pydpend import _tracker
+from pydpend.errors import Message, PydpendError, Setting
+
+Kind: TypeAlias = Literal[
+    "film",
+    "pictures",
+    "nodes",
+    "truth",
+    "angles",
+    "encoder",
+    "tables",
+    "calibration",
+    "rig",
+    "scene",
+    "model",
+    "config",
+    "run",
+    "fit",
+    "page",
+    "spreadsheet",
+    "unknown",
+]
+"""Of each, `Kind` in ``crates/tracker/src/kind.rs`` says what it is."""
+
+
+def kind_of(path: str | os.PathLike[str]) -> Kind:
+    """What a file or folder is; ``unknown`` where nobody can tell, or there is none."""
+    kind: Kind = _tracker.kind_of(os.fspath(path))
+    return kind
+
+
+def expect(
+    path: str | os.PathLike[str],
+    wanted: tuple[Kind, ...],
+    error: type[PydpendError],
+    setting: str | None = None,
+) -> None:
+    """Raises ``error`` for a file that is of a known kind and of none that is wanted, with what is done with it.
+
+    ``setting``: the option that names the file.
+    """
+    said: Message | None = _tracker.misplaced(os.fspath(path), list(wanted))
+    if said is not None:
+        raise error(said if setting is None else Setting(setting, subject=True) + ": " + said)
