@@ -57,6 +57,7 @@ validate: build
 	target/release/examples/validate --seeds 200..220 --write docs/validation.md
 	$(PY) -m tests.validate_kinematics
 	$(PY) -m tests.validate_resume
+	$(PY) -m tests.mutate --mutants 300
 	for sweep in angles default physics; do $(PY) -m tests.validate_$$sweep || exit 1; done
 	for part in energy inertias ratios slow all none added; do $(PY) -m tests.validate_damping $$part || exit 1; done
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import zoneinfo
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from nptdms import ChannelObject, TdmsWriter
-from pydpend.angles import read_angles
+from pydpend.angles import LinkAngles, read_angles
 from pydpend.columns import Columns, read_columns
 from pydpend.encoder import EncoderSignal, calibrate, read_encoder, read_holds
 from pydpend.errors import AnglesError, EncoderError
@@ -265,5 +266,9 @@ def test_dates_given_as_arrays_become_seconds() -> None:
     for unit in ("ms", "us", "ns"):
         found = EncoderSignal(TIMES.to_numpy().astype(f"datetime64[{unit}]"), np.zeros(3))
         assert found.t_s == pytest.approx([0.0, 0.001, 0.002], abs=1e-15)
+    berlin = zoneinfo.ZoneInfo("Europe/Berlin")
+    night = [datetime.datetime(2024, 10, 27, 2, 59, 59, tzinfo=berlin, fold=fold) for fold in (0, 1)]
+    utc = np.array([stamp.astimezone(datetime.UTC) for stamp in night])
+    assert LinkAngles(utc, np.zeros((2, 1)), np.zeros((2, 1)) + 1e-3).t_s.tolist() == [0.0, 3600.0]
     spans = np.array([datetime.timedelta(milliseconds=k) for k in (5, 6)], dtype="timedelta64[us]")
     assert EncoderSignal(spans, np.zeros(2)).t_s == pytest.approx([0.005, 0.006], abs=1e-15)

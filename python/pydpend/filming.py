@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 from pyarrow import csv, parquet
 
 from pydpend import _tracker
+from pydpend.columns import PARQUET_FAULTS
 from pydpend.errors import FILM_TRUTH, FilmError, fault
 
 StrPath: TypeAlias = "str | os.PathLike[str]"
@@ -176,22 +177,33 @@ def read_truth(path: StrPath) -> Truth:
     """
     name = os.fspath(path)
     try:
-        table = csv.read_csv(name) if name.endswith(".csv") else parquet.read_table(name)
-    except (OSError, pa.ArrowException) as problem:
-        raise FilmError(fault(name, f"the truth cannot be read ({problem})")) from None
+        with open(name, "rb") as file:
+            table = csv.read_csv(file) if name.endswith(".csv") else parquet.read_table(file)
+    except PARQUET_FAULTS as problem:
+        said = " ".join(str(problem).split())
+        raise FilmError(fault(name, f"the truth cannot be read ({said})")) from None
     wanted = ["frame", "time_s", "node", "body", "x_px", "y_px", "visible", "phi1_rad"]
     missing = [column for column in wanted if column not in table.column_names]
     if missing:
         advice = "Give the table that " + FILM_TRUTH + " wrote"
         raise FilmError(fault(name, f"there is no column {missing[0]}", advice, place=missing[0]))
-    frame = table["frame"].to_numpy()
+
+    def numbers(key: str, kind: pa.DataType) -> NDArray[Any]:
+        if table.column_names.count(key) > 1:
+            raise FilmError(fault(name, "the column is there twice", "Rename one", place=f"column {key}"))
+        try:
+            return np.asarray(table[key].cast(kind).to_numpy())
+        except pa.ArrowException:
+            problem = f"it holds {table[key].type}, not {kind}"
+            raise FilmError(fault(name, problem, "Give the whole table", place=f"column {key}")) from None
+
+    frame = numbers("frame", pa.int64())
     count = int(np.count_nonzero(frame == frame[0])) if len(frame) else 0
     if count == 0 or len(frame) % count or np.any(frame.reshape(-1, count) != frame[::count, None]):
         raise FilmError(fault(name, "it has not all markers in each frame", "Give the whole table"))
 
     def column(key: str) -> NDArray[np.float64]:
-        values: NDArray[np.float64] = np.asarray(table[key].to_numpy(), dtype=np.float64)
-        return values.reshape(-1, count)
+        return numbers(key, pa.float64()).reshape(-1, count)
 
     links = [f"phi{k}_rad" for k in range(1, len(table.column_names)) if f"phi{k}_rad" in table.column_names]
     return Truth(

@@ -6,8 +6,10 @@ to the size of the date. A duration is seconds already.
 
 from __future__ import annotations
 
+import datetime
 import re
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -106,8 +108,14 @@ def seconds_of_arrow(column: pa.ChunkedArray) -> tuple[Floats, str] | None:
     return out, ""
 
 
-def seconds_of_numpy(values: NDArray[np.generic]) -> Floats:
-    """Numbers as they are; ``datetime64`` as seconds from the first, ``timedelta64`` as seconds; NaT is NaN."""
+def seconds_of_numpy(values: NDArray[Any]) -> Floats:
+    """Numbers as they are; ``datetime64`` and ``datetime`` as seconds from the first, ``timedelta64`` as seconds.
+
+    NaT is NaN.
+    """
+    if values.dtype.kind == "O" and values.size and isinstance(values.flat[0], datetime.datetime):
+        first = values.flat[0]
+        return np.array([(stamp - first).total_seconds() for stamp in values.flat]).reshape(values.shape)
     if values.dtype.kind not in "mM":
         return np.ascontiguousarray(values, dtype=np.float64)
     fine = values.astype(f"{values.dtype.kind}8[ns]")

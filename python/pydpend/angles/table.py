@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pydpend.errors import AnglesError, Setting, fault
+from pydpend.instants import seconds_of_numpy
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -25,9 +26,10 @@ Floats = NDArray[np.float64]
 class LinkAngles:
     """Angles of one or two links at T instants.
 
-    ``t_s`` (T,): s, finite, strictly increasing. ``phi_rad`` (T, L), L = 1 or 2: absolute angle of each
-    link to the downward vertical, **counter-clockwise positive, zero hanging down**, unwrapped over turns,
-    NaN where the link was not seen. ``sigma_rad`` (T, L): standard uncertainty of each, NaN where not seen
+    ``t_s`` (T,): s, finite, strictly increasing; dates become seconds from the first. ``phi_rad`` (T, L), L = 1
+    or 2: absolute angle of each link to the downward vertical, **counter-clockwise positive, zero hanging
+    down**, unwrapped over turns, NaN where the link was not seen. ``sigma_rad`` (T, L): standard uncertainty of
+    each, NaN where not seen
     or not known. ``frame`` (T,): index in the recording, or ``None``. ``meta``: how they were had, JSON-like.
     ``name``: the recording's, for messages and legends.
 
@@ -42,7 +44,7 @@ class LinkAngles:
     name: str = "angles"
 
     def __post_init__(self) -> None:
-        t = np.ascontiguousarray(self.t_s, dtype=np.float64)
+        t = seconds_of_numpy(np.asarray(self.t_s))
         phi = np.ascontiguousarray(self.phi_rad, dtype=np.float64)
         sigma = np.ascontiguousarray(self.sigma_rad, dtype=np.float64)
         if t.ndim != 1 or t.size == 0:

@@ -1,0 +1,31 @@
+"""A few damaged files of every kind; `python -m tests.mutate` (in `make validate`) tries 300 of each."""
+
+from __future__ import annotations
+
+import random
+from pathlib import Path
+
+import pytest
+
+from tests.mutants import mutant
+from tests.mutate import BAD, tried
+from tests.mutated_formats import FORMATS
+
+MUTANTS = 3
+"""Enough to see that a format's commands still answer; the sweep finds what is rare."""
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_damage_is_read_or_refused_in_one_line(name: str, tmp_path: Path) -> None:
+    found = tried(name, FORMATS[name], MUTANTS, 3, tmp_path, None)
+    assert not found.bad
+    assert sum(found.counts.values()) == MUTANTS
+    assert not set(found.counts) & set(BAD)
+
+
+def test_mutants_are_the_same_from_the_same_seed() -> None:
+    data = bytes(range(256)) * 8
+    for text in (True, False):
+        made = [mutant(data, text, random.Random(f"1 x {k}")) for k in range(50)]
+        assert made == [mutant(data, text, random.Random(f"1 x {k}")) for k in range(50)]
+        assert sum(damaged != data for damaged, _ in made) > 40
