@@ -39,8 +39,9 @@ def _remuxed(name: str, *options: str) -> Callable[[Path], None]:
     """A film that FFmpeg writes."""
 
     def make(folder: Path) -> None:
-        _film("from.mkv")(folder)
-        _run("ffmpeg", "-v", "error", "-i", folder / "from.mkv", *options, folder / name)
+        # Long enough for a stream whose first pictures lie some way in.
+        _film("from.mkv", "--frames", "60")(folder)
+        _run("ffmpeg", "-v", "error", "-r", "25", "-i", folder / "from.mkv", *options, folder / name)
         (folder / "from.mkv").unlink()
 
     return make
@@ -73,9 +74,9 @@ def _cine(folder: Path) -> None:
     pictures = [
         np.frombuffer(f[: width * height], np.uint8).reshape(height, width)[::-1].tobytes() for f in frames
     ]
-    setup = bytearray(1000)
+    setup = bytearray(5700)
     struct.pack_into("<H", setup, 0, rate)
-    struct.pack_into("<H", setup, 142, len(setup))
+    struct.pack_into("<2sH", setup, 140, b"ST", len(setup))
     struct.pack_into("<II", setup, 768, rate, 200_000)
     struct.pack_into("<I", setup, 896, 8)
     at_offsets = 44 + 40 + len(setup)
@@ -106,15 +107,15 @@ def _films() -> dict[str, Format]:
         return Format(make, damaged or name, False, _reads(name, *options))
 
     fps = ("--fps", "1000")
-    still = ("-c:v", "mpeg2video", "-r", "25")
+    mpeg2 = ("-c:v", "mpeg2video", "-q:v", "2")
     return {
         "mp4": film("film.mp4", _film("film.mp4")),
         "mov": film("film.mov", _film("film.mov")),
         "mkv": film("film.mkv", _film("film.mkv")),
         "avi": film("film.avi", _film("film.avi", "--codec", "mjpeg")),
         "avi raw": film("film.avi", _film("film.avi")),
-        "gif": film("film.gif", _remuxed("film.gif", "-r", "50"), ""),
-        "mpeg-ts": film("film.ts", _remuxed("film.ts", *still)),
+        "gif": film("film.gif", _remuxed("film.gif"), ""),
+        "mpeg-ts": film("film.ts", _remuxed("film.ts", *mpeg2)),
         "webm": film("film.webm", _remuxed("film.webm", "-c:v", "libvpx")),
         "y4m": film("film.y4m", _film("film.y4m")),
         "cine": film("film.cine", _cine),

@@ -108,7 +108,7 @@ class Comparison:
             "stated_sigma_rad": {
                 "encoder": self.encoder_sigma_rad,
                 "video": float(np.sqrt(np.nanmean(self.video_sigma_rad**2)))
-                if self.video_sigma_rad.size
+                if np.isfinite(self.video_sigma_rad).any()
                 else None,
             },
             "own_noise_rad": {"encoder": self.encoder_noise_rad, "video": self.video_noise_rad},
