@@ -83,7 +83,11 @@ def _angles(r: Stored) -> Figure:
 
 def _nodes(r: Stored) -> Figure:
     path = r.here / "nodes.parquet"
-    nodes = read_nodes(path if path.exists() else r.facts["path"])
+    if not path.exists():
+        path = Path(r.facts["path"])
+        if not path.is_file():
+            raise FigureError(fault(str(path), "the run's node table is no longer there", AGAIN))
+    nodes = read_nodes(path)
     names = [f"node{i}_px" for i in range(len(nodes.rig.nodes))]
     columns = read_table(r.here / "residuals.parquet", *names)
     residual = np.column_stack([columns[name] for name in names])
