@@ -129,7 +129,7 @@ pub(super) fn read(path: &Path) -> Result<NodeTable> {
             .ok_or_else(|| {
                 Error::Table(
                     Fault::new(&name, format!("row group {g} says {rows} rows, its columns say otherwise"))
-                        .advice("It is damaged: copy it again, or run `tracker track` again"),
+                        .advice("It is damaged: copy it again, or run " + TRACK + " again"),
                 )
             })?;
     }
