@@ -26,6 +26,8 @@ from pydpend.kinds import kind_of
 from pydpend.plots import folder as figures
 from pydpend.plots.moving import check_film
 
+from tests import two_links
+
 ROOT = Path(__file__).parent.parent
 TRACKER = ROOT / "target" / "release" / "tracker"
 PACKAGE = ROOT / "python" / "pydpend"
@@ -88,8 +90,8 @@ def flags() -> dict[str, set[str]]:
     return found | {f"tracker {name}": set(FLAG.findall(text)) for name, text in tracker_help().items()}
 
 
-PYTHON_ONLY = {"min_area_px", "max_area_px"}
-"""Settings of functions that have no command."""
+PYTHON_ONLY = {"min_area_px", "max_area_px", "link_length_sigma_m"}
+"""Settings that no command has."""
 
 
 def test_every_setting_that_a_message_names_is_a_keyword_and_a_flag() -> None:
@@ -355,6 +357,13 @@ def test_old_names_are_taken_with_a_note(tmp_path: Path, capsys: pytest.CaptureF
     said = capsys.readouterr().err
     assert status == 2
     assert said.splitlines()[0] == "pydpend: note: --method is called --estimator now"
+    config = tmp_path / "run.toml"
+    config.write_text('inputs = []\nencoder_column = "ai0"\n', encoding="utf-8")
+    with pytest.raises(PydpendError, match="the option is called column now"):
+        pydpend.analyse.read_config(config)
+    with pytest.raises(PydpendError, match="Give estimator='linkage'"):
+        # The old name, wrong on purpose.
+        dp.angles(None, method="linkage")  # type: ignore[arg-type]
 
 
 def test_what_does_nothing_with_these_inputs_is_refused(
@@ -371,6 +380,25 @@ def test_what_does_nothing_with_these_inputs_is_refused(
     assert main(["export", FIT[1], "--px-per-m", "900", "-o", str(tmp_path / "out.mat")]) == 2
     assert "--px-per-m: .mat files are in px" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+def test_a_length_that_nothing_is_made_of_is_refused() -> None:
+    t = np.arange(200) / 100
+    nodes = two_links.film(t, np.column_stack([np.sin(3 * t), np.sin(5 * t)]), 1)
+    for given, said in (
+        (
+            {"estimator": "pairwise", "link_length_m": 0.17},
+            "link_length_m: the pairs of markers give no joints",
+        ),
+        (
+            {"bodies": [nodes.rig.bodies[0]], "link_length_m": 0.17},
+            "link_length_m: a single link has no elbow",
+        ),
+        ({"link_length_m": -1.0}, "link_length_m: -1 m is no length"),
+        ({"link_length_sigma_m": 0.01}, "Give link_length_m=..."),
+    ):
+        with pytest.raises(PydpendError, match=re.escape(said)):
+            dp.angles(nodes, zero="reference_frame", **given)
 
 
 def test_one_function_knows_what_a_file_is(tmp_path: Path) -> None:

@@ -188,6 +188,10 @@ READ_CONFIG = Step("pydpend analyse --config THIS_FILE", "pydpend.analyse.read_c
 """Uses a file of options."""
 
 
+OLD_NAMES = {"encoder_column": "column"}
+"""Names that options had."""
+
+
 def read_config(path: str | Path) -> Options:
     """Options from a TOML file as ``--write-config`` writes it. Unknown keys are errors."""
     expect(path, ("config",), OptionError)
@@ -195,6 +199,8 @@ def read_config(path: str | Path) -> Options:
     known = {f.name: f for f in fields(Options)}
     values: dict[str, Any] = {}
     for key in raw:
+        if key in OLD_NAMES:
+            raw.refuse(key, f"the option is called {OLD_NAMES[key]} now", "Rename the key")
         if key not in known:
             raw.refuse(key, f"{key} is not an option", f"Known are {', '.join(known)}")
         wanted = str(known[key].type)

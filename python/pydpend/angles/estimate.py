@@ -35,6 +35,7 @@ def angles(
     link_length_sigma_m: float = 0.0,
     gaps: Literal["error", "stop"] = "error",
     name: str | None = None,
+    method: None = None,
 ) -> LinkAngles:
     """Angles of one or two links, in rad: counter-clockwise positive, zero hanging down, unwrapped over
     turns.
@@ -61,10 +62,17 @@ def angles(
     ``meta["zero"]``. Where the table says that its times are uncertain (a variable frame rate in coarse ticks), it
     holds that too, times the link's speed; ``meta["time"]`` says what the times are.
 
+    ``method`` is the old name of ``estimator`` and is refused.
+
     Raises :class:`~pydpend.errors.AnglesError`: a body never seen, or in one marker only; no rest found, or one in
     which the links are held and do not hang; a turn that may be lost; links that turn too little for a linkage.
     """
+    if method is not None:
+        raise AnglesError(
+            fault("method", "the option has another name now", "Give " + Setting("estimator", method))
+        )
     markers = body_markers(nodes, bodies, mirrored)
+    _check_length(estimator, len(markers), link_length_m, link_length_sigma_m)
     label = name if name is not None else _label(nodes)
     raw = _estimate(markers, estimator, mirrored, link_length_m, link_length_sigma_m)
     notes: list[str] = list(raw.meta.pop("notes", ()))
@@ -114,6 +122,26 @@ def find_linkage(nodes: Nodes, *, bodies: Sequence[str] | None = None, mirrored:
     """
     poses = [fit_pose(m) for m in body_markers(nodes, bodies, mirrored)]
     return fit_linkage(poses[0], poses[1] if len(poses) > 1 else None).linkage
+
+
+def _check_length(estimator: Method, links: int, length_m: float | None, length_sigma_m: float) -> None:
+    """Raises AnglesError for a length that does nothing or makes no sense."""
+    if length_m is None:
+        if length_sigma_m:
+            problem = "an uncertainty of a length that is not given"
+            raise AnglesError(
+                fault(Setting("link_length_sigma_m"), problem, "Give " + Setting("link_length_m"))
+            )
+        return
+    if not (np.isfinite(length_m) and length_m > 0):
+        raise AnglesError(
+            fault(Setting("link_length_m"), f"{length_m:g} m is no length", "Give metres, above 0")
+        )
+    if estimator == "pairwise":
+        advice = "Leave it out, or use " + Setting("estimator", "rigid")
+        raise AnglesError(fault(Setting("link_length_m"), "the pairs of markers give no joints", advice))
+    if links == 1:
+        raise AnglesError(fault(Setting("link_length_m"), "a single link has no elbow", "Leave it out"))
 
 
 def _label(nodes: Nodes) -> str:

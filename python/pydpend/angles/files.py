@@ -55,6 +55,10 @@ def read_angles(
     expect(path, ("angles", "tables") if path.is_dir() else ("angles",), AnglesError)
     label = name if name is not None else (path.name if path.is_dir() else path.stem)
     if path.is_dir():
+        if columns:
+            raise AnglesError(
+                fault(Setting("columns"), f"{path} is a folder of arrays without names", "Leave it out")
+            )
         t, phi, sigma = _read_published(path)
         frame, meta, table = None, {"source": str(path), "form": "published npy"}, None
     else:

@@ -50,19 +50,19 @@ pub struct Args {
     #[arg(long, value_name = "F")]
     fps: Option<f64>,
     /// Codec of a video file; by the ending if not given.
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, requires = "output")]
     codec: Option<CodecName>,
     /// H.264: constant rate factor, 0 (no loss) to 51; MJPEG: 1 (best) to 31.
-    #[arg(long, value_name = "Q")]
+    #[arg(long, value_name = "Q", requires = "output")]
     quality: Option<u32>,
     /// H.264: x264's preset, e.g. ultrafast, medium, veryslow.
-    #[arg(long, value_name = "PRESET")]
+    #[arg(long, value_name = "PRESET", requires = "output")]
     speed: Option<String>,
     /// H.264: no colour planes; smaller, but not every player shows it.
-    #[arg(long, alias = "gray")]
+    #[arg(long, alias = "gray", requires = "output")]
     gray_only: bool,
     /// Bits per pixel of an .mraw: 8, 10, 12 or 16.
-    #[arg(long)]
+    #[arg(long, requires = "output")]
     bits: Option<u32>,
     /// No progress bar.
     #[arg(short, long)]

@@ -62,8 +62,8 @@ fn unknown_option(option: &str, near: &[String]) -> String {
         .map(|c| format!("`tracker {}`", c.get_name()))
         .collect();
     let advice = match near.first() {
+        _ if !owners.is_empty() => format!("{} has it", listed(&owners)),
         Some(near) => format!("Did you mean {near}?"),
-        None if !owners.is_empty() => format!("{} has it", listed(&owners)),
         None => "See `tracker help`".into(),
     };
     format!("{option}: it is not an option of this command. {advice}")
