@@ -10,7 +10,7 @@ import pydpend as dp
 import pytest
 from pydpend.cli import main
 from pydpend.export import export
-from pydpend.nodes import SEEN
+from pydpend.nodes import SEEN, Nodes
 
 from tests.drawn_nodes import some_nodes
 
@@ -114,6 +114,45 @@ def test_readers_that_are_not_the_writers_agree(tmp_path: Path) -> None:
     mat = mat4py.loadmat(str(tmp_path / "t.mat"))
     assert mat["node"] == list(nodes.rig.names)
     np.testing.assert_array_equal(np.array(mat["y_px"]), nodes.xy_px[..., 1])
+
+
+def _from_frame(first: int, count: int) -> Nodes:
+    """A table of `count` frames from `first` on at 500 Hz: the drawn one again and again."""
+    nodes = some_nodes()
+    again = np.arange(count) % len(nodes)
+    frame = first + np.arange(count)
+    columns = {name: getattr(nodes, name)[again] for name in ("xy_px", "sigma_px", "area_px", "status")}
+    return replace(nodes, frame=frame, t_s=frame / 500, **columns)
+
+
+@pytest.mark.filterwarnings("ignore:No analog data")
+def test_c3d_ends_where_its_numbers_do(tmp_path: Path) -> None:
+    import c3d
+    import ezc3d
+
+    # The last number that every reader takes for itself; a table before it and one up to it are read back whole.
+    for first, count in [(65484, 50), (64534, 1000)]:
+        export(_from_frame(first, count), tmp_path / "t.c3d")
+        assert ezc3d.c3d(str(tmp_path / "t.c3d"))["data"]["points"].shape[2] == count
+        with (tmp_path / "t.c3d").open("rb") as file:
+            reader = c3d.Reader(file)
+            assert (reader.first_frame, reader.last_frame) == (first + 1, 65534)
+            assert len(list(reader.read_frames())) == count
+    (tmp_path / "t.c3d").unlink()
+    # One frame more, many more, and a first number that would begin anew.
+    for first, count, numbers in [
+        (64535, 1000, "64536 to 65535"),
+        (0, 70000, "1 to 70000"),
+        (70000, 50, "70001 to 70050"),
+    ]:
+        nodes = _from_frame(first, count)
+        with pytest.raises(
+            dp.TableError, match=rf"t.c3d: its frames would have the numbers {numbers}, .* end at 65534"
+        ):
+            export(nodes, tmp_path / "t.c3d")
+        assert list(tmp_path.iterdir()) == []
+    export(nodes, tmp_path / "t.trc")
+    export(nodes, tmp_path / "t.mat")
 
 
 def test_what_a_form_cannot_hold_is_refused(tmp_path: Path) -> None:

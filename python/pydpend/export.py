@@ -23,6 +23,10 @@ LEAST_EVEN = 1e-6
 SCALED = (".c3d", ".trc")
 """Endings of the forms that have a unit of length."""
 
+LAST_C3D_FRAME = 65534
+"""C3D's header numbers frames from 1 with 16 bits, and 65535 stands for "more": what readers then do differs (ezc3d 1.7
+gives the first 65535 frames, c3d 0.6 fails)."""
+
 
 def export(nodes: Nodes, path: str | os.PathLike[str], *, px_per_m: float | None = None) -> None:
     """Writes nodes for another program, by the ending: `.c3d`, `.trc`, `.csv` (DLTdv xypts) or `.mat`.
@@ -34,7 +38,8 @@ def export(nodes: Nodes, path: str | os.PathLike[str], *, px_per_m: float | None
 
     Raises:
         ArgumentError: if the ending is not known or the scale makes no sense.
-        TableError: if the form cannot hold the table (C3D and TRC need one rate), or the file cannot be written.
+        TableError: if the form cannot hold the table (C3D and TRC need one rate, and C3D ends at frame 65534 counted
+            from 1), or the file cannot be written.
     """
     target = Path(path)
     writer = WRITERS.get(target.suffix.lower())
@@ -47,6 +52,8 @@ def export(nodes: Nodes, path: str | os.PathLike[str], *, px_per_m: float | None
             fault(Setting("px_per_m"), f"{px_per_m} is no scale", "Give pixels per metre, above 0")
         )
     nodes.check()
+    if writer is _c3d:
+        _numbered(nodes, str(target))
     # The libraries look at the ending, so the temporary name keeps it.
     temporary = target.with_name(f".{target.stem}.writing{target.suffix}")
     try:
@@ -83,6 +90,20 @@ def _upright(nodes: Nodes, px_per_m: float | None) -> tuple[NDArray[np.float64],
     out[..., 1] = nodes.rig.image_px[1] - 1 - nodes.xy_px[..., 1]
     out[..., 2] = np.where(nodes.seen, 0.0, np.nan)
     return (out, "px") if px_per_m is None else (out * (1000 / px_per_m), "mm")
+
+
+def _numbered(nodes: Nodes, name: str) -> None:
+    """Refuses frames that C3D has no number for."""
+    first = int(nodes.frame[0]) + 1 if len(nodes) else 1
+    last = first + len(nodes) - 1
+    if last > LAST_C3D_FRAME:
+        raise TableError(
+            fault(
+                name,
+                f"its frames would have the numbers {first} to {last}, and those of C3D end at {LAST_C3D_FRAME}",
+                "Write it as .trc, .csv or .mat, which have no such end",
+            )
+        )
 
 
 def _c3d(nodes: Nodes, path: Path, px_per_m: float | None) -> None:
