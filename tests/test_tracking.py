@@ -353,3 +353,32 @@ def test_what_ffmpeg_says_of_a_file_reaches_the_user(tmp_path: Path) -> None:
     # FFmpeg's own words; they were an empty pair of brackets once.
     with pytest.raises(dp.SourceError, match=r"no\.mp4: not a recording that can be read \(\w+"):
         dp.info(path)
+
+
+def test_a_recording_that_is_cut_while_it_is_read_is_an_error_and_not_the_end_of_python(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "drop.mraw"
+    # Zeros that take no room, more than are read until the first call; markers in the first frames, and where levels
+    # are learned: in the middles of a dozen or two dozen equal parts.
+    count, size = 240_000, H * W
+    with path.open("wb") as file:
+        for t in [*range(60), *range(count // 48, count, count // 48)]:
+            file.seek(t * size)
+            file.write(image(t).tobytes())
+    os.truncate(path, count * size)
+    keys = {
+        "Record Rate(fps)": 500, "Total Frame": count, "Image Width": W, "Image Height": H, "Color Bit": 8,
+        "Color Type": "Mono", "File Format": "MRaw",
+    }  # fmt: skip
+    lines = [f"{key} : {value}" for key, value in keys.items()]
+    path.with_suffix(".cih").write_text("\n".join(["#Camera Information Header", *lines]) + "\n")
+
+    def cut(stage: str, done: int, total: int | None) -> None:
+        if stage == "detecting":
+            os.truncate(path, 41 * size + 9)
+
+    with pytest.raises(
+        dp.SourceError, match=r"drop\.mraw, frame \d+: the file became shorter while it was read"
+    ):
+        dp.track(path, rig(), progress=cut)

@@ -234,7 +234,7 @@ fn maxima(path: &Path) -> u64 {
         if batch.is_empty() {
             return sum;
         }
-        sum += batch.into_par_iter().map(|f| u64::from(brightest(&f).unwrap())).sum::<u64>();
+        sum += batch.into_par_iter().map(|f| u64::from(brightest(&f).unwrap().unwrap())).sum::<u64>();
     }
 }
 

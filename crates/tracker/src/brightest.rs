@@ -5,12 +5,19 @@
 
 use multiversion::multiversion;
 
+use crate::error::Result;
 use crate::frame::{Frame, PixelFormat};
 
 /// The greatest sample of a frame, in units of its least significant bit; `None` if it was not decoded or its plane
 /// is shorter than its size says.
-pub fn brightest(frame: &Frame) -> Option<u16> {
-    let bytes = frame.plane.as_ref()?.bytes();
+///
+/// # Errors
+/// [`Error::Source`](crate::error::Error::Source) where the recording cannot be read any more.
+pub fn brightest(frame: &Frame) -> Result<Option<u16>> {
+    Ok(frame.bytes()?.and_then(|bytes| brightest_in(frame, bytes)))
+}
+
+fn brightest_in(frame: &Frame, bytes: &[u8]) -> Option<u16> {
     let (width, height) = (frame.width as usize, frame.height as usize);
     let row_bits = width.checked_mul(frame.format.bits_per_pixel() as usize)?;
     if frame.stride == 0 || frame.stride * 8 == row_bits {
@@ -139,9 +146,9 @@ mod tests {
                         depth_bits: bits as u32,
                         plane: Some(Box::new(bytes.clone())),
                     };
-                    assert_eq!(brightest(&frame), Some(top), "{format:?} {width} x {height}, {at}");
+                    assert_eq!(brightest(&frame), Ok(Some(top)), "{format:?} {width} x {height}, {at}");
                     frame.plane = Some(Box::new(bytes[..bytes.len() - 1].to_vec()));
-                    assert_eq!(brightest(&frame), None, "{format:?} {width} x {height} cut");
+                    assert_eq!(brightest(&frame), Ok(None), "{format:?} {width} x {height} cut");
                 }
                 let dark = Frame {
                     index: 0,
@@ -154,7 +161,7 @@ mod tests {
                     // 255 only between the rows.
                     plane: Some(Box::new([vec![1; 2 * width], vec![255; 3], vec![1; 2 * width]].concat())),
                 };
-                assert_eq!(brightest(&dark), Some(257));
+                assert_eq!(brightest(&dark), Ok(Some(257)));
             }
         }
     }

@@ -7,7 +7,7 @@
 
 use std::fmt;
 
-use crate::error::Result;
+use crate::error::{Error, Fault, Result};
 use crate::message::Message;
 
 /// How the samples of one row are stored.
@@ -54,10 +54,15 @@ impl TimeBase {
     }
 }
 
-/// Bytes that a frame lends out: a decoder's buffer, a memory map, a vector.
+/// Bytes that a frame lends out: a decoder's buffer, a part of a file, a vector.
 pub trait Bytes: Send + Sync {
-    /// The bytes, the same at every call.
+    /// The bytes, the same at every call; none where there is a fault.
     fn bytes(&self) -> &[u8];
+
+    /// What kept the bytes from being read, for those that are read when they are first asked for.
+    fn fault(&self) -> Option<&Fault> {
+        None
+    }
 }
 
 impl Bytes for Vec<u8> {
@@ -85,6 +90,23 @@ pub struct Frame {
     pub depth_bits: u32,
     /// The plane; `None` for a frame that could not be decoded. It still has its index and time.
     pub plane: Option<Box<dyn Bytes>>,
+}
+
+impl Frame {
+    /// The bytes of the plane; `None` for a frame that could not be decoded.
+    ///
+    /// # Errors
+    /// [`Error::Source`] where they cannot be read from the recording any more.
+    pub fn bytes(&self) -> Result<Option<&[u8]>> {
+        let Some(plane) = &self.plane else { return Ok(None) };
+        let bytes = plane.bytes();
+        plane.fault().map_or(Ok(Some(bytes)), |fault| Err(Error::Source(fault.clone())))
+    }
+
+    /// Bytes that its samples take without gaps between rows.
+    pub fn size_bytes(&self) -> usize {
+        self.width as usize * self.height as usize * self.format.bits_per_pixel() as usize / 8
+    }
 }
 
 impl fmt::Debug for Frame {

@@ -6,6 +6,8 @@
 pub mod error;
 #[path = "../../src/frame.rs"]
 pub mod frame;
+#[path = "../../src/message.rs"]
+pub mod message;
 #[path = "../../src/rig.rs"]
 pub mod rig;
 

@@ -8,5 +8,7 @@ pub mod clock;
 pub mod mraw;
 #[path = "../../src/source/options.rs"]
 mod options;
+#[path = "../../src/source/raw.rs"]
+mod raw;
 
 pub use options::OpenOptions;

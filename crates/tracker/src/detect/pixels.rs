@@ -25,10 +25,10 @@ impl<'a> Pixels<'a> {
     /// The pixels of a frame, `None` if it was not decoded.
     ///
     /// # Errors
-    /// [`Error::Detect`] where the plane holds fewer bytes than its size says.
+    /// [`Error::Detect`] where the plane holds fewer bytes than its size says, [`Error::Source`] where the recording
+    /// cannot be read any more.
     pub fn of(frame: &'a Frame) -> Result<Option<Self>> {
-        let Some(plane) = &frame.plane else { return Ok(None) };
-        let bytes = plane.bytes();
+        let Some(bytes) = frame.bytes()? else { return Ok(None) };
         let (width, height) = (frame.width as usize, frame.height as usize);
         let bits = frame.format.bits_per_pixel() as usize;
         let row_bits = if frame.stride == 0 { width * bits } else { frame.stride * 8 };

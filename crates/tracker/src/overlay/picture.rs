@@ -35,8 +35,7 @@ pub(super) fn colour(frame: &Frame, size: [i32; 2]) -> Result<Mat> {
 /// Samples of a frame by their upper 8 bits, row by row.
 fn gray8(frame: &Frame) -> Result<Vec<u8>> {
     let (w, h) = (frame.width as usize, frame.height as usize);
-    let Some(plane) = &frame.plane else { return Ok(vec![0; w * h]) };
-    let bytes = plane.bytes();
+    let Some(bytes) = frame.bytes()? else { return Ok(vec![0; w * h]) };
     let short = || {
         Error::Film(Fault::new(
             "overlay",

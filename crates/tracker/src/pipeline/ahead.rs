@@ -104,6 +104,5 @@ fn read(
 
 /// Frames in a batch: so many that handing them on costs nothing beside detecting in them.
 fn batch_size(frame: &Frame) -> usize {
-    let bytes = frame.width as usize * frame.height as usize * frame.format.bits_per_pixel() as usize / 8;
-    (BATCH_BYTES / bytes.max(1)).clamp(1, MOST_FRAMES)
+    (BATCH_BYTES / frame.size_bytes().max(1)).clamp(1, MOST_FRAMES)
 }

@@ -7,8 +7,10 @@ pub mod clock;
 pub mod ffmpeg;
 pub mod images;
 pub mod mraw;
+pub mod norpix;
 pub mod opencv;
 mod options;
+mod raw;
 pub mod synthetic;
 
 use std::fs::{self, File};
@@ -61,13 +63,12 @@ impl Input {
     }
 
     fn address(name: &str, options: &OpenOptions) -> Result<Self> {
-        let scheme = name.split_once(':').map_or("", |(s, _)| s);
-        let is_address = scheme.len() > 1 && scheme.chars().all(|c| c.is_ascii_alphanumeric() || c == '+');
-        if !is_address {
+        if !ffmpeg::formats::is_address(name) {
             return Err(Error::Source(
                 Fault::new(name, "no such file").advice("Check the name and the folder you are in"),
             ));
         }
+        let scheme = name.split([':', ',']).next().unwrap_or(name);
         if !options.allow_protocol {
             return Err(Error::Source(
                 Fault::new(name, format!("an address ({scheme}:), and these are not opened unasked"))
@@ -95,6 +96,10 @@ pub fn open(name: &str, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
         return Ok(Box::new(images::SequenceSource::open(name, options)?));
     }
     let input = Input::of(name, options)?;
+    // FFmpeg would take its name for a pattern of others.
+    if matches!(input, Input::File(_)) && images::names::is_pattern(name) && images::names::is_picture(name) {
+        return Ok(Box::new(images::SequenceSource::open_one(name, options)?));
+    }
     if let Input::File(_) = &input {
         let first = first_bytes(name)?;
         let by_camera: Option<Box<dyn FrameSource>> = match &first[..] {
@@ -102,6 +107,7 @@ pub fn open(name: &str, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
             [b'C', b'I', ..] if first.get(2..4) == Some(&[44, 0]) => {
                 Some(Box::new(cine::CineSource::open(name, &input, options)?))
             }
+            b if norpix::is_norpix(b) => Some(Box::new(norpix::NorpixSource::open(name, options)?)),
             [b'I', b'I', 42 | 43, 0, ..] | [b'M', b'M', 0, 42 | 43, ..] => {
                 Some(Box::new(images::StackSource::open(name, options)?))
             }
@@ -116,7 +122,6 @@ pub fn open(name: &str, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
                 _ => Ok(source),
             };
         }
-        refuse_lists(name, &first)?;
     }
     let source = ffmpeg::FfmpegSource::open(name, &input, options)?;
     if options.decoder != Decoder::Opencv {
@@ -150,19 +155,4 @@ fn first_bytes(name: &str) -> Result<Vec<u8>> {
         ));
     }
     Ok(bytes)
-}
-
-/// Refuses text files that make a demuxer open other files or addresses.
-fn refuse_lists(name: &str, bytes: &[u8]) -> Result<()> {
-    let text = String::from_utf8_lossy(&bytes[..bytes.len().min(256)]);
-    let text = text.trim_start_matches(['\u{feff}', ' ', '\r', '\n', '\t']);
-    let is_list = text.starts_with("#EXTM3U")
-        || text.starts_with("ffconcat")
-        || text.starts_with("<?xml") && String::from_utf8_lossy(bytes).contains("<MPD");
-    if is_list {
-        return Err(Error::Source(
-            Fault::new(name, "a list of other files, not a recording").advice("Give the recording itself"),
-        ));
-    }
-    Ok(())
 }

@@ -66,7 +66,8 @@ fn open(name: &str) -> Result<VideoCapture> {
                 .advice("Leave out " + Setting::Decoder.set_to("opencv")),
         )
     };
-    let capture = VideoCapture::from_file(name, videoio::CAP_FFMPEG)
+    // With its protocol, a name is never taken for an address.
+    let capture = VideoCapture::from_file(&format!("file:{name}"), videoio::CAP_FFMPEG)
         .map_err(|e| failed(format!(" ({})", e.message)))?;
     match capture.is_opened() {
         Ok(true) => Ok(capture),

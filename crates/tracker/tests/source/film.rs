@@ -107,6 +107,16 @@ pub fn encode(folder: &Path, name: &str, count: usize, arguments: &[&str]) -> Pa
     path
 }
 
+/// Picture `index` as a gray JPEG of good quality; `ffmpeg` makes colour ones only.
+pub fn gray_jpeg(index: usize) -> Vec<u8> {
+    let pixels = picture(index);
+    let mat = opencv::core::Mat::from_slice(&pixels).unwrap();
+    let mut bytes = opencv::core::Vector::<u8>::new();
+    let mat = opencv::prelude::MatTraitConst::reshape(&mat, 1, HEIGHT as i32).unwrap();
+    assert!(opencv::imgcodecs::imencode_def(".jpg", &mat, &mut bytes).unwrap());
+    bytes.iter().collect()
+}
+
 /// A real recording from the shared folder, if it is there; says so if not.
 pub fn real(name: &str) -> Option<PathBuf> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data").join(name);

@@ -132,3 +132,102 @@ fn the_pages_of_a_tiff_are_frames_and_a_cut_one_ends_early() {
     let Ending::Early { frames: n, .. } = source.ending() else { panic!("not early") };
     assert_eq!(n as usize, frames.len());
 }
+
+/// A gray PGM picture with one value in all samples.
+fn pgm(path: &Path, width: usize, height: usize, value: u8) {
+    let mut bytes = format!("P5 {width} {height} 255\n").into_bytes();
+    bytes.resize(bytes.len() + width * height, value);
+    std::fs::write(path, bytes).unwrap();
+}
+
+#[test]
+fn company_in_a_folder_is_left_out_and_named() {
+    for company in [
+        &["cover.pgm"][..],
+        &["AAA_preview.pgm", "zzz.pgm"],
+        &["._img_001.pgm", ".hidden.pgm", "Thumbs.db", ".DS_Store", "notes.txt", "desktop.ini"],
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        for i in 0..30 {
+            pgm(&folder.path().join(format!("img_{:03}.pgm", i + 1)), 8, 6, 100 + i);
+        }
+        for name in company {
+            pgm(&folder.path().join(name), 3, 2, 7);
+        }
+        let named: Vec<&&str> =
+            company.iter().filter(|n| n.ends_with(".pgm") && !n.starts_with('.')).collect();
+        for name in
+            [folder.path().to_owned(), folder.path().join("img*.pgm"), folder.path().join("img_%03d.pgm")]
+        {
+            let mut source = open(name.to_str().unwrap(), &with_fps(100.0)).unwrap();
+            assert_eq!((source.info().width, source.info().height), (8, 6));
+            let warnings =
+                source.info().warnings.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n");
+            let frames = read_all(&mut *source);
+            assert_eq!((frames.len(), source.ending()), (30, Ending::Complete), "{}", name.display());
+            assert!((0..30).all(|i| samples(&frames[i]).unwrap()[0] == 100 + i as u32));
+            let told = name.is_dir() && !named.is_empty();
+            assert_eq!(warnings.contains("left out"), told, "{warnings}");
+            assert!(!told || named.iter().all(|n| warnings.contains(**n)), "{warnings}");
+        }
+    }
+    // A pattern of all pictures leaves out no more than what is hidden.
+    let folder = tempfile::tempdir().unwrap();
+    (1..4).for_each(|i| pgm(&folder.path().join(format!("{i}.pgm")), 8, 6, i));
+    pgm(&folder.path().join("._1.pgm"), 8, 6, 9);
+    let all = folder.path().join("*.pgm");
+    assert_eq!(read_all(&mut *open(all.to_str().unwrap(), &with_fps(1.0)).unwrap()).len(), 3);
+}
+
+#[test]
+fn a_first_picture_of_another_size_is_the_odd_one() {
+    for odd in [1, 7, 20] {
+        let folder = tempfile::tempdir().unwrap();
+        for i in 1..=20 {
+            let (width, height) = if i == odd { (3, 2) } else { (8, 6) };
+            pgm(&folder.path().join(format!("img_{i:03}.pgm")), width, height, i as u8);
+        }
+        let mut source = open(folder.path().to_str().unwrap(), &with_fps(100.0)).unwrap();
+        assert_eq!((source.info().width, source.info().height), (8, 6));
+        if odd != 7 {
+            let expected = format!("picture {} (img_{odd:03}.pgm) is 3 x 2 px", odd - 1);
+            assert!(
+                source.info().warnings.iter().any(|w| w.to_string().contains(&expected)),
+                "{:?}",
+                source.info().warnings
+            );
+        }
+        let frames = read_all(&mut *source);
+        let empty: Vec<usize> = (0..frames.len()).filter(|i| frames[*i].plane.is_none()).collect();
+        if odd == 20 {
+            assert_eq!((frames.len(), empty.len()), (19, 0));
+            assert!(matches!(source.ending(), Ending::Early { frames: 19, .. }));
+        } else {
+            assert_eq!((frames.len(), empty), (20, vec![odd - 1]));
+        }
+    }
+}
+
+#[test]
+fn several_sequences_in_a_folder_or_several_pictures_in_a_file_are_refused() {
+    let problem = |path: &Path| open(path.to_str().unwrap(), &with_fps(100.0)).err().unwrap().to_string();
+    let folder = tempfile::tempdir().unwrap();
+    for i in 0..6 {
+        pgm(&folder.path().join(format!("left_{i}.pgm")), 8, 6, i);
+        pgm(&folder.path().join(format!("right_{i}.pgm")), 8, 6, i);
+    }
+    let told = problem(folder.path());
+    assert!(told.contains("several sequences of pictures (6 left_#.pgm, 6 right_#.pgm)"), "{told}");
+    let one = folder.path().join("left_*.pgm");
+    assert_eq!(read_all(&mut *open(one.to_str().unwrap(), &with_fps(100.0)).unwrap()).len(), 6);
+
+    let folder = tempfile::tempdir().unwrap();
+    (0..3).for_each(|i| write_stack(&folder.path().join(format!("part_{i}.tif")), 4));
+    let told = problem(folder.path());
+    assert!(told.contains("it holds several pictures, and in a folder each file is one"), "{told}");
+    // A file whose name looks like a pattern is itself.
+    let path = folder.path().join("img_%03d.pgm");
+    pgm(&path, 8, 6, 77);
+    let frames = read_all(&mut *open(path.to_str().unwrap(), &with_fps(100.0)).unwrap());
+    assert_eq!((frames.len(), samples(&frames[0]).unwrap()[0]), (1, 77));
+}

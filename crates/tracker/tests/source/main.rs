@@ -4,13 +4,17 @@
 mod film;
 
 mod cine;
+mod cut;
 mod damage;
 mod ffmpeg;
+mod formats;
 mod images;
 mod info;
 mod lies;
 mod mraw;
+mod norpix;
 mod opencv;
 mod pixels;
 mod program;
+mod tiffs;
 mod times;

@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use rayon::prelude::*;
 use serde_json::{Value, json};
 use tracker::brightest::brightest;
+use tracker::error::Error;
 use tracker::frame::{Ending, Frame, FrameSource, PixelFormat};
 use tracker::pipeline;
 use tracker::source::{OpenOptions, open};
@@ -116,24 +117,24 @@ fn look(source: &mut dyn FrameSource, count: bool) -> anyhow::Result<Seen> {
         if seen.first.len() < FIRST {
             seen.first.push(frame.ticks);
         }
-        bytes += frame.plane.as_ref().map_or(0, |p| p.bytes().len());
+        bytes += frame.size_bytes();
         batch.push(frame);
         if bytes >= BATCH_BYTES {
-            seen.brightest = seen.brightest.max(brightest_of(&mut batch));
+            seen.brightest = seen.brightest.max(brightest_of(&mut batch)?);
             bytes = 0;
         }
     }
     if seen.ending.is_some() {
         seen.counted = Some((frames, lost));
         seen.is_whole = true;
-        seen.brightest = seen.brightest.max(brightest_of(&mut batch));
+        seen.brightest = seen.brightest.max(brightest_of(&mut batch)?);
     }
     Ok(seen)
 }
 
 /// The greatest sample of the frames, each looked at by whichever core is free; empties the vector.
-fn brightest_of(batch: &mut Vec<Frame>) -> Option<u16> {
-    batch.par_drain(..).filter_map(|frame| brightest(&frame)).max()
+fn brightest_of(batch: &mut Vec<Frame>) -> Result<Option<u16>, Error> {
+    batch.par_drain(..).map(|frame| brightest(&frame)).try_reduce(|| None, |a, b| Ok(a.max(b)))
 }
 
 fn format_name(format: PixelFormat) -> &'static str {

@@ -5,8 +5,8 @@
 pub mod header;
 
 use std::fs::File;
-
-use memmap2::Mmap;
+use std::io::Read;
+use std::os::unix::fs::FileExt;
 
 use super::ffmpeg::FfmpegSource;
 use super::{Input, OpenOptions};
@@ -14,6 +14,22 @@ use crate::error::{Error, Fault, Result};
 use crate::frame::{Ending, Frame, FrameSource, RateClaims, RateOrigin, SourceInfo, TimeBase};
 use crate::message::Setting;
 use header::{Header, TICKS_PER_S};
+
+/// Most bytes of a header that are read: time stamps and exposures of twenty million frames.
+const MOST_HEAD_BYTES: u64 = 256 << 20;
+/// The first bytes, and a setup block's greatest length, which is two bytes in the file.
+const LEAST_HEAD_BYTES: u64 = 44 + 40 + 65536;
+
+/// The bytes before the table of frames, which hold all that the header says.
+fn head(name: &str) -> std::io::Result<Vec<u8>> {
+    let file = File::open(name)?;
+    let mut table = [0; 4];
+    // A file too short for it is told by the header's reader.
+    let end = file.read_exact_at(&mut table, 32).map_or(0, |()| u64::from(u32::from_le_bytes(table)));
+    let mut bytes = Vec::new();
+    file.take(end.clamp(LEAST_HEAD_BYTES, MOST_HEAD_BYTES)).read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
 
 /// A Phantom recording.
 pub struct CineSource {
@@ -35,12 +51,7 @@ impl CineSource {
                 Fault::new(name, format!("the file cannot be read ({e})")).advice("Check its permissions"),
             )
         };
-        let file = File::open(name).map_err(unreadable)?;
-        // SAFETY: the map is only read, and dropped before this function returns; a file that is cut meanwhile
-        // by another program ends this one by a signal, as with every reader of memory maps.
-        let map = unsafe { Mmap::map(&file) }.map_err(unreadable)?;
-        let header = Header::parse(&map, name)?;
-        drop(map);
+        let header = Header::parse(&head(name).map_err(unreadable)?, name)?;
         let inner = FfmpegSource::open(name, input, options)?;
         let mut info = inner.info().clone();
         // The header and the stamps say what FFmpeg's demuxer can only guess.

@@ -9,11 +9,8 @@ use std::ptr;
 use ffmpeg_next::ffi;
 
 use super::boxes::Boxes;
-use super::message;
+use super::{formats, message};
 use crate::error::{Error, Fault, Result};
-
-/// Demuxers that would open further files or addresses named inside the file.
-const PLAYLISTS: [&str; 5] = ["hls", "concat", "dash", "image2", "imf"];
 
 /// An open container with one video stream selected; all others are discarded unread.
 pub(super) struct Demuxer {
@@ -36,20 +33,25 @@ pub(super) enum Read {
 }
 
 impl Demuxer {
-    /// Opens `url` (with its protocol, e.g. `file:`); `protocols` are those that may be used.
+    /// Opens `url` (with its protocol, e.g. `file:`) if it is of a format in [`formats::READ`]; `protocols` are those
+    /// that may be used.
     pub(super) fn open(url: &str, name: &str, protocols: Option<&str>) -> Result<Self> {
         let failed = |code: i32| {
-            Error::Source(
-                Fault::new(name, format!("not a recording that can be read ({})", message(code)))
+            Error::Source(match formats::not_read(url) {
+                Some(what) => Fault::new(name, what).advice("Give the recording itself"),
+                None => Fault::new(name, format!("not a recording that can be read ({})", message(code)))
                     .advice("Check that the file is complete and that `ffmpeg -i` reads it"),
-            )
+            })
         };
         let address =
             CString::new(url).map_err(|_| Error::Source(Fault::new(name, "the name holds a zero byte")))?;
         let mut options: *mut ffi::AVDictionary = ptr::null_mut();
-        if let Some(list) = protocols.and_then(|p| CString::new(p).ok()) {
-            // SAFETY: all strings are valid and zero-terminated; av_dict_set copies them.
-            unsafe { ffi::av_dict_set(&mut options, c"protocol_whitelist".as_ptr(), list.as_ptr(), 0) };
+        let formats = formats::allowed(protocols.is_none());
+        for (option, list) in [(c"protocol_whitelist", protocols), (c"format_whitelist", Some(&*formats))] {
+            if let Some(list) = list.and_then(|l| CString::new(l).ok()) {
+                // SAFETY: all strings are valid and zero-terminated; av_dict_set copies them.
+                unsafe { ffi::av_dict_set(&mut options, option.as_ptr(), list.as_ptr(), 0) };
+            }
         }
         let boxes = url.strip_prefix("file:").map_or_else(Boxes::default, |p| Boxes::of(Path::new(p)));
         if boxes.edits_change_time {
@@ -66,13 +68,6 @@ impl Demuxer {
             return Err(failed(code));
         }
         let mut demuxer = Self { context, stream: 0, boxes };
-        let container = demuxer.container();
-        if PLAYLISTS.iter().any(|p| container.split(',').any(|c| c == *p)) {
-            return Err(Error::Source(
-                Fault::new(name, format!("a list of other files ({container}), not a recording"))
-                    .advice("Give the recording itself"),
-            ));
-        }
         // SAFETY: the context is open; null asks for no per-stream options.
         let code = unsafe { ffi::avformat_find_stream_info(demuxer.context, ptr::null_mut()) };
         if code < 0 {
@@ -94,6 +89,12 @@ impl Demuxer {
                 Fault::new(name, "it holds no video stream").advice("Give a film, not a sound or text file"),
             )
         })?;
+        if demuxer.stream().disposition & ffi::AV_DISPOSITION_ATTACHED_PIC != 0 {
+            return Err(Error::Source(
+                Fault::new(name, "it holds no video stream, only sound with a cover picture")
+                    .advice("Give a film, not a sound file"),
+            ));
+        }
         // SAFETY: `nb_streams` streams are valid while the context is open.
         unsafe {
             for i in 0..(*demuxer.context).nb_streams as usize {

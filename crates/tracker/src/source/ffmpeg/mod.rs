@@ -10,6 +10,7 @@ mod decode;
 mod demux;
 mod describe;
 mod ending;
+pub(crate) mod formats;
 mod layout;
 mod order;
 mod sample;
@@ -110,7 +111,7 @@ impl FfmpegSource {
         unsafe { ffi::av_log_set_level(ffi::AV_LOG_QUIET) };
         let (url, can_reopen, protocols) = match input {
             Input::File(url) => (url, true, Some("file")),
-            Input::Pipe(url) => (url, false, Some("file,pipe")),
+            Input::Pipe(url) => (url, false, Some(if url.starts_with("file:") { "file" } else { "pipe" })),
             Input::Address(url) => (url, false, None),
         };
         let mut demuxer = Demuxer::open(url, name, protocols)?;

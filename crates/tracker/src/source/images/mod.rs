@@ -3,7 +3,9 @@
 //! Owns: [`SequenceSource`], [`StackSource`].
 
 pub mod names;
+mod page;
 pub mod picture;
+mod planes;
 mod stack;
 
 use std::collections::VecDeque;
@@ -20,6 +22,10 @@ pub use stack::StackSource;
 
 /// Bytes of pictures decoded ahead at most.
 const AHEAD_BYTES: usize = 48 << 20;
+/// Pictures, spread over the sequence, of which most must agree on a size.
+const LOOKED_AT: usize = 9;
+/// Pictures looked at, from the first on, if none of those can be read.
+const LOOKED_FOR: usize = 16;
 
 /// Picture files in the order of their numbers.
 pub struct SequenceSource {
@@ -66,29 +72,61 @@ fn frame(info: &SourceInfo, index: u64, picture: Option<Picture>) -> Frame {
     }
 }
 
+/// A picture of the size and depth that most pictures have, and its file. The first one may be a small copy, which is said.
+fn size_of_most<'a>(
+    there: &[(usize, &'a PathBuf)],
+    warnings: &mut Vec<Message>,
+) -> Result<(Picture, &'a PathBuf)> {
+    let n = there.len().min(LOOKED_AT);
+    // The first and the last are among them.
+    let spread = (0..n).map(|k| there[k * (there.len() - 1) / (n - 1).max(1)]);
+    let mut problem = None;
+    let mut readable = |(index, path): (usize, &'a PathBuf)| match picture::read(path) {
+        Ok(picture) => Some((index, path, picture)),
+        Err(e) => {
+            problem.get_or_insert((path, e));
+            None
+        }
+    };
+    let mut pictures: Vec<_> = spread.filter_map(&mut readable).collect();
+    if pictures.is_empty() {
+        pictures.extend(there.iter().copied().take(LOOKED_FOR).find_map(readable));
+    }
+    let kind = |p: &Picture| (p.width, p.height, p.depth_bits);
+    let like = |p: &Picture| pictures.iter().filter(|(.., other)| kind(other) == kind(p)).count();
+    // Of several as many, the first.
+    let Some(best) = (0..pictures.len()).rev().max_by_key(|i| like(&pictures[*i].2)) else {
+        let (path, problem) = problem.map_or_else(Default::default, |(p, e)| (p.display().to_string(), e));
+        return Err(Error::Source(Fault::new(path, problem).advice(
+            "Check that the pictures were copied whole; a file with several pictures is given by itself, without its folder",
+        )));
+    };
+    for (index, path, odd) in pictures.iter().filter(|(.., p)| kind(p) != kind(&pictures[best].2)) {
+        let (name, usual) = (path.file_name().unwrap_or_default().to_string_lossy(), &pictures[best].2);
+        warnings.push(format!(
+            "picture {index} ({name}) is {} x {} px of {} bits, most are {} x {} px of {}: such a frame stays empty",
+            odd.width, odd.height, odd.depth_bits, usual.width, usual.height, usual.depth_bits
+        ).into());
+    }
+    let (_, path, picture) = pictures.swap_remove(best);
+    Ok((picture, path))
+}
+
 impl SequenceSource {
     /// Opens a folder or a pattern.
     ///
     /// # Errors
     /// [`Error::Source`] if there are no pictures or none can be read.
     pub fn open(name: &str, options: &OpenOptions) -> Result<Self> {
-        let numbered = names::list(name)?;
+        Self::over(name, names::list(name)?, options)
+    }
+
+    fn over(name: &str, numbered: names::Numbered, options: &OpenOptions) -> Result<Self> {
         let mut warnings = numbered.warnings;
         let files = numbered.files;
-        let mut problem = None;
-        // Its size is that of the first that can be read.
-        let first = files.iter().flatten().take(16).find_map(|path| {
-            picture::read(path)
-                .map_err(|e| problem.get_or_insert_with(|| (path.clone(), e)).1.len())
-                .ok()
-                .map(|p| (path, p))
-        });
-        let Some((path, first)) = first else {
-            let (path, problem) = problem.unwrap_or_default();
-            return Err(Error::Source(
-                Fault::new(path.display(), problem).advice("Check that the pictures were copied whole"),
-            ));
-        };
+        let there: Vec<(usize, &PathBuf)> =
+            files.iter().enumerate().filter_map(|(i, f)| f.as_ref().map(|p| (i, p))).collect();
+        let (first, path) = size_of_most(&there, &mut warnings)?;
         let (time_base, rate_hz, rate_origin) = rate(options, &mut warnings)?;
         let ending = path.extension().map_or(String::new(), |e| e.to_string_lossy().to_lowercase());
         let size_bytes = files.iter().flatten().map(|f| std::fs::metadata(f).map_or(0, |m| m.len())).sum();
@@ -120,6 +158,18 @@ impl SequenceSource {
             damaged: Vec::new(),
             ending: Ending::Complete,
         })
+    }
+
+    /// A picture file alone.
+    ///
+    /// # Errors
+    /// As for [`SequenceSource::open`].
+    pub fn open_one(name: &str, options: &OpenOptions) -> Result<Self> {
+        Self::over(
+            name,
+            names::Numbered { files: vec![Some(PathBuf::from(name))], warnings: Vec::new() },
+            options,
+        )
     }
 
     /// Decodes the next few pictures side by side.

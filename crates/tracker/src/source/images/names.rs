@@ -3,6 +3,7 @@
 //! Owns: [`list`], [`Numbered`]. Must not: open a picture.
 
 use std::cmp::Ordering;
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -49,7 +50,7 @@ pub fn list(name: &str) -> Result<Numbered> {
         .filter(|e| e.path().is_file())
         .map(|e| e.file_name().to_string_lossy().into_owned())
         .filter(|n| match &pattern {
-            Some(p) => fits(p, n),
+            Some(p) => fits(p, n) && (!n.starts_with('.') || p.starts_with('.')),
             None => is_picture(n) && !n.starts_with('.'),
         })
         .collect();
@@ -60,14 +61,61 @@ pub fn list(name: &str) -> Result<Numbered> {
         ));
     }
     names.sort_by(|a, b| natural(a, b));
+    let left_out = if pattern.is_none() { leave_out(name, &mut names)? } else { None };
     let mut numbered = gaps(&names);
+    numbered.warnings.extend(left_out.map(Message::from));
     for file in numbered.files.iter_mut().flatten() {
         *file = folder.join(&*file);
     }
     Ok(numbered)
 }
 
-fn is_picture(name: &str) -> bool {
+/// How many times as many pictures of one naming as of any other make the others company: covers and previews.
+const CLEARLY_MORE: usize = 10;
+
+/// The naming of a file: its name with `#` for each number.
+fn naming(name: &str) -> String {
+    runs(&name.to_lowercase()).into_iter().map(|r| if r.starts_with(is_digit) { "#" } else { r }).collect()
+}
+
+/// Leaves the pictures of a folder that belong to one sequence, and says which ones were left out.
+fn leave_out(folder: &str, names: &mut Vec<String>) -> Result<Option<String>> {
+    let mut counts: BTreeMap<String, usize> = BTreeMap::new();
+    for name in &*names {
+        *counts.entry(naming(name)).or_default() += 1;
+    }
+    let mut by_count: Vec<(usize, String)> = counts.into_iter().map(|(naming, n)| (n, naming)).collect();
+    by_count.sort_by(|a, b| b.0.cmp(&a.0).then_with(|| a.1.cmp(&b.1)));
+    let [(most, naming_of_most), (second, _), ..] = &by_count[..] else { return Ok(None) };
+    // Names that are all different tell nothing; two pictures alike by chance neither.
+    if *most < 3 {
+        return Ok(None);
+    }
+    let kinds: Vec<String> = by_count.iter().take(3).map(|(n, naming)| format!("{n} {naming}")).collect();
+    let more = if by_count.len() > 3 { ", ..." } else { "" };
+    if second * CLEARLY_MORE > *most && *second > 1 {
+        return Err(Error::Source(
+            Fault::new(
+                folder,
+                format!("the folder holds several sequences of pictures ({}{more})", kinds.join(", ")),
+            )
+            .advice("Give one of them as a pattern, such as 'frames/img_%05d.png'"),
+        ));
+    }
+    let (kept, others): (Vec<String>, Vec<String>) =
+        std::mem::take(names).into_iter().partition(|n| naming(n) == *naming_of_most);
+    *names = kept;
+    let some: Vec<&str> = others.iter().take(3).map(String::as_str).collect();
+    let more = if others.len() > 3 { ", ..." } else { "" };
+    Ok(Some(format!(
+        "{} other pictures in the folder are left out ({}{more}): they are not named as the {most} {naming_of_most}",
+        others.len(),
+        some.join(", ")
+    )))
+}
+
+/// Whether a file's ending is one of pictures.
+pub fn is_picture(name: &str) -> bool {
     let ending = Path::new(name).extension().and_then(|e| e.to_str()).map(str::to_lowercase);
     ending.is_some_and(|e| ENDINGS.contains(&e.as_str()))
 }

@@ -1,6 +1,6 @@
 //! One picture file: 8 or 16 bit brightness, whatever it was stored as.
 //!
-//! Owns: [`Picture`], [`read`], [`page`]. Must not: scale values; 16 bit stay 16 bit.
+//! Owns: [`Picture`], [`read`], [`decode`]. Must not: scale values; 16 bit stay 16 bit.
 
 use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
@@ -9,8 +9,10 @@ use std::path::Path;
 use opencv::core::{CV_8U, CV_16U};
 use opencv::imgcodecs;
 use opencv::prelude::{MatTraitConst, MatTraitConstManual};
-use tiff::ColorType;
-use tiff::decoder::{Decoder, DecodingResult};
+use tiff::decoder::Decoder;
+
+use super::page::{is_reduced, page};
+use super::planes::are_behind;
 
 /// A decoded picture.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -19,7 +21,7 @@ pub struct Picture {
     pub width: u32,
     /// Height, px.
     pub height: u32,
-    /// 8, or 16 for little-endian pairs.
+    /// 8, or 9 to 16 for little-endian pairs.
     pub depth_bits: u32,
     /// Samples, row by row without gaps.
     pub samples: Vec<u8>,
@@ -38,12 +40,39 @@ pub fn read(path: &Path) -> Result<Picture, String> {
     }
     if head.starts_with(b"II") || head.starts_with(b"MM") {
         file.seek(SeekFrom::Start(0)).map_err(|e| e.to_string())?;
+        let size = file.metadata().map_err(|e| e.to_string())?.len();
         let mut decoder = Decoder::new(BufReader::new(file)).map_err(|e| e.to_string())?;
-        return page(&mut decoder);
+        let picture = page(&mut decoder)?;
+        let several = || "it holds several pictures, and in a folder each file is one".to_owned();
+        if !decoder.more_images() && are_behind(&mut decoder, size) {
+            return Err(several());
+        }
+        while decoder.more_images() {
+            decoder.next_image().map_err(|e| e.to_string())?;
+            if !is_reduced(&mut decoder) {
+                return Err(several());
+            }
+        }
+        return Ok(picture);
     }
     believable(head, &mut file)?;
     let name = path.to_str().ok_or("its name is not UTF-8")?;
-    let color = imgcodecs::imread(name, imgcodecs::IMREAD_UNCHANGED).map_err(|e| short(&e.message))?;
+    gray(imgcodecs::imread(name, imgcodecs::IMREAD_UNCHANGED).map_err(|e| short(&e.message))?)
+}
+
+/// Decodes a JPEG picture that lies in memory; an error is a clause without a full stop.
+pub fn decode(jpeg: &[u8]) -> Result<Picture, String> {
+    if !jpeg.starts_with(b"\xff\xd8")
+        || !jpeg[jpeg.len().saturating_sub(64)..].windows(2).any(|w| w == [0xff, 0xd9])
+    {
+        return Err("it is no whole JPEG picture".to_owned());
+    }
+    let bytes = opencv::core::Vector::<u8>::from_slice(jpeg);
+    gray(imgcodecs::imdecode(&bytes, imgcodecs::IMREAD_UNCHANGED).map_err(|e| short(&e.message))?)
+}
+
+/// The brightness of a picture as OpenCV reads it.
+fn gray(color: opencv::core::Mat) -> Result<Picture, String> {
     if color.empty() {
         return Err("it is not a picture that can be read, or it is cut".to_owned());
     }
@@ -69,43 +98,6 @@ pub fn read(path: &Path) -> Result<Picture, String> {
     // OpenCV's 16-bit samples are in this machine's order; all machines that we are built for are little-endian.
     let samples = gray.data_bytes().map_err(|e| short(&e.message))?.to_vec();
     Ok(Picture { width: size(gray.cols())?, height: size(gray.rows())?, depth_bits, samples, converted_from })
-}
-
-/// Reads the page at which a TIFF decoder stands; an error is a clause without a full stop.
-pub fn page<R: Read + Seek>(decoder: &mut Decoder<R>) -> Result<Picture, String> {
-    let (width, height) = decoder.dimensions().map_err(|e| e.to_string())?;
-    let color = decoder.colortype().map_err(|e| e.to_string())?;
-    let channels = match color {
-        ColorType::Gray(8 | 16) => 1usize,
-        ColorType::RGB(8 | 16) => 3,
-        ColorType::RGBA(8 | 16) => 4,
-        other => return Err(format!("its samples are {other:?}; gray and RGB of 8 or 16 bit are read")),
-    };
-    let count = (width as usize)
-        .checked_mul(height as usize)
-        .and_then(|n| n.checked_mul(channels))
-        .ok_or_else(|| format!("{width} x {height} px is too large"))?;
-    let converted_from = (channels > 1).then(|| format!("{color:?}"));
-    let (depth_bits, samples) = match decoder.read_image().map_err(|e| e.to_string())? {
-        DecodingResult::U8(v) if v.len() >= count => (
-            8,
-            if channels == 1 { v } else { v.chunks_exact(channels).map(|c| brightness(c) as u8).collect() },
-        ),
-        DecodingResult::U16(v) if v.len() >= count => (
-            16,
-            v.chunks_exact(channels)
-                .map(|c| if channels == 1 { c[0] } else { brightness(c) as u16 })
-                .flat_map(u16::to_le_bytes)
-                .collect(),
-        ),
-        _ => return Err("it is cut, or its samples are not 8 or 16 bit".to_owned()),
-    };
-    Ok(Picture { width, height, depth_bits, samples, converted_from })
-}
-
-/// Red, green and blue weighted as by OpenCV (ITU-R BT.601, over 2^14).
-fn brightness<T: Copy + Into<u32>>(pixel: &[T]) -> u32 {
-    (4899 * pixel[0].into() + 9617 * pixel[1].into() + 1868 * pixel[2].into() + (1 << 13)) >> 14
 }
 
 /// Refuses a header that promises more pixels than the file can hold, before anything is allocated.

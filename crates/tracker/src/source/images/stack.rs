@@ -1,23 +1,65 @@
-//! The pages of one TIFF file as frames.
+//! The pages of one TIFF file as frames; or, where it has one page and says that there are more pictures, those behind it.
 
 use std::fs::File;
 use std::io::BufReader;
 
 use tiff::decoder::Decoder;
 
-use super::picture::{self, Picture};
+use super::page::{self, Layout};
+use super::picture::Picture;
+use super::planes::{self, Planes};
 use super::{format, frame, rate};
 use crate::error::{Error, Fault, Result};
 use crate::frame::{Ending, Frame, FrameSource, RateClaims, SourceInfo};
+use crate::message::Message;
 use crate::source::OpenOptions;
+use crate::source::raw::RawFrames;
 
 /// A multi-page TIFF.
 pub struct StackSource {
     info: SourceInfo,
-    /// `None` once it has ended.
-    decoder: Option<Decoder<BufReader<File>>>,
+    pictures: Pictures,
     next: u64,
     ending: Ending,
+}
+
+/// Where the pictures of a file are.
+enum Pictures {
+    /// Each in a page of its own; `None` once they have ended.
+    Pages(Option<Box<Pages>>),
+    /// One after another without pages.
+    Planes(RawFrames, Planes),
+}
+
+/// The pages of a file in their order, without those that are smaller copies of others.
+struct Pages {
+    decoder: Decoder<BufReader<File>>,
+    whole_only: bool,
+}
+
+impl Pages {
+    /// At the first page.
+    fn open(name: &str) -> Result<Self> {
+        let mut pages = Self { decoder: decoder(name)?, whole_only: true };
+        // A file of nothing but small copies is one of small pictures.
+        if page::is_reduced(&mut pages.decoder) && pages.turn() != Ok(true) {
+            pages = Self { decoder: decoder(name)?, whole_only: false };
+        }
+        Ok(pages)
+    }
+
+    /// Goes to the next page; `false` at the end, with what was wrong if that is not a clean one.
+    fn turn(&mut self) -> std::result::Result<bool, String> {
+        loop {
+            if !self.decoder.more_images() {
+                return Ok(false);
+            }
+            self.decoder.next_image().map_err(|e| e.to_string())?;
+            if !(self.whole_only && page::is_reduced(&mut self.decoder)) {
+                return Ok(true);
+            }
+        }
+    }
 }
 
 impl StackSource {
@@ -26,49 +68,103 @@ impl StackSource {
     /// # Errors
     /// [`Error::Source`] if its first page cannot be read.
     pub fn open(name: &str, options: &OpenOptions) -> Result<Self> {
-        let first = picture::page(&mut decoder(name)?).map_err(|e| {
+        let unreadable = |e: String| {
             Error::Source(Fault::new(name, format!("the first page cannot be read: {e}")).advice(
                 "Save it as gray of 8 or 16 bit, without compression or with LZW, Deflate or PackBits",
             ))
-        })?;
+        };
+        let mut pages = Pages::open(name)?;
+        let layout = Layout::of(&mut pages.decoder).map_err(unreadable)?;
+        layout.judge().map_err(unreadable)?;
+        let declared = planes::declared(&mut pages.decoder, &layout);
         let mut warnings = Vec::new();
+        warnings.extend(declared.as_ref().and_then(|d| d.order()).map(Message::from));
+        warnings.extend(planes::channels_of_ome(&mut pages.decoder, &layout).map(Message::from));
+        let size_bytes = std::fs::metadata(name).ok().map(|m| m.len());
         let (time_base, rate_hz, rate_origin) = rate(options, &mut warnings)?;
-        let info = SourceInfo {
+        let mut info = SourceInfo {
             name: name.to_owned(),
             container: "TIFF".into(),
-            codec: format!("{} bit pages", first.depth_bits),
-            width: first.width,
-            height: first.height,
-            format: format(first.depth_bits),
-            depth_bits: first.depth_bits,
-            declared_frames: None,
+            codec: format!("{} bit pages", layout.bits),
+            width: layout.width,
+            height: layout.height,
+            format: format(layout.bits),
+            depth_bits: layout.bits.max(8),
+            declared_frames: declared.as_ref().map(|d| d.pictures),
             time_base,
             rate_hz,
             rate_origin,
             claims: RateClaims::default(),
-            converted_from: first.converted_from,
-            size_bytes: std::fs::metadata(name).ok().map(|m| m.len()),
-            details: Vec::new(),
+            converted_from: None,
+            size_bytes,
+            details: declared
+                .as_ref()
+                .map(|d| ("described by".to_owned(), d.by.to_owned()))
+                .into_iter()
+                .collect(),
             warnings,
         };
-        Ok(Self { info, decoder: Some(decoder(name)?), next: 0, ending: Ending::Complete })
-    }
-
-    /// Goes to the next page; `false` at the end, with what was wrong if that is not a clean one.
-    fn turn(decoder: &mut Decoder<BufReader<File>>) -> std::result::Result<bool, String> {
-        if !decoder.more_images() {
-            return Ok(false);
+        let more = declared.filter(|_| !pages.decoder.more_images());
+        if let Some(declared) = more {
+            let planes = Planes::new(&layout, declared.pictures, size_bytes.unwrap_or(0)).map_err(|e| {
+                Error::Source(
+                    Fault::new(
+                        name,
+                        format!(
+                            "{} says that it holds {} pictures, but there is one page and {e}",
+                            declared.by, declared.pictures
+                        ),
+                    )
+                    .advice("Save it with a page for each picture"),
+                )
+            })?;
+            info.codec = format!("{} bit pictures behind one page", layout.bits);
+            info.converted_from = planes.converted_from();
+            (info.depth_bits, info.format) = (planes.depth_bits, format(planes.depth_bits));
+            let file = File::open(name).map_err(|e| unreadable(e.to_string()))?;
+            let raw = RawFrames::new(file, name, planes.stored);
+            return Ok(Self {
+                info,
+                pictures: Pictures::Planes(raw, planes),
+                next: 0,
+                ending: Ending::Complete,
+            });
         }
-        decoder.next_image().map_err(|e| e.to_string())?;
-        Ok(true)
+        let first = page::page(&mut pages.decoder).map_err(unreadable)?;
+        (info.depth_bits, info.format) = (first.depth_bits, format(first.depth_bits));
+        info.converted_from = first.converted_from;
+        Ok(Self {
+            info,
+            pictures: Pictures::Pages(Some(Box::new(Pages::open(name)?))),
+            next: 0,
+            ending: Ending::Complete,
+        })
     }
 
-    fn read(&mut self) -> std::result::Result<Option<Picture>, String> {
-        let Some(decoder) = &mut self.decoder else { return Ok(None) };
-        if self.next > 0 && !Self::turn(decoder)? {
+    fn read_page(pages: &mut Pages, next: u64) -> std::result::Result<Option<Picture>, String> {
+        if next > 0 && !pages.turn()? {
             return Ok(None);
         }
-        picture::page(decoder).map(Some)
+        page::page(&mut pages.decoder).map(Some)
+    }
+
+    /// The end that comes before all that the description declares.
+    fn short(&self) -> Option<Ending> {
+        let declared = self.info.declared_frames.filter(|n| *n > self.next)?;
+        Some(Ending::Early {
+            frames: self.next,
+            byte: self.info.size_bytes,
+            reason: format!(
+                "the file ends after {} of {declared} pictures that its description declares",
+                self.next
+            ),
+        })
+    }
+
+    fn plane(&self, raw: &RawFrames, planes: &Planes, index: u64, copy: bool) -> Result<Frame> {
+        let at = planes.place(index);
+        let plane = if copy { raw.copy(index, at, planes.bytes)? } else { raw.lend(index, at, planes.bytes) };
+        Ok(Frame { plane: Some(plane), ..frame(&self.info, index, None) })
     }
 }
 
@@ -86,26 +182,34 @@ impl FrameSource for StackSource {
     }
 
     fn next_frame(&mut self) -> Result<Option<Frame>> {
-        match self.read() {
+        let read = match &mut self.pictures {
+            Pictures::Planes(raw, planes) if self.next < planes.whole => {
+                let (raw, planes) = (raw.clone(), *planes);
+                self.next += 1;
+                return self.plane(&raw, &planes, self.next - 1, false).map(Some);
+            }
+            Pictures::Planes(..) | Pictures::Pages(None) => Ok(None),
+            Pictures::Pages(Some(pages)) => Self::read_page(pages, self.next),
+        };
+        match read {
             Ok(Some(picture)) => {
                 self.next += 1;
-                Ok(Some(frame(&self.info, self.next - 1, Some(picture))))
+                return Ok(Some(frame(&self.info, self.next - 1, Some(picture))));
             }
-            Ok(None) => {
-                self.decoder = None;
-                Ok(None)
-            }
+            Ok(None) => self.ending = self.short().unwrap_or_else(|| self.ending.clone()),
+            // Pages are a chain: what follows a broken one is not found.
             Err(reason) => {
-                // Pages are a chain: what follows a broken one is not found.
-                self.decoder = None;
                 self.ending = Ending::Early {
                     frames: self.next,
                     byte: self.info.size_bytes,
                     reason: format!("page {} cannot be read: {reason}", self.next),
                 };
-                Ok(None)
             }
         }
+        if let Pictures::Pages(pages) = &mut self.pictures {
+            *pages = None;
+        }
+        Ok(None)
     }
 
     fn ending(&self) -> Ending {
@@ -113,22 +217,28 @@ impl FrameSource for StackSource {
     }
 
     fn sample(&mut self, count: usize) -> Result<Vec<Frame>> {
+        let spread = |all: u64| {
+            let n = (count as u64).min(all);
+            (0..n).map(move |k| (2 * k + 1) * all / (2 * n))
+        };
+        if let Pictures::Planes(raw, planes) = &self.pictures {
+            return spread(planes.whole).map(|at| self.plane(raw, planes, at, true)).collect();
+        }
         // Pages are counted without reading their pixels.
-        let mut counter = decoder(&self.info.name)?;
+        let mut counter = Pages::open(&self.info.name)?;
         let mut pages = 1u64;
-        while Self::turn(&mut counter) == Ok(true) {
+        while counter.turn() == Ok(true) {
             pages += 1;
         }
-        let n = (count as u64).min(pages);
-        let mut wanted = (0..n).map(|k| (2 * k + 1) * pages / (2 * n)).peekable();
-        let mut reader = decoder(&self.info.name)?;
+        let mut wanted = spread(pages).peekable();
+        let mut reader = Pages::open(&self.info.name)?;
         let mut frames = Vec::new();
         for at in 0..pages {
-            if at > 0 && Self::turn(&mut reader) != Ok(true) {
+            if at > 0 && reader.turn() != Ok(true) {
                 break;
             }
             if wanted.next_if_eq(&at).is_some() {
-                let picture = picture::page(&mut reader).ok();
+                let picture = page::page(&mut reader.decoder).ok();
                 frames.extend(Some(frame(&self.info, at, picture)).filter(|f| f.plane.is_some()));
             }
         }

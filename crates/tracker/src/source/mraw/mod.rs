@@ -1,6 +1,6 @@
 //! Photron MRAW: a file of pixels without a header, and beside it a `.cih` or `.cihx` that explains it.
 //!
-//! Owns: [`MrawSource`]. Must not: unpack pixels; frames are lent from a memory map as they lie in the file.
+//! Owns: [`MrawSource`]. Must not: unpack pixels; frames are handed out as they lie in the file.
 //! The one exception is 16-bit with the significant bits on top, which is moved down.
 
 pub mod cih;
@@ -9,12 +9,9 @@ pub mod header;
 
 use std::fs::{self, File};
 use std::io::Read;
-use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
-use memmap2::{Advice, Mmap, MmapOptions};
-
+use super::raw::{RawFrames, Stored};
 use super::{OpenOptions, clock};
 use crate::error::{Error, Fault, Result};
 use crate::frame::{
@@ -23,20 +20,17 @@ use crate::frame::{
 use crate::message::Setting;
 use header::{Header, Packing};
 
-/// Bytes mapped at a time: what was read is given back, so memory does not grow with the recording.
-const WINDOW_BYTES: u64 = 32 << 20;
 /// Longest header that is read; real ones have some kB.
 const HEADER_BYTES: u64 = 16 << 20;
 
 /// A Photron recording.
 pub struct MrawSource {
     info: SourceInfo,
-    file: File,
+    pixels: RawFrames,
     packing: Packing,
     /// Whole frames in the file, up to those declared.
     frames: u64,
     next: u64,
-    window: Option<(Range<u64>, Arc<Mmap>)>,
     ending: Ending,
 }
 
@@ -146,25 +140,20 @@ impl MrawSource {
             None => info.warnings.push("the header does not say how many frames there are".into()),
             Some(_) => {}
         }
-        Ok(Self { info, file, packing, frames, next: 0, window: None, ending: Ending::Complete })
+        let stored = match packing.shift {
+            0 => Stored::Plain,
+            shift => Stored::Words { big_endian: false, shift, inverted: false },
+        };
+        let pixels = RawFrames::new(file, &pixels_path.display().to_string(), stored);
+        Ok(Self { info, pixels, packing, frames, next: 0, ending: Ending::Complete })
     }
 
-    /// The frame at `index`, from the window that holds it, mapped if it is not.
-    fn frame(&mut self, index: u64) -> Result<Frame> {
-        let size = self.packing.frame_bytes;
-        let at = index * size;
-        let window = match &self.window {
-            Some((range, map)) if range.contains(&at) => (range.clone(), Arc::clone(map)),
-            _ => {
-                let count = (WINDOW_BYTES / size).clamp(1, self.frames - index);
-                let range = at..at + count * size;
-                let map = self.map(&range)?;
-                self.window = Some((range.clone(), Arc::clone(&map)));
-                (range, map)
-            }
-        };
-        let begin = (at - window.0.start) as usize;
-        let lent = Lent { map: window.1, range: begin..begin + size as usize };
+    /// Where the frame at `index` begins in the file, and how many bytes it takes.
+    fn place(&self, index: u64) -> (u64, usize) {
+        (index * self.packing.frame_bytes, self.packing.frame_bytes as usize)
+    }
+
+    fn frame(&self, index: u64, plane: Box<dyn Bytes>) -> Frame {
         let (format, width) = (self.packing.format, self.info.width as usize);
         let stride = match format {
             PixelFormat::Gray8 => width,
@@ -175,12 +164,7 @@ impl MrawSource {
             }
             _ => 0,
         };
-        let plane: Box<dyn Bytes> = if self.packing.shift > 0 {
-            Box::new(moved_down(&lent, self.packing.shift))
-        } else {
-            Box::new(lent)
-        };
-        Ok(Frame {
+        Frame {
             index,
             ticks: index as i64,
             width: self.info.width,
@@ -189,26 +173,7 @@ impl MrawSource {
             format,
             depth_bits: self.packing.depth_bits,
             plane: Some(plane),
-        })
-    }
-
-    fn map(&self, range: &Range<u64>) -> Result<Arc<Mmap>> {
-        let failed = |e: std::io::Error| {
-            Error::Source(
-                Fault::new(&self.info.name, format!("the file cannot be mapped into memory ({e})"))
-                    .at(crate::error::Place::Byte(range.start))
-                    .advice("Copy it to a local disk"),
-            )
-        };
-        let length = usize::try_from(range.end - range.start)
-            .map_err(|_| failed(std::io::Error::other("a frame is larger than memory")))?;
-        // SAFETY: the range lies inside the file as it was when opened, and the map is only read. As with every
-        // reader of memory maps, another program that cuts the file while it is read ends this one by a signal.
-        let map =
-            unsafe { MmapOptions::new().offset(range.start).len(length).map(&self.file) }.map_err(failed)?;
-        // Advice only speeds things up.
-        let _ = map.advise(Advice::Sequential);
-        Ok(Arc::new(map))
+        }
     }
 }
 
@@ -272,10 +237,11 @@ impl FrameSource for MrawSource {
 
     fn next_frame(&mut self) -> Result<Option<Frame>> {
         if self.next < self.frames {
+            let (at, length) = self.place(self.next);
+            let plane = self.pixels.lend(self.next, at, length);
             self.next += 1;
-            return self.frame(self.next - 1).map(Some);
+            return Ok(Some(self.frame(self.next - 1, plane)));
         }
-        self.window = None;
         let size = self.info.size_bytes.unwrap_or(0);
         if let Some(declared) = self.info.declared_frames.filter(|n| *n > self.frames) {
             let rest = size - self.frames * self.packing.frame_bytes;
@@ -297,36 +263,13 @@ impl FrameSource for MrawSource {
 
     fn sample(&mut self, count: usize) -> Result<Vec<Frame>> {
         let n = self.frames.min(count as u64);
-        let window = self.window.take();
-        let frames = (0..n)
+        (0..n)
             .map(|k| {
                 let index = ((u128::from(2 * k + 1) * u128::from(self.frames)) / u128::from(2 * n)) as u64;
-                let mut frame = self.frame(index)?;
-                // A copy, so that a few samples do not keep whole windows mapped.
-                if let Some(plane) = frame.plane.take() {
-                    frame.plane = Some(Box::new(plane.bytes().to_vec()));
-                }
-                Ok(frame)
+                let (at, length) = self.place(index);
+                // Read at once: a learner may look at them long after.
+                Ok(self.frame(index, self.pixels.copy(index, at, length)?))
             })
-            .collect();
-        self.window = window;
-        frames
+            .collect()
     }
-}
-
-/// Bytes of a frame inside a window.
-struct Lent {
-    map: Arc<Mmap>,
-    range: Range<usize>,
-}
-
-impl Bytes for Lent {
-    fn bytes(&self) -> &[u8] {
-        &self.map[self.range.clone()]
-    }
-}
-
-fn moved_down(lent: &Lent, shift: u32) -> Vec<u8> {
-    let pairs = lent.bytes().chunks_exact(2);
-    pairs.flat_map(|p| (u16::from_le_bytes([p[0], p[1]]) >> shift).to_le_bytes()).collect()
 }
