@@ -322,7 +322,7 @@ fn kind_of_folder(path: &Path) -> Kind {
 fn kind_of_magic(bytes: &[u8]) -> Option<Kind> {
     let at = |place: usize, magic: &[u8]| bytes.get(place..place + magic.len()) == Some(magic);
     let boxes: [&[u8]; 7] = [b"ftyp", b"moov", b"mdat", b"wide", b"free", b"skip", b"pnot"];
-    let films: [&[u8]; 14] = [
+    let films: [&[u8]; 17] = [
         b"\x1a\x45\xdf\xa3",
         b"GIF8",
         b"YUV4MPEG2",
@@ -335,6 +335,9 @@ fn kind_of_magic(bytes: &[u8]) -> Option<Kind> {
         b"\xff\xd8\xff",
         b"II*\0",
         b"MM\0*",
+        b"II+\0",
+        b"MM\0+",
+        b"\xed\xfe\0\0N\0o\0r\0p\0i\0x\0",
         b"CI\x2c\0",
         b"#Camera Information Header",
     ];
