@@ -67,7 +67,7 @@ fn open(name: &str) -> Result<VideoCapture> {
         )
     };
     // With its protocol, a name is never taken for an address.
-    let capture = VideoCapture::from_file(&format!("file:{name}"), videoio::CAP_FFMPEG)
+    let capture = VideoCapture::from_file(format!("file:{name}").as_str(), videoio::CAP_FFMPEG)
         .map_err(|e| failed(format!(" ({})", e.message)))?;
     match capture.is_opened() {
         Ok(true) => Ok(capture),
