@@ -262,6 +262,27 @@ def test_stamps_in_tdms_become_seconds_to_their_resolution(tmp_path: Path) -> No
             read_encoder(path, column=channel, time_column="late" if channel == "when" else None)
 
 
+def test_a_tdms_file_that_is_cut_says_so_and_nothing_else(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "t.tdms"
+    with TdmsWriter(path) as writer:
+        for _ in range(2):
+            data = ChannelObject("g", "voltage_v", np.arange(100) / 10, properties={"wf_increment": 0.001})
+            writer.write_segment([data])
+    whole = path.read_bytes()
+    path.write_bytes(whole[:-37])
+    found = read_encoder(path)
+    assert 100 < found.value.size < 200
+    assert any("the recording was cut off" in note for note in found.notes)
+    path.write_bytes(whole[:60] + bytes(40) + whole[100:])
+    with pytest.raises(EncoderError) as caught:
+        read_encoder(path)
+    assert "\n" not in str(caught.value)
+    # npTDMS prints what it meets.
+    assert capfd.readouterr() == ("", "")
+
+
 def test_dates_given_as_arrays_become_seconds() -> None:
     for unit in ("ms", "us", "ns"):
         found = EncoderSignal(TIMES.to_numpy().astype(f"datetime64[{unit}]"), np.zeros(3))

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import logging
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 from nptdms import TdmsFile
+from nptdms.log import log_manager
 from nptdms.timestamp import TimestampArray
 from numpy.typing import NDArray
 
@@ -24,15 +27,47 @@ def read_tdms(
 
     Raises :class:`EncoderError` if they cannot be had.
     """
-    # Stamps come as whole seconds and fractions: as datetime64 they would be cut to microseconds.
-    file = _asked(path, lambda: TdmsFile.open(path, raw_timestamps=True))
-    with file:
-        return _read(path, file, channel, time_channel, rate_hz)
+    with path.open("rb") as opened, _heard(path) as said:
+        # Stamps come as whole seconds and fractions: as datetime64 they would be cut to microseconds.
+        file = _asked(path, lambda: TdmsFile.open(opened, raw_timestamps=True))
+        t, value, label, notes = _read(path, file, channel, time_channel, rate_hz)
+    return t, value, label, [*notes, *said]
+
+
+@contextmanager
+def _heard(path: Path) -> Iterator[list[str]]:
+    """What npTDMS says of a file meanwhile, which it would print, as notes."""
+    said: list[str] = []
+
+    class Ear(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            what = " ".join(record.getMessage().split())
+            if record.name == "nptdms.scaling":
+                # Its values would be the converter's steps and not volts.
+                raise EncoderError(
+                    fault(str(path), f"the scale of a channel is not known ({what})", "Export it as CSV")
+                )
+            note = f"the TDMS file is not whole ({what})"
+            if note not in said:
+                said.append(note)
+
+    ear, console = Ear(), log_manager.console_handler
+    level = console.level
+    console.setLevel(logging.CRITICAL + 1)
+    logger = logging.getLogger("nptdms")
+    logger.addHandler(ear)
+    try:
+        yield said
+    finally:
+        logger.removeHandler(ear)
+        console.setLevel(level)
 
 
 def _asked(path: Path, ask: Callable[[], T]) -> T:
     try:
         return ask()
+    except EncoderError:
+        raise
     except Exception as problem:  # npTDMS raises what its parser happens to meet, and Exception itself
         said = " ".join(str(problem).split())[:200] or type(problem).__name__
         raise EncoderError(
