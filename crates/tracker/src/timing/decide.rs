@@ -31,6 +31,7 @@ pub fn decide(
         kind: TimingKind::Even,
         rate_hz: claimed_hz,
         rate_origin: origin,
+        rate_from_stamps: false,
         rate_sigma_hz: None,
         range_hz: None,
         tick_s,
@@ -85,6 +86,7 @@ fn stamped(steps: &Steps, timing: &mut Timing) -> Result<(), Standstill> {
     let Some((least, most)) = steps.range() else { return Ok(()) };
     let mean = steps.span() as f64 / (steps.len() - 1) as f64;
     timing.rate_hz = Some(1.0 / (mean * timing.tick_s));
+    timing.rate_from_stamps = true;
     if least != most {
         timing.kind = TimingKind::Variable;
         timing.range_hz = Some([1.0 / (most as f64 * timing.tick_s), 1.0 / (least as f64 * timing.tick_s)]);
@@ -103,6 +105,7 @@ fn apply(fit: &Fit, steps: &Steps, timing: &mut Timing, clock: &mut Clock) {
         Period::Ticks { step, .. } => (1.0 / (step * timing.tick_s), Seconds::Measured(step * timing.tick_s)),
     };
     timing.rate_hz = Some(rate_hz);
+    timing.rate_from_stamps = !fit.is_claimed;
     if let Period::Ticks { sigma, step } = fit.period {
         timing.rate_sigma_hz = (sigma > 0.0).then_some(rate_hz * sigma / step);
     }
@@ -155,6 +158,7 @@ fn slowed(factor: f64, rate_hz: f64, steps: &Steps, timing: &mut Timing, clock: 
     timing.sigma_s /= factor;
     timing.range_hz = timing.range_hz.map(|r| r.map(|hz| hz * factor));
     timing.rate_sigma_hz = None;
+    timing.rate_from_stamps = timing.kind == TimingKind::Variable;
     clock.scale = 1.0 / factor;
     if timing.kind == TimingKind::Variable {
         timing.rate_hz = timing.rate_hz.map(|hz| hz * factor);

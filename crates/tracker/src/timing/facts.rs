@@ -48,6 +48,8 @@ pub struct Timing {
     pub rate_hz: Option<f64>,
     /// Where the rate comes from.
     pub rate_origin: RateOrigin,
+    /// The rate is what the time stamps say; else whoever `rate_origin` names gave it.
+    pub rate_from_stamps: bool,
     /// Standard uncertainty of the rate, where it was measured from rounded time stamps.
     pub rate_sigma_hz: Option<f64>,
     /// Slowest and fastest rate between two frames, where the rate is variable.

@@ -37,6 +37,8 @@ pub(super) enum Period {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Fit {
     pub period: Period,
+    /// The rate is one that the container gives; else the stamps alone say it.
+    pub is_claimed: bool,
     /// Where the grid begins, ticks.
     pub origin_ticks: f64,
     /// The stamps are on the grid without having been rounded.
@@ -232,11 +234,12 @@ fn gaps_of(places: &[u64]) -> Vec<(u64, u64)> {
 /// The grid through a strip of stamps: a rate that the container claims, else the only round number of frames per
 /// second (or television's) that the stamps allow, else the middle of what they allow.
 fn chosen(strip: &Strip, base: TimeBase, claims: &[[u64; 2]], gaps: Vec<(u64, u64)>) -> Option<Fit> {
-    let made = |period, step: f64| {
+    let made = |period, step: f64, is_claimed| {
         let (low, high) = strip.heights(step);
         let first = strip.first.1 as f64;
         Fit {
             period,
+            is_claimed,
             // A film that begins at zero begins there; else the rounding is as likely up as down.
             origin_ticks: if strip.first.1 == 0 { 0.0 } else { first + (low + high) / 2.0 },
             is_exact: low == high && step.fract() == 0.0,
@@ -248,7 +251,7 @@ fn chosen(strip: &Strip, base: TimeBase, claims: &[[u64; 2]], gaps: Vec<(u64, u6
     let fraction = |[numerator, denominator]: [u64; 2]| Period::Rate { numerator, denominator };
     let agrees = |rate: &&[u64; 2], height: f64| strip.height(step_of(**rate, base)) < height;
     if let Some(rate) = claims.iter().find(|r| agrees(r, ROUNDED)) {
-        return Some(made(fraction(*rate), step_of(*rate, base)));
+        return Some(made(fraction(*rate), step_of(*rate, base), true));
     }
     let (best, least) = strip.lowest()?;
     if best <= 0.0 || least > WITHIN_A_TICK {
@@ -256,22 +259,22 @@ fn chosen(strip: &Strip, base: TimeBase, claims: &[[u64; 2]], gaps: Vec<(u64, u6
     }
     // Steps that are all the same are the truth; nothing was rounded that could be told.
     if least == 0.0 {
-        return Some(made(Period::Ticks { step: best, sigma: 0.0 }, best));
+        return Some(made(Period::Ticks { step: best, sigma: 0.0 }, best, false));
     }
     if least < ROUNDED {
         let (short, long) = strip.steps_within(ROUNDED, best);
         if let Some(rate) = only_rate(short, long, base) {
-            return Some(made(fraction(rate), step_of(rate, base)));
+            return Some(made(fraction(rate), step_of(rate, base), false));
         }
     }
     if let Some(rate) = claims.iter().find(|r| agrees(r, ROUNDED_TWICE.max(least))) {
-        return Some(made(fraction(*rate), step_of(*rate, base)));
+        return Some(made(fraction(*rate), step_of(*rate, base), true));
     }
     let (short, long) = strip.steps_within(ROUNDED.max(least + 0.1), best);
     let step = (short + long) / 2.0;
     // Anything between is as likely: the spread of a uniform distribution.
     let sigma = (long - short) / 12f64.sqrt();
-    (short > 0.0).then(|| made(Period::Ticks { step, sigma }, step))
+    (short > 0.0).then(|| made(Period::Ticks { step, sigma }, step, false))
 }
 
 /// The only round number of frames per second, or television's rate, whose step lies between two.

@@ -65,10 +65,11 @@ pub fn rate_words(timing: &Timing) -> Message {
         RateOrigin::TimeStamps => "from the frames' time stamps".into(),
         RateOrigin::CameraHeader => "from the camera's header".into(),
         RateOrigin::CaptureTag => "by the camera's own tag".into(),
-        RateOrigin::Container if timing.doubt.is_some() => {
-            "as the container says, which may be a player's speed and not the camera's".into()
+        RateOrigin::Container => {
+            let by = if timing.rate_from_stamps { "by the time stamps" } else { "as the container says" };
+            let player = ", which may be a player's speed and not the camera's";
+            format!("{by}{}", if timing.doubt.is_some() { player } else { "" }).into()
         }
-        RateOrigin::Container => "as the container says".into(),
         RateOrigin::Unknown => return "unknown".into(),
     };
     let rate = match (timing.rate_hz, timing.range_hz) {
@@ -77,11 +78,7 @@ pub fn rate_words(timing: &Timing) -> Message {
             format!("variable, {} ({} on average)", range(ends), digits(hz, 4))
         }
         (Some(hz), _) if timing.rate_sigma_hz.is_none() => format!("{} frames per second", digits(hz, 9)),
-        _ if timing.doubt.is_some() => {
-            let measured = format!("{}, measured from the time stamps", per_second(timing));
-            return (measured + ", which may be a player's").into();
-        }
-        _ => return format!("{}, measured from the time stamps", per_second(timing)).into(),
+        _ => per_second(timing),
     };
     Message::from(rate) + ", " + origin
 }

@@ -67,6 +67,10 @@ fn rounded_stamps_give_their_grid_back() {
                 assert!((timing.rate_hz.unwrap() / exact - 1.0).abs() < 1e-12, "{rate}: {timing:?}");
                 assert!(rms_s(&clock, &stamps, |k| k as f64 / exact) < 1e-9);
                 assert_eq!((timing.gaps, timing.stray, timing.sigma_s), (0, 0, 0.0));
+                let claimed = said.iter().any(|r| (r[0] as f64 / r[1] as f64 / exact - 1.0).abs() < 1e-12);
+                assert_eq!(timing.rate_from_stamps, !claimed, "{rate}");
+                let by = if claimed { "as the container says" } else { "by the time stamps" };
+                assert!(super::super::rate_words(&timing).to_string().contains(by), "{rate}");
                 // Half a tick to both sides, so never further off than the rounding was.
                 let first = clock.seconds(0, stamps[0]);
                 assert!((first - start).abs() <= 1.01 * tick, "{first} {start}");
