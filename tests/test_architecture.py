@@ -14,6 +14,8 @@ PACKAGE = ROOT / "python" / "pydpend"
 # From left to right. A module may import from its own group and from those to its left.
 GROUPS: tuple[tuple[str, ...], ...] = (
     (
+        "terminal",
+        "output",
         "errors",
         "crossing",
         "_tracker",

@@ -4,6 +4,7 @@ Shapes: T frames, N nodes. Images are (H, W), uint8 or uint16. What is not seen 
 """
 
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any, Self, final
 
 import numpy as np
@@ -27,8 +28,10 @@ __all__ = [
     "Film",
     "LiveTracker",
     "arrow_reader",
+    "check_outputs",
     "check_table",
     "detect",
+    "fingerprint",
     "follow_motion",
     "info",
     "kind_of",
@@ -39,6 +42,7 @@ __all__ = [
     "read_meta",
     "read_rig",
     "read_table",
+    "recording_files",
     "rig_toml",
     "score_places",
     "setup",
@@ -52,6 +56,7 @@ __all__ = [
     "term_names",
     "track",
     "unit_powers",
+    "write_rig",
     "write_table",
 ]
 
@@ -65,6 +70,8 @@ def track(
     open: OpenArguments,
     output: str | None,
     existing: str,
+    safe_csv: bool,
+    reads: list[str],
     progress: Callback,
 ) -> tuple[Columns, list[Message], BaseException | None]:
     """Columns, warnings, and the exception that stopped the run, if one did. `rig` is JSON."""
@@ -74,7 +81,9 @@ def setup(
     frames: Frames,
     detect: DetectArguments,
     open: OpenArguments,
+    output: str | None,
     picture: str | None,
+    replace: bool,
     progress: Callback,
 ) -> tuple[str, list[Message], NDArray[np.uint8]]:
     """The rig as JSON, warnings, and the reference frame with the rig drawn, (H, W, 3), red, green, blue."""
@@ -90,9 +99,19 @@ def overlay_film(
     play_fps: int,
     quality: int,
     replace: bool,
+    reads: list[str],
     progress: Callback,
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Of each of the film's K pictures the frame, (K,), and its time in the recording in s, (K,). `width` is in px."""
+
+def recording_files(input: str | Path) -> list[Path]:
+    """The files that a recording is read from; none for what is read once only."""
+
+def fingerprint(files: list[Path]) -> str:
+    """What tells the contents of some files from others without reading all of them, in hexadecimal."""
+
+def check_outputs(outputs: list[str], inputs: list[str], replace: bool) -> None:
+    """Refuses outputs that would replace an input, one another or, unless `replace`, what is there already."""
 
 def info(input: str, open: OpenArguments) -> str:
     """What is known of a recording before it is read through, as JSON."""
@@ -125,7 +144,7 @@ def read_table(path: str) -> Columns:
 def read_meta(path: str) -> str:
     """The metadata of a node table as JSON."""
 
-def write_table(path: str, held: HeldColumns, meta: str) -> None:
+def write_table(path: str, held: HeldColumns, meta: str, safe_csv: bool) -> None:
     """Writes a node table, Parquet or CSV by the ending."""
 
 def check_table(held: HeldColumns, meta: str) -> None:
@@ -138,6 +157,9 @@ def kind_of(path: str) -> Kind: ...
 def misplaced(path: str, wanted: list[str]) -> Message | None: ...
 def read_rig(path: str) -> str:
     """A rig file as JSON."""
+
+def write_rig(path: str, rig: str) -> None:
+    """Writes a rig, given as JSON, as TOML."""
 
 def rig_toml(rig: str) -> str:
     """A rig's TOML from its JSON."""
@@ -184,6 +206,9 @@ class Film:
         speed: str | None,
         gray_only: bool,
         bits: int | None,
+        safe_csv: bool,
+        replace: bool,
+        reads: list[str],
     ) -> None:
         """Writes the film, and its truth if a file is named; `bits` are those of a sample."""
 

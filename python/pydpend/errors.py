@@ -16,6 +16,8 @@ from contextvars import ContextVar
 from dataclasses import dataclass, replace
 from typing import Protocol, TypeAlias
 
+from pydpend.terminal import shown
+
 
 class _Part:
     """Something that may stand in a message: a sum of parts and texts is a message."""
@@ -156,7 +158,8 @@ class PydpendError(Exception):
         super().__init__(self.message)
 
     def __str__(self) -> str:
-        return str(self.message)
+        """The message on one line; what it quotes of names and files does nothing to a terminal."""
+        return shown(str(self.message))
 
 
 class TrackerError(PydpendError):

@@ -7,6 +7,8 @@ scale is given and else in px, which the file then says. What is not seen is wha
 from __future__ import annotations
 
 import os
+import shutil
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -15,6 +17,7 @@ from numpy.typing import NDArray
 
 from pydpend.errors import ArgumentError, Setting, TableError, fault
 from pydpend.nodes import STATUS_WORDS, Nodes
+from pydpend.output import whole
 
 LEAST_EVEN = 1e-6
 """A rate is one number, so steps of time may differ by so much of a step; time stamps in whole ticks do not."""
@@ -41,7 +44,7 @@ def export(nodes: Nodes, path: str | os.PathLike[str], *, px_per_m: float | None
         TableError: if the form cannot hold the table (C3D and TRC need one rate, and C3D ends at frame 65534 counted
             from 1), or the file cannot be written.
     """
-    target = Path(path)
+    target = Path(os.fsdecode(path))
     writer = WRITERS.get(target.suffix.lower())
     if writer is None:
         raise ArgumentError(
@@ -54,17 +57,13 @@ def export(nodes: Nodes, path: str | os.PathLike[str], *, px_per_m: float | None
     nodes.check()
     if writer is _c3d:
         _numbered(nodes, str(target))
-    # The libraries look at the ending, so the temporary name keeps it.
-    temporary = target.with_name(f".{target.stem}.writing{target.suffix}")
     try:
-        writer(nodes, temporary, px_per_m)
-        temporary.replace(target)
+        with whole(target) as new:
+            writer(nodes, new, px_per_m, target.name)
     except OSError as error:
         raise TableError(
             fault(str(target), f"it cannot be written ({error})", "Choose another folder")
         ) from error
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def rate_hz(nodes: Nodes, name: str) -> float:
@@ -106,14 +105,12 @@ def _numbered(nodes: Nodes, name: str) -> None:
         )
 
 
-def _c3d(nodes: Nodes, path: Path, px_per_m: float | None) -> None:
+def _c3d(nodes: Nodes, path: Path, px_per_m: float | None, name: str) -> None:
     try:
         import ezc3d
     except ImportError:
         raise TableError(
-            fault(
-                str(path), "C3D is written by ezc3d, which is not installed", "pip install 'pydpend[export]'"
-            )
+            fault(name, "C3D is written by ezc3d, which is not installed", "pip install 'pydpend[export]'")
         ) from None
     places, unit = _upright(nodes, px_per_m)
     scale = 1.0 if px_per_m is None else 1000 / px_per_m
@@ -121,7 +118,7 @@ def _c3d(nodes: Nodes, path: Path, px_per_m: float | None) -> None:
     points[:3] = places.transpose(2, 1, 0)
     file = ezc3d.c3d()
     parameters = file["parameters"]["POINT"]
-    parameters["RATE"]["value"] = [rate_hz(nodes, str(path))]
+    parameters["RATE"]["value"] = [rate_hz(nodes, name)]
     parameters["LABELS"]["value"] = list(nodes.rig.names)
     parameters["UNITS"]["value"] = [unit]
     file["data"]["points"] = points
@@ -129,16 +126,20 @@ def _c3d(nodes: Nodes, path: Path, px_per_m: float | None) -> None:
     residuals = np.where(nodes.seen, nodes.sigma_px * scale, -1.0)
     file["data"]["meta_points"]["residuals"] = residuals.T[None]
     file["header"]["points"]["first_frame"] = int(nodes.frame[0])
-    file.write(str(path))
+    # ezc3d takes names in UTF-8 only, and the folder's may be none.
+    with tempfile.TemporaryDirectory() as folder:
+        plain = Path(folder) / "nodes.c3d"
+        file.write(str(plain))
+        shutil.copyfile(plain, path)
 
 
-def _trc(nodes: Nodes, path: Path, px_per_m: float | None) -> None:
+def _trc(nodes: Nodes, path: Path, px_per_m: float | None, name: str) -> None:
     places, unit = _upright(nodes, px_per_m)
-    rate = f"{rate_hz(nodes, str(path)):.9g}"
+    rate = f"{rate_hz(nodes, name):.9g}"
     names = nodes.rig.names
     count, first = len(nodes), int(nodes.frame[0]) + 1
     head = [
-        f"PathFileType\t4\t(X/Y/Z)\t{path.name.removeprefix('.').replace('.writing', '')}",
+        f"PathFileType\t4\t(X/Y/Z)\t{name}",
         "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames",
         f"{rate}\t{rate}\t{count}\t{len(names)}\t{unit}\t{rate}\t{first}\t{count}",
         "Frame#\tTime\t" + "\t\t\t".join(names),
@@ -153,7 +154,7 @@ def _trc(nodes: Nodes, path: Path, px_per_m: float | None) -> None:
             file.write(f"{nodes.frame[t] + 1}\t{float(nodes.t_s[t])!r}\t" + "\t".join(cells) + "\n")
 
 
-def _dltdv(nodes: Nodes, path: Path, px_per_m: float | None) -> None:
+def _dltdv(nodes: Nodes, path: Path, px_per_m: float | None, name: str) -> None:
     """Pixels as MATLAB has them: the first is 1, and DLTdv counts rows from the lowest. A row per video frame."""
     names = [f"pt{i}_cam1_{axis}" for i in range(1, len(nodes.rig.nodes) + 1) for axis in "XY"]
     rows = np.full((int(nodes.frame[-1]) + 1 if len(nodes) else 0, len(names)), np.nan)
@@ -162,7 +163,7 @@ def _dltdv(nodes: Nodes, path: Path, px_per_m: float | None) -> None:
     np.savetxt(path, rows, fmt="%.6f", delimiter=",", header=",".join(names), comments="")
 
 
-def _mat(nodes: Nodes, path: Path, px_per_m: float | None) -> None:
+def _mat(nodes: Nodes, path: Path, px_per_m: float | None, name: str) -> None:
     from scipy.io import savemat
 
     text = np.array(nodes.rig.names, dtype=object)
@@ -184,7 +185,7 @@ def _mat(nodes: Nodes, path: Path, px_per_m: float | None) -> None:
     savemat(path, content, do_compression=True)
 
 
-WRITERS: dict[str, Callable[[Nodes, Path, float | None], None]] = {
+WRITERS: dict[str, Callable[[Nodes, Path, float | None, str], None]] = {
     ".c3d": _c3d,
     ".trc": _trc,
     ".csv": _dltdv,

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
@@ -25,8 +26,9 @@ from pyarrow import csv, parquet
 from pydpend import _tracker
 from pydpend.columns import PARQUET_FAULTS
 from pydpend.errors import FILM_TRUTH, FilmError, fault
+from pydpend.output import AnyPath
 
-StrPath: TypeAlias = "str | os.PathLike[str]"
+StrPath: TypeAlias = AnyPath
 Codec: TypeAlias = Literal["h264", "ffv1", "mjpeg", "raw"]
 
 PRESETS = ("clean", "noisy", "dim", "glints", "late", "dropout", "occluded", "fast")
@@ -71,6 +73,7 @@ class Film:
         rate_hz: float | None = None,
     ) -> None:
         moving = _motion(motion)
+        self._reads: list[str] = []
         changes = {
             key: value
             for key, value in (("seed", seed), ("frames", frames), ("rate_hz", rate_hz))
@@ -79,12 +82,13 @@ class Film:
         if isinstance(scene, Mapping):
             self._film = _tracker.Film.from_json(json.dumps({**scene, **changes}), moving)
             return
-        if str(scene) in PRESETS:
+        if scene in PRESETS:
             self._film = _tracker.Film.preset(str(scene), seed or 0)
         else:
+            self._reads = [os.fsdecode(scene)]
             # A motion that is given here may stand for a scene that is not complete without one.
-            self._film = _tracker.Film.read(os.fspath(scene), moving)
-        if changes or (moving is not None and str(scene) in PRESETS):
+            self._film = _tracker.Film.read(os.fsdecode(scene), moving)
+        if changes or (moving is not None and scene in PRESETS):
             self._film = _tracker.Film.from_json(json.dumps({**self.scene, **changes}), moving)
 
     @property
@@ -129,23 +133,30 @@ class Film:
         speed: str | None = None,
         gray_only: bool = False,
         bits: int | None = None,
+        safe_csv: bool = False,
+        force: bool = False,
     ) -> None:
         """Writes the film and, if wanted, its truth (.parquet or .csv, a row per frame and marker).
 
         The ending of ``output`` decides the form: .mp4 .mov .mkv .avi, .mraw (with its .cih), .tif (pages), .y4m, or
         numbered images as in ``frames/%05d.png``. ``quality``: H.264's rate factor 0 to 51 or MJPEG's 1 to 31.
-        ``bits``: of a .mraw, 8, 10, 12 or 16.
+        ``bits``: of a .mraw, 8, 10, 12 or 16. ``safe_csv``: as in `Nodes.write`, for the truth. ``force``: replace
+        files that are there already; each takes its name when it is whole.
 
-        Raises :class:`pydpend.FilmError` if the form cannot hold the film or cannot be written.
+        Raises :class:`pydpend.FilmError` if the form cannot hold the film, a file is there already or is the scene's,
+        or the film cannot be written.
         """
         self._film.write(
-            os.fspath(output),
-            None if truth is None else os.fspath(truth),
+            os.fsdecode(output),
+            None if truth is None else os.fsdecode(truth),
             codec,
             quality,
             speed,
             gray_only,
             bits,
+            safe_csv,
+            force,
+            self._reads,
         )
 
 
@@ -163,10 +174,22 @@ def film(
     speed: str | None = None,
     gray_only: bool = False,
     bits: int | None = None,
+    safe_csv: bool = False,
+    force: bool = False,
 ) -> Film:
     """Films a scene into a file; see :class:`Film` and :meth:`Film.write`. Returns the film, which knows its truth."""
     made = Film(scene, motion=motion, seed=seed, frames=frames, rate_hz=rate_hz)
-    made.write(output, truth, codec=codec, quality=quality, speed=speed, gray_only=gray_only, bits=bits)
+    made.write(
+        output,
+        truth,
+        codec=codec,
+        quality=quality,
+        speed=speed,
+        gray_only=gray_only,
+        bits=bits,
+        safe_csv=safe_csv,
+        force=force,
+    )
     return made
 
 
@@ -175,8 +198,9 @@ def read_truth(path: StrPath) -> Truth:
 
     Raises :class:`pydpend.FilmError` for a file that is not one, naming the column.
     """
-    name = os.fspath(path)
+    name = os.fsdecode(path)
     try:
+        # A file, because pyarrow looks for addresses in names.
         with open(name, "rb") as file:
             table = csv.read_csv(file) if name.endswith(".csv") else parquet.read_table(file)
     except PARQUET_FAULTS as problem:
@@ -205,14 +229,20 @@ def read_truth(path: StrPath) -> Truth:
     def column(key: str) -> NDArray[np.float64]:
         return numbers(key, pa.float64()).reshape(-1, count)
 
+    def names(key: str) -> tuple[str, ...]:
+        words = [str(word) for word in table[key].slice(0, count).to_pylist()]
+        # A CSV marks names that a spreadsheet would take for formulas.
+        marked = re.compile("'+[=+@\t\r-]")
+        return tuple(w[1:] if name.endswith(".csv") and marked.match(w) else w for w in words)
+
     links = [f"phi{k}_rad" for k in range(1, len(table.column_names)) if f"phi{k}_rad" in table.column_names]
     return Truth(
         t_s=column("time_s")[:, 0],
         xy_px=np.stack([column("x_px"), column("y_px")], axis=-1),
         visible=column("visible"),
         phi_rad=np.stack([column(key)[:, 0] for key in links], axis=-1),
-        nodes=tuple(table["node"].slice(0, count).to_pylist()),
-        bodies=tuple(table["body"].slice(0, count).to_pylist()),
+        nodes=names("node"),
+        bodies=names("body"),
     )
 
 

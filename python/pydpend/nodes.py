@@ -8,7 +8,6 @@ from __future__ import annotations
 import json
 import os
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 from pydpend import _tracker
 from pydpend.crossing import Columns, HeldColumns
 from pydpend.errors import ArgumentError, fault
+from pydpend.output import AnyPath
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -64,13 +64,13 @@ class Rig:
     lens: dict[str, Any] | None = None
 
     @staticmethod
-    def read(path: str | os.PathLike[str]) -> Rig:
+    def read(path: AnyPath) -> Rig:
         """Reads a rig file (TOML), as `tracker setup` writes it.
 
         Raises:
             RigError: naming the line or key at fault.
         """
-        return Rig.from_json(_tracker.read_rig(os.fspath(path)))
+        return Rig.from_json(_tracker.read_rig(os.fsdecode(path)))
 
     @staticmethod
     def from_json(text: str) -> Rig:
@@ -98,14 +98,13 @@ class Rig:
         """
         return _tracker.rig_toml(self.to_json())
 
-    def write(self, path: str | os.PathLike[str]) -> None:
+    def write(self, path: AnyPath) -> None:
         """Writes a rig file.
 
         Raises:
-            RigError: if the rig is wrong in itself.
-            OSError: if the file cannot be written.
+            RigError: if the rig is wrong in itself or the file cannot be written.
         """
-        Path(path).write_text(self.to_toml(), encoding="utf-8")
+        _tracker.write_rig(os.fsdecode(path), self.to_json())
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -199,14 +198,19 @@ class Nodes:
         """
         _tracker.check_table(self._columns(), self._meta_json())
 
-    def write(self, path: str | os.PathLike[str]) -> None:
+    def write(self, path: AnyPath, *, safe_csv: bool = False) -> None:
         """Writes the table, Parquet or CSV (with its `.json`) by the ending, replacing what is there.
+
+        Args:
+            path: the file.
+            safe_csv: in a CSV put a ``'`` before names that a spreadsheet would take for a formula (they begin with
+                ``=``, ``+``, ``-``, ``@``, a tab or a carriage return). `read_nodes` takes it off again.
 
         Raises:
             TableError: if the table is not valid or the file cannot be written.
             ArgumentError: if an array has the wrong type or shape.
         """
-        _tracker.write_table(os.fspath(path), self._columns(), self._meta_json())
+        _tracker.write_table(os.fsdecode(path), self._columns(), self._meta_json(), safe_csv)
 
     def to_dataframe(self) -> pd.DataFrame:
         """The table as pandas has it: one row per frame and node, names as categories."""
@@ -269,7 +273,7 @@ def nodes_of(columns: Columns) -> Nodes:
     return Nodes(frame, t_s, xy_px, sigma_px, area_px, status, rig, meta)
 
 
-def read_nodes(path: str | os.PathLike[str]) -> Nodes:
+def read_nodes(path: AnyPath) -> Nodes:
     """Reads a node table, Parquet or CSV by the ending, and checks every value.
 
     Args:
@@ -279,4 +283,4 @@ def read_nodes(path: str | os.PathLike[str]) -> Nodes:
         TableError: naming the row, line or column at fault, or a schema version that is not known.
         RigError: if the rig in it is wrong.
     """
-    return nodes_of(_tracker.read_table(os.fspath(path)))
+    return nodes_of(_tracker.read_table(os.fsdecode(path)))

@@ -56,7 +56,7 @@ def score(nodes: Nodes | StrPath, truth: Film | StrPath, limit_px: float = 2.0) 
             table.frame,
             table.xy_px,
             table.sigma_px,
-            truth._film if isinstance(truth, Film) else os.fspath(truth),
+            truth._film if isinstance(truth, Film) else os.fsdecode(truth),
             limit_px,
         )
     )

@@ -19,8 +19,9 @@ from pydpend import _tracker
 from pydpend.crossing import Found
 from pydpend.errors import ArgumentError, fault
 from pydpend.nodes import Nodes, Rig, nodes_of, read_nodes
+from pydpend.output import AnyPath
 
-Path: TypeAlias = str | os.PathLike[str]
+Path: TypeAlias = AnyPath
 Progress: TypeAlias = Callable[[str, int, int | None], object] | bool | None
 """A callback ``(stage, done, total)``; None is a bar on a terminal or in a notebook, False is nothing."""
 
@@ -66,7 +67,7 @@ def _frames(frames: tuple[int, int | None] | range | None) -> tuple[int, int | N
 def _threads(threads: int | None) -> int:
     if threads is None:
         return 0
-    if not 0 < threads < 1024:
+    if not 0 < threads < 1 << 62:
         raise ArgumentError(
             fault("threads", f"{threads} is out of range", "Give 1 or more, or None for one a core")
         )
@@ -83,7 +84,12 @@ def _count(name: str, value: int) -> int:
 def _rig(rig: Rig | Path | None) -> str | None:
     if rig is None:
         return None
-    return rig.to_json() if isinstance(rig, Rig) else _tracker.read_rig(os.fspath(rig))
+    return rig.to_json() if isinstance(rig, Rig) else _tracker.read_rig(os.fsdecode(rig))
+
+
+def _files(rig: Rig | Path | None) -> list[str]:
+    """Files that are read besides the recording."""
+    return [] if rig is None or isinstance(rig, Rig) else [os.fsdecode(rig)]
 
 
 class _Bar:
@@ -132,6 +138,7 @@ def track(
     output: Path | None = None,
     force: bool = False,
     resume: bool = False,
+    safe_csv: bool = False,
     threshold: float | None = None,
     polarity: Polarity = "auto",
     centroid: Centroid = "weighted",
@@ -151,6 +158,7 @@ def track(
         output: a table to write too, Parquet or CSV by the ending.
         force: replace `output` if it is there already.
         resume: go on where an earlier run for `output` stopped.
+        safe_csv: as in `Nodes.write`.
         threshold: in the recording's units; None is learned from it.
         polarity: whether markers are brighter or darker than what is around them.
         centroid: by intensity, or by OpenCV's contours as in the paper.
@@ -174,13 +182,15 @@ def track(
     callback, close = _callback(progress)
     try:
         columns, warnings, stopped = _tracker.track(
-            os.fspath(path),
+            os.fsdecode(path),
             _rig(rig),
             _frames(frames),
             (threshold, polarity, centroid),
             (fps, decoder, allow_protocol, _threads(threads)),
-            None if output is None else os.fspath(output),
+            None if output is None else os.fsdecode(output),
             existing,
+            safe_csv,
+            _files(rig),
             callback,
         )
     finally:
@@ -212,6 +222,7 @@ def setup(
     output: Path | None = None,
     *,
     picture: Path | None = None,
+    force: bool = False,
     fps: float | None = None,
     frames: tuple[int, int | None] | range | None = None,
     threads: int | None = None,
@@ -227,29 +238,29 @@ def setup(
         path: the recording; it is read through.
         output: a rig file to write, to be looked at and edited.
         picture: an image file to write, for example .png: the reference frame with all that was found.
+        force: replace `output` and `picture` if they are there already.
         fps, frames, threads, progress, threshold, polarity, decoder, allow_protocol: as in `track`.
 
     Raises:
         SourceError, DetectError, RigError, ArgumentError: as `track`.
-        FilmError: if the picture cannot be written.
+        RigError, FilmError: also if `output` or `picture` is there already, is the recording, or cannot be written.
         KeyboardInterrupt: on Ctrl-C, within a second; nothing is written then.
     """
     callback, close = _callback(progress)
     try:
         text, warnings, drawn = _tracker.setup(
-            os.fspath(path),
+            os.fsdecode(path),
             _frames(frames),
             (threshold, polarity, "weighted"),
             (fps, decoder, allow_protocol, _threads(threads)),
-            None if picture is None else os.fspath(picture),
+            None if output is None else os.fsdecode(output),
+            None if picture is None else os.fsdecode(picture),
+            force,
             callback,
         )
     finally:
         close()
-    rig = Rig.from_json(text)
-    if output is not None:
-        rig.write(output)
-    return Setup(rig, [str(warning) for warning in warnings], drawn)
+    return Setup(Rig.from_json(text), [str(warning) for warning in warnings], drawn)
 
 
 @dataclass(frozen=True, eq=False)
@@ -306,26 +317,28 @@ def overlay(
         ArgumentError: if an argument makes no sense.
         KeyboardInterrupt: on Ctrl-C, within a second; what was drawn is a whole film.
     """
+    table = [] if isinstance(nodes, Nodes) else [os.fsdecode(nodes)]
     if not isinstance(nodes, Nodes):
         nodes = read_nodes(nodes)
     callback, close = _callback(progress)
     try:
         frame, t_s = _tracker.overlay_film(
-            os.fspath(recording),
+            os.fsdecode(recording),
             nodes._columns(),
             nodes._meta_json(),
-            os.fspath(output),
+            os.fsdecode(output),
             (None, decoder, allow_protocol, 0),
             _count("every", every),
             None if width is None else _count("width", width),
             _count("play_fps", play_fps),
             _count("quality", quality),
             force,
+            table,
             callback,
         )
     finally:
         close()
-    return OverlayFilm(os.fspath(output), frame, t_s, play_fps)
+    return OverlayFilm(os.fsdecode(output), frame, t_s, play_fps)
 
 
 def info(
@@ -343,7 +356,7 @@ def info(
     Raises:
         SourceError: if it cannot be opened, or its time stamps stand still.
     """
-    known: dict[str, Any] = json.loads(_tracker.info(os.fspath(path), (fps, decoder, allow_protocol, 0)))
+    known: dict[str, Any] = json.loads(_tracker.info(os.fsdecode(path), (fps, decoder, allow_protocol, 0)))
     return known
 
 

@@ -37,7 +37,8 @@ fn films() -> &'static Path {
             let make = |name: &str, frames: &str, more: &[&str]| {
                 let path = folder.path().join(name);
                 let rig = folder.path().join("rig.toml");
-                let mut arguments = vec!["film", "--preset", "clean", "--frames", frames, "-q", "--rig"];
+                let mut arguments =
+                    vec!["film", "--preset", "clean", "--frames", frames, "-q", "--force", "--rig"];
                 arguments.extend([rig.to_str().unwrap(), "-o", path.to_str().unwrap()]);
                 arguments.extend(more);
                 let (status, _, error) = said(&arguments);

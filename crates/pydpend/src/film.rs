@@ -12,6 +12,7 @@ use tracker::film::{self, Film, MotionTable, Scene, Truth, WriteOptions};
 use tracker::score::{Tracked, score};
 
 use crate::errors::raise;
+use crate::settings::cells;
 
 /// Times (T,) and angles (T, L) of a motion given from Python.
 type Motion<'py> = Option<(PyReadonlyArray1<'py, f64>, PyReadonlyArray2<'py, f64>)>;
@@ -133,7 +134,7 @@ impl PyFilm {
     }
 
     /// Writes the film and, if wanted, its truth.
-    #[pyo3(signature = (output, truth, codec, quality, speed, gray_only, bits))]
+    #[pyo3(signature = (output, truth, codec, quality, speed, gray_only, bits, safe_csv, replace, reads))]
     #[expect(clippy::too_many_arguments, reason = "the options of one call of Python's")]
     fn write(
         &self,
@@ -145,6 +146,9 @@ impl PyFilm {
         speed: Option<String>,
         gray_only: bool,
         bits: Option<u32>,
+        safe_csv: bool,
+        replace: bool,
+        reads: Vec<PathBuf>,
     ) -> PyResult<()> {
         let codec = match codec {
             None => None,
@@ -158,7 +162,17 @@ impl PyFilm {
                 return Err(raise(py, Error::Film(fault)));
             }
         };
-        let options = WriteOptions { codec, quality, speed, gray_only, bits, truth };
+        let options = WriteOptions {
+            codec,
+            quality,
+            speed,
+            gray_only,
+            bits,
+            truth,
+            cells: cells(safe_csv),
+            replace,
+            reads,
+        };
         let done = py.detach(|| {
             film::write(&self.film, &output, &options, &mut |_| {
                 Python::attach(|py| py.check_signals()).map_err(|_| Error::Interrupted)

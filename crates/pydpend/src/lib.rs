@@ -29,10 +29,11 @@ mod _tracker {
     use super::smoothing::{learn_noise, smooth_angles};
     #[pymodule_export]
     use super::tables::{
-        arrow_reader, check_table, kind_of, misplaced, read_meta, read_rig, read_table, rig_toml, write_table,
+        arrow_reader, check_table, kind_of, misplaced, read_meta, read_rig, read_table, rig_toml, write_rig,
+        write_table,
     };
     #[pymodule_export]
-    use super::track::{info, overlay_film, setup, track};
+    use super::track::{check_outputs, fingerprint, info, overlay_film, recording_files, setup, track};
 
     #[pymodule_export]
     const VERSION: &str = env!("CARGO_PKG_VERSION");

@@ -3,6 +3,7 @@
 //! Owns: their words. Words are those of the command line.
 
 use pyo3::prelude::*;
+use tracker::csv_text::Cells;
 use tracker::detect::{Centroid, DetectSettings, Polarity, Threshold};
 use tracker::rig::Rig;
 use tracker::source::{Decoder, OpenOptions};
@@ -61,6 +62,11 @@ pub fn open_options(py: Python<'_>, given: &OpenArguments) -> PyResult<OpenOptio
         allow_protocol: *allow_protocol,
         threads: *threads,
     })
+}
+
+/// How a CSV writes names.
+pub fn cells(safe_csv: bool) -> Cells {
+    if safe_csv { Cells::Safe } else { Cells::Plain }
 }
 
 /// A rig of its JSON, checked.

@@ -19,6 +19,7 @@ use tracker::rig::Rig;
 use tracker::table::{self, NodeTable, Rows, TableMeta};
 
 use crate::errors::{argument, raise, to_python};
+use crate::settings::cells;
 
 /// Columns as NumPy arrays, and the metadata as JSON.
 pub type Columns<'py> = (
@@ -106,9 +107,15 @@ pub fn table_of(py: Python<'_>, held: &Held<'_>, meta: &str) -> PyResult<NodeTab
 
 /// Writes a node table, Parquet or CSV by the ending of `path`.
 #[pyfunction]
-pub fn write_table(py: Python<'_>, path: PathBuf, held: Held<'_>, meta: &str) -> PyResult<()> {
+pub fn write_table(
+    py: Python<'_>,
+    path: PathBuf,
+    held: Held<'_>,
+    meta: &str,
+    safe_csv: bool,
+) -> PyResult<()> {
     let table = table_of(py, &held, meta)?;
-    py.detach(|| table.write(&path)).map_err(|e| raise(py, e))
+    py.detach(|| table.write(&path, cells(safe_csv))).map_err(|e| raise(py, e))
 }
 
 /// Checks the invariants of a node table.
@@ -163,6 +170,12 @@ pub fn misplaced(py: Python<'_>, path: PathBuf, wanted: Vec<String>) -> PyResult
 /// A rig as JSON.
 pub fn rig_json(rig: &Rig) -> tracker::error::Result<String> {
     serde_json::to_string(rig).map_err(|e| Error::Rig(Fault::new("rig", e.to_string())))
+}
+
+/// Writes a rig, given as JSON, as TOML.
+#[pyfunction]
+pub fn write_rig(py: Python<'_>, path: PathBuf, rig: &str) -> PyResult<()> {
+    rig_of_json(rig).and_then(|r| r.write(&path)).map_err(|e| raise(py, e))
 }
 
 /// A rig's TOML from its JSON.

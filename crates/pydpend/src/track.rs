@@ -7,12 +7,15 @@ use pyo3::prelude::*;
 use serde_json::json;
 use tracker::error::Error;
 use tracker::message::Message;
+use tracker::name::text;
+use tracker::output;
 use tracker::overlay::{self, FilmSettings};
 use tracker::pipeline::{self, Existing, RunSettings};
-use tracker::table::SourceFacts;
+use tracker::source;
+use tracker::table::{Fingerprint, SourceFacts};
 
 use crate::errors::{argument, raise, to_python};
-use crate::settings::{DetectArguments, OpenArguments, detect_settings, open_options, rig};
+use crate::settings::{DetectArguments, OpenArguments, cells, detect_settings, open_options, rig};
 use crate::tables::{Columns, Held, columns, rig_json, table_of};
 use crate::watch::Watch;
 
@@ -21,14 +24,14 @@ type Frames = Option<(u64, Option<u64>)>;
 
 fn settings(
     py: Python<'_>,
-    input: String,
+    input: PathBuf,
     rig_text: Option<&str>,
     frames: Frames,
     detect: &DetectArguments,
     open: &OpenArguments,
 ) -> PyResult<RunSettings> {
     Ok(RunSettings {
-        input,
+        input: text(&input),
         rig: rig(py, rig_text)?,
         frames: frames.map(|(start, end)| start..end.unwrap_or(u64::MAX)),
         detect: detect_settings(py, detect)?,
@@ -47,21 +50,25 @@ fn messages<'py>(py: Python<'py>, warnings: &[Message]) -> PyResult<Messages<'py
 
 /// Follows the markers of a recording. Columns, warnings, and the exception that stopped it, if one did.
 #[pyfunction]
-#[allow(clippy::too_many_arguments)]
+#[expect(clippy::too_many_arguments, reason = "the options of one call of Python's")]
 pub fn track<'py>(
     py: Python<'py>,
-    input: String,
+    input: PathBuf,
     rig: Option<&str>,
     frames: Frames,
     detect: DetectArguments,
     open: OpenArguments,
     output: Option<PathBuf>,
     existing: &str,
+    safe_csv: bool,
+    reads: Vec<PathBuf>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<(Columns<'py>, Messages<'py>, Option<PyErr>)> {
     let mut settings = settings(py, input, rig, frames, &detect, &open)?;
     settings.output = output;
     settings.collect = true;
+    settings.cells = cells(safe_csv);
+    settings.reads = reads;
     settings.existing = match existing {
         "refuse" => Existing::Refuse,
         "replace" => Existing::Replace,
@@ -83,23 +90,31 @@ pub fn track<'py>(
 /// A rig as JSON, warnings, and the reference frame with the rig drawn, (H, W, 3).
 type Found<'py> = (String, Messages<'py>, Bound<'py, PyArray3<u8>>);
 
-/// Finds the rig of a recording; the picture is also written if a file is given.
+/// Finds the rig of a recording; rig and picture are also written if files are given.
 #[pyfunction]
+#[expect(clippy::too_many_arguments, reason = "the options of one call of Python's")]
 pub fn setup<'py>(
     py: Python<'py>,
-    input: String,
+    input: PathBuf,
     frames: Frames,
     detect: DetectArguments,
     open: OpenArguments,
+    output: Option<PathBuf>,
     picture: Option<PathBuf>,
+    replace: bool,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Found<'py>> {
     let settings = settings(py, input, None, frames, &detect, &open)?;
     let mut watch = Watch::new(progress);
     let outcome = py.detach(|| {
+        let outputs: Vec<PathBuf> = output.iter().chain(&picture).cloned().collect();
+        output::check(&outputs, &source::files(&settings.input)?, replace).map_err(Error::Rig)?;
         let found = tracker::setup::find(&settings, &mut watch)?;
         if let Some(path) = &picture {
             overlay::save(&found.picture, path)?;
+        }
+        if let Some(path) = &output {
+            found.rig.write(path)?;
         }
         Ok((rig_json(&found.rig)?, found.warnings, overlay::rgb(&found.picture)?, found.rig.image_px))
     });
@@ -116,7 +131,7 @@ type Filmed<'py> = (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<f64>>);
 #[expect(clippy::too_many_arguments, reason = "the options of one call of Python's")]
 pub fn overlay_film<'py>(
     py: Python<'py>,
-    input: String,
+    input: PathBuf,
     held: Held<'_>,
     meta: &str,
     output: PathBuf,
@@ -126,6 +141,7 @@ pub fn overlay_film<'py>(
     play_fps: u32,
     quality: u32,
     replace: bool,
+    reads: Vec<PathBuf>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Filmed<'py>> {
     let table = table_of(py, &held, meta)?;
@@ -134,7 +150,8 @@ pub fn overlay_film<'py>(
     let mut watch = Watch::new(progress);
     let outcome = py.detach(|| {
         table.check("nodes")?;
-        overlay::film(&input, &open, &table, &output, &settings, &mut watch)
+        output::check(std::slice::from_ref(&output), &reads, replace).map_err(Error::Film)?;
+        overlay::film(&text(&input), &open, &table, &output, &settings, &mut watch)
     });
     let filmed = watch.done(py, outcome)?;
     Ok((filmed.frame.into_pyarray(py), filmed.time_s.into_pyarray(py)))
@@ -142,10 +159,12 @@ pub fn overlay_film<'py>(
 
 /// What is known of a recording before it is read through, as JSON.
 #[pyfunction]
-pub fn info(py: Python<'_>, input: String, open: OpenArguments) -> PyResult<String> {
+pub fn info(py: Python<'_>, input: PathBuf, open: OpenArguments) -> PyResult<String> {
     let options = open_options(py, &open)?;
     let mut watch = Watch::new(None);
     let known = py.detach(|| {
+        let input = text(&input);
+        let files = source::files(&input)?;
         let mut source = pipeline::open(&input, &options, &mut watch)?;
         let surveyed = pipeline::survey(&mut *source)?;
         let info = source.info();
@@ -154,7 +173,7 @@ pub fn info(py: Python<'_>, input: String, open: OpenArguments) -> PyResult<Stri
         let mut value = json!(SourceFacts {
             rate_hz: timing.rate_hz,
             rate_origin: timing.rate_origin,
-            ..SourceFacts::of(info)
+            ..SourceFacts::of(info, &files)?
         });
         value["time"] = json!(timing);
         value["frames"] = json!(is_whole.then(|| steps.len()));
@@ -162,4 +181,27 @@ pub fn info(py: Python<'_>, input: String, open: OpenArguments) -> PyResult<Stri
         Ok(value.to_string())
     });
     watch.done(py, known)
+}
+
+/// The files that a recording is read from; none for what is read once only.
+#[pyfunction]
+pub fn recording_files(py: Python<'_>, input: PathBuf) -> PyResult<Vec<PathBuf>> {
+    source::files(&text(&input)).map_err(|e| raise(py, e))
+}
+
+/// What tells the contents of some files from others without reading all of them, in hexadecimal.
+#[pyfunction]
+pub fn fingerprint(py: Python<'_>, files: Vec<PathBuf>) -> PyResult<String> {
+    py.detach(|| Fingerprint::of(&files)).map(|f| f.sha256).map_err(|e| raise(py, e))
+}
+
+/// Refuses outputs that would replace an input, one another or, unless `replace`, anything that is there already.
+#[pyfunction]
+pub fn check_outputs(
+    py: Python<'_>,
+    outputs: Vec<PathBuf>,
+    inputs: Vec<PathBuf>,
+    replace: bool,
+) -> PyResult<()> {
+    output::check(&outputs, &inputs, replace).map_err(|fault| raise(py, Error::Argument(fault)))
 }

@@ -6,6 +6,7 @@ use std::fmt;
 use std::path::Path;
 
 use crate::message::{FrontEnd, Message, Setting};
+use crate::name::text;
 
 /// Where in the input a fault lies.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -71,7 +72,7 @@ impl Fault {
 
     /// A file that is there already and was not to be replaced.
     pub fn exists(path: &Path) -> Self {
-        Self::new(path.display(), "it is there already")
+        Self::new(text(path), "it is there already")
             .advice("Choose another name, or replace it with " + Setting::Force)
     }
 

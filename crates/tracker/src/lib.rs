@@ -11,6 +11,7 @@
 //! ticks with a time base until they are written.
 
 pub mod brightest;
+pub mod csv_text;
 pub mod detect;
 pub mod discover;
 pub mod error;
@@ -18,7 +19,9 @@ pub mod film;
 pub mod frame;
 pub mod kind;
 pub mod message;
+pub mod name;
 pub mod observation;
+pub mod output;
 pub mod overlay;
 pub mod pipeline;
 pub mod residual;
@@ -27,6 +30,7 @@ pub mod rigid;
 pub mod score;
 pub mod setup;
 pub mod source;
+pub mod stop;
 pub mod store;
 pub mod table;
 pub mod timing;

@@ -9,6 +9,8 @@ use serde::{Deserialize, Serialize};
 use crate::error::{Error, Fault, Place, Result};
 use crate::kind::{self, Kind};
 use crate::message::SETUP;
+use crate::name::text;
+use crate::output;
 
 /// Version of the rig file's form; a file with a higher one is refused.
 pub const RIG_SCHEMA: u32 = 1;
@@ -104,14 +106,14 @@ impl Rig {
     /// [`Error::Rig`] naming the file and the line or key.
     pub fn read(path: &Path) -> Result<Self> {
         kind::expect(path, &[Kind::Rig], Error::Rig)?;
-        let name = path.display().to_string();
-        let text = std::fs::read_to_string(path).map_err(|e| {
+        let name = text(path);
+        let content = std::fs::read_to_string(path).map_err(|e| {
             Error::Rig(
                 Fault::new(&name, format!("the rig file cannot be read ({e})"))
                     .advice("Give a rig made by " + SETUP),
             )
         })?;
-        Self::parse(&text, &name)
+        Self::parse(&content, &name)
     }
 
     /// Reads and checks the text of a rig file; `name` is for messages.
@@ -140,6 +142,19 @@ impl Rig {
         toml::to_string_pretty(self).map_err(|e| Error::Rig(Fault::new("rig", e.to_string())))
     }
 
+    /// Writes it as TOML.
+    ///
+    /// # Errors
+    /// [`Error::Rig`] if it cannot be written.
+    pub fn write(&self, path: &Path) -> Result<()> {
+        output::write(path, self.to_toml()?.as_bytes()).map_err(|e| {
+            Error::Rig(
+                Fault::new(text(path), format!("the rig file cannot be written ({e})"))
+                    .advice("Check that the folder exists and may be written to"),
+            )
+        })
+    }
+
     /// Index of a body by its name.
     pub fn body_index(&self, name: &str) -> Option<usize> {
         self.bodies.iter().position(|b| b.name == name)
@@ -151,7 +166,36 @@ impl Rig {
         self.nodes.iter().map(|n| self.body_index(&n.body).unwrap_or(usize::MAX)).collect()
     }
 
-    /// Checks that names are unique and known and numbers finite and inside the image.
+    /// Whether a node can be at this place of the reference frame. The image itself need not hold it: a link may reach
+    /// out of the image there. But a node is seen in some frame, and so is another of its body, so that it is no farther
+    /// from the image than the image's diagonal.
+    pub fn in_reach(&self, [x_px, y_px]: [f64; 2]) -> bool {
+        let [w, h] = self.image_px.map(f64::from);
+        // Pixel centres are at integers, so the image's edges are half a pixel out.
+        let outside = |v: f64, size: f64| (-0.5 - v).max(v - (size - 0.5)).max(0.0);
+        x_px.is_finite() && y_px.is_finite() && outside(x_px, w).hypot(outside(y_px, h)) <= w.hypot(h)
+    }
+
+    /// Whether a place is in the image, to half a pixel beyond the outermost pixel centres.
+    pub fn in_image(&self, [x_px, y_px]: [f64; 2]) -> bool {
+        let [w, h] = self.image_px.map(f64::from);
+        x_px >= -0.5 && y_px >= -0.5 && x_px <= w - 0.5 && y_px <= h - 0.5
+    }
+
+    /// Leaves out nodes at places where no node can be, and the bodies and joints that are then nobody's. Names of the
+    /// nodes left out.
+    pub fn leave_out_unreachable(&mut self) -> Vec<String> {
+        let rig = self.clone();
+        let gone = |n: &Node| !rig.in_reach([n.x_px, n.y_px]);
+        let names: Vec<String> = rig.nodes.iter().filter(|n| gone(n)).map(|n| n.name.clone()).collect();
+        self.nodes.retain(|n| !gone(n));
+        self.bodies.retain(|b| self.nodes.iter().any(|n| n.body == b.name));
+        let known = |name: &String| self.bodies.iter().any(|b| b.name == *name);
+        self.joints.retain(|j| j.bodies.iter().all(known) && j.x_px.is_finite() && j.y_px.is_finite());
+        names
+    }
+
+    /// Checks that names are unique and known and numbers finite and places where nodes can be.
     ///
     /// # Errors
     /// [`Error::Rig`] naming the first key at fault.
@@ -198,11 +242,22 @@ impl Rig {
                     "Add a [[body]] of that name",
                 );
             }
-            // Outside by half a pixel is outside: pixel centres are at integers.
-            if !(n.x_px >= -0.5 && n.y_px >= -0.5 && n.x_px <= w - 0.5 && n.y_px <= h - 0.5) {
+            if let Some(o) = self.nodes[..i].iter().find(|o| {
+                (&o.body, o.x_px.to_bits(), o.y_px.to_bits()) == (&n.body, n.x_px.to_bits(), n.y_px.to_bits())
+            }) {
                 return fault(
                     format!("node {}", n.name),
-                    format!("({}, {}) px is outside the image of {w} x {h} px", n.x_px, n.y_px),
+                    format!("it is at ({}, {}) px as node {} of its body is", n.x_px, n.y_px, o.name),
+                    "Give its own centre in the reference frame",
+                );
+            }
+            if !self.in_reach([n.x_px, n.y_px]) {
+                return fault(
+                    format!("node {}", n.name),
+                    format!(
+                        "({}, {}) px is farther from the image of {w} x {h} px than its diagonal is long",
+                        n.x_px, n.y_px
+                    ),
                     "Give its centre in the reference frame",
                 );
             }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use opencv::core::Mat;
 
-use crate::detect::{DetectSettings, Detection, Detector, Flags, Levels};
+use crate::detect::{Detection, Detector, Flags};
 use crate::discover::advice::advise;
 use crate::error::{Error, Fault, Place, Result};
 use crate::frame::Frame;
@@ -14,7 +14,6 @@ use crate::message::Message;
 use crate::overlay;
 use crate::pipeline::{self, Existing, Observer, RunSettings};
 use crate::rig::Rig;
-use crate::source::{self, OpenOptions};
 use crate::table::RunEnding;
 
 /// What a recording shows.
@@ -57,7 +56,7 @@ pub fn find(settings: &RunSettings, observer: &mut dyn Observer) -> Result<Setup
             .extend(advise(&rig, &table.rows, summary.meta.source.rate_hz).into_iter().map(Message::from));
     }
     let index = rig.reference_frame.unwrap_or(0);
-    let (frame, detections) = frame_at(&settings.input, &settings.open, &settings.detect, index)?;
+    let (frame, detections) = frame_at(&settings, index, observer)?;
     let saturated = detections.iter().filter(|d| d.flags.has(Flags::SATURATED)).count();
     if saturated > 0 {
         warnings.push(format!(
@@ -72,15 +71,19 @@ pub fn find(settings: &RunSettings, observer: &mut dyn Observer) -> Result<Setup
 
 /// A frame of a recording and what is detected in it.
 fn frame_at(
-    input: &str,
-    open: &OpenOptions,
-    detect: &DetectSettings,
+    settings: &RunSettings,
     index: u64,
+    observer: &mut dyn Observer,
 ) -> Result<(Frame, Vec<Detection>)> {
-    let mut source = source::open(input, open)?;
-    let levels = Levels::learn(&source.sample(24)?, detect)?;
+    let RunSettings { input, open, detect, threads, .. } = settings;
+    let source = pipeline::open(input, open, observer)?;
+    let (mut source, samples) = pipeline::sample(source, 24, observer)?;
+    let levels = pipeline::learn(samples, detect, *threads, observer)?;
     let mut detections = Vec::new();
     while let Some(frame) = source.next_frame()? {
+        if observer.interrupted() {
+            return Err(Error::Interrupted);
+        }
         if frame.index == index {
             Detector::new(Arc::new(levels), detect)?.detect(&frame, &mut detections)?;
             return Ok((frame, detections));

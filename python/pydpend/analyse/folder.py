@@ -15,9 +15,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from pydpend._tracker import fingerprint, recording_files
 from pydpend.analyse.contents import made_by
 from pydpend.documents import Table, read_json
 from pydpend.errors import PydpendError, fault
+from pydpend.output import check_kept, write_text
 
 RUN_SCHEMA = 3
 """A folder of an older schema is done again, one of a newer is refused."""
@@ -40,17 +42,25 @@ class Digests:
     """SHA-256 of input files. One whose size and time of change are known already is not read again."""
 
     known: dict[str, list[Any]] = field(default_factory=dict)
-    """Absolute path: size in bytes, time of change in ns, SHA-256."""
+    """Absolute path: size in bytes, time of change in ns and its fingerprint, SHA-256."""
 
     def of(self, path: Path) -> str:
-        """SHA-256 of a file, or of the names and digests of the files in a folder."""
+        """SHA-256 of a file, or of the names and digests of the files in a folder. Of a film that is two files, of
+        both."""
         if path.is_dir():
             inside = sorted(p for p in path.rglob("*") if p.is_file())
             return digest({p.relative_to(path).as_posix(): self.of(p) for p in inside})
+        others = [p for p in recording_files(path) if not p.samefile(path)]
+        if others:
+            return digest([self._of_file(path), *(self._of_file(p) for p in others)])
+        return self._of_file(path)
+
+    def _of_file(self, path: Path) -> str:
         name, state = str(path.absolute()), path.stat()
         known = self.known.get(name)
-        if known is None or known[:2] != [state.st_size, state.st_mtime_ns]:
-            known = [state.st_size, state.st_mtime_ns, _sha256(path)]
+        now = f"{state.st_mtime_ns} {fingerprint([path])}"
+        if known is None or known[:2] != [state.st_size, now]:
+            known = [state.st_size, now, _sha256(path)]
             self.known[name] = known
         return str(known[2])
 
@@ -64,12 +74,7 @@ class Digests:
 
 def write_whole(path: Path, text: str) -> None:
     """Writes a file so that it is there whole or not at all."""
-    temporary = path.with_name(path.name + ".new")
-    # A link of that name would lead elsewhere.
-    temporary.unlink(missing_ok=True)
-    with temporary.open("x", encoding="utf-8") as file:
-        file.write(text)
-    os.replace(temporary, path)
+    write_text(path, text)
 
 
 def _sha256(path: Path) -> str:
@@ -148,8 +153,8 @@ class RunFolder:
         known: dict[str, list[Any]] = {}
         for name in table:
             entry = table.items(name)
-            whole = all(isinstance(number, int) for number in entry[:2])
-            if len(entry) != 3 or not whole or not isinstance(entry[2], str):
+            kinds = (int, str, str)
+            if len(entry) != 3 or not all(isinstance(e, k) for e, k in zip(entry, kinds, strict=True)):
                 table.refuse(name, "size, time of change and SHA-256 are expected")
             known[name] = entry
         return Digests(known)
@@ -193,6 +198,7 @@ class RunFolder:
         names = []
         for source in sorted(p for p in unfinished.rglob("*") if p.is_file()):
             target = into / source.relative_to(unfinished)
+            check_kept(target)
             target.parent.mkdir(parents=True, exist_ok=True)
             os.replace(source, target)
             names.append(target.relative_to(self.path).as_posix())

@@ -19,6 +19,7 @@ from pydpend.analyse.folder import UNFINISHED, Digests, RunFolder, digest, write
 from pydpend.analyse.options import Options, check_files
 from pydpend.analyse.recordings import Recording, check_options, recordings
 from pydpend.errors import OptionError, PydpendError, Setting, fault
+from pydpend.output import keeping
 
 Progress = Callable[[int, int, str, str], None]
 """Called as ``progress(stage number from 1, stages, title, what)``, ``what`` being ``start``, how far it is
@@ -236,6 +237,12 @@ def analyse(options: Options, folder: str | Path, progress: Progress | None = No
         "titles": {s.name: s.title for s in todo},
         "digests": digests.known,
     }
+    with keeping(str(i["path"]) for i in run.facts["inputs"]):
+        return _analyse(run, todo, options, progress)
+
+
+def _analyse(run: RunFolder, todo: list[Stage], options: Options, progress: Progress | None) -> Outcome:
+    path = run.path
     run.save()
     said: dict[str, str] = {}
     of = len(todo) + 1

@@ -18,6 +18,7 @@ from pydpend.analyse.folder import write_whole
 from pydpend.analyse.options import Options
 from pydpend.documents import read_json
 from pydpend.errors import PydpendError
+from pydpend.output import whole
 
 if TYPE_CHECKING:
     from pydpend.analyse.recordings import Recording
@@ -42,6 +43,15 @@ def version() -> str:
 
 def _write_json(path: Path, value: Any) -> None:
     write_whole(path, json.dumps(value, indent=1, allow_nan=False) + "\n")
+
+
+def _write_parquet(path: Path, columns: dict[str, Any]) -> None:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    # A file, because pyarrow looks for addresses in names.
+    with whole(path) as new, new.open("wb") as file:
+        pq.write_table(pa.table(columns), file, use_dictionary=False)
 
 
 def _share(tell: Tell) -> Callable[[str, int, int | None], None]:
@@ -83,8 +93,6 @@ def track(r: Recording, options: Options, into: Path, tell: Tell, resume: bool) 
 def markers(r: Recording, here: Path, into: Path) -> str:
     """How well each node was seen and how well it fits its body: ``residuals.parquet``, ``markers.json``."""
     import numpy as np
-    import pyarrow as pa
-    import pyarrow.parquet as pq
 
     from pydpend.angles import misfits
 
@@ -92,7 +100,7 @@ def markers(r: Recording, here: Path, into: Path) -> str:
     off = misfits(nodes)
     # Columns are numbered, because a node may be called anything; their names are in markers.json.
     columns = {"time_s": nodes.t_s} | {f"node{i}_px": off[:, i] for i in range(off.shape[1])}
-    pq.write_table(pa.table(columns), into / "residuals.parquet", use_dictionary=False)
+    _write_parquet(into / "residuals.parquet", columns)
     known = np.isfinite(off)
     rows = [
         {
@@ -134,7 +142,7 @@ def _hanging(r: Recording, options: Options, here: Path, into: Path) -> Any:
 
     # The same rig, so that the markers have the same names.
     rig = into / "zero_rig.toml"
-    rig.write_text(_nodes(here, r).rig.to_toml(), encoding="utf-8")
+    _nodes(here, r).rig.write(rig)
     return track_film(path, rig, fps=options.fps, output=into / "zero.parquet", progress=False)
 
 
@@ -216,9 +224,6 @@ def _model(options: Options) -> Model:
 
 def encoder(r: Recording, options: Options, here: Path, into: Path) -> str:
     """Calibrates the encoder and compares the film's phi1 with it."""
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
     from pydpend.angles import read_angles
     from pydpend.encoder import calibrate, compare, encoder_angles, read_calibration, read_encoder, read_holds
     from pydpend.plots.encoder import calibration_figure, comparison_figure
@@ -241,7 +246,7 @@ def encoder(r: Recording, options: Options, here: Path, into: Path) -> str:
         save(calibration_figure(line), into / "calibration.svg")
     found = compare(film, encoder_angles(signal, line))
     write_whole(into / "comparison.json", found.to_json())
-    pq.write_table(pa.table(found.to_columns()), into / "comparison.parquet", use_dictionary=False)
+    _write_parquet(into / "comparison.parquet", found.to_columns())
     save(comparison_figure(found), into / "comparison.png")
     return f"RMS difference {math.degrees(found.rms_rad):.4f} deg"
 

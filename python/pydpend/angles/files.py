@@ -22,13 +22,14 @@ from pydpend.columns import Columns, read_columns
 from pydpend.documents import parse_json, read_text
 from pydpend.errors import AnglesError, Setting, fault
 from pydpend.kinds import expect
+from pydpend.output import AnyPath, path_of, whole, write_text
 
 META_KEY = "pydpend_angles"
 """Key of the JSON that :func:`write_angles` puts into a Parquet file's metadata."""
 
 
 def read_angles(
-    path: str | Path,
+    path: AnyPath,
     *,
     columns: Mapping[str, str] | None = None,
     hanging_rad: float | tuple[float, float] = 0.0,
@@ -50,7 +51,7 @@ def read_angles(
 
     Raises :class:`~pydpend.errors.AnglesError` naming file, line (or row) and column.
     """
-    path = Path(path)
+    path = path_of(path)
     # What a folder lacks is told below.
     expect(path, ("angles", "tables") if path.is_dir() else ("angles",), AnglesError)
     label = name if name is not None else (path.name if path.is_dir() else path.stem)
@@ -218,7 +219,7 @@ def _read_pair(path: Path) -> tuple[Floats, Floats]:
     return array[0].astype(np.float64), array[1].astype(np.float64)
 
 
-def write_angles(angles: LinkAngles, path: str | Path) -> None:
+def write_angles(angles: LinkAngles, path: AnyPath) -> None:
     """Writes the table as Parquet or CSV, by the ending; empty (null) where a link was not seen.
 
     ``meta`` and ``name`` go into the Parquet metadata, or beside a CSV into ``PATH.json``. Numbers read back
@@ -226,28 +227,30 @@ def write_angles(angles: LinkAngles, path: str | Path) -> None:
 
     Raises :class:`~pydpend.errors.AnglesError` for another ending or a path that cannot be written.
     """
-    path = Path(path)
+    path = path_of(path)
     meta = json.dumps({**angles.meta, "name": angles.name}, sort_keys=True)
     columns = angles.to_columns()
-    temporary = path.with_name(f".{path.name}.part")
+    if path.suffix not in (".parquet", ".csv"):
+        raise AnglesError(
+            fault(str(path), f"the ending {path.suffix!r} is not known", "Use .parquet or .csv")
+        )
     try:
-        if path.suffix == ".parquet":
-            table = pa.table({k: pa.array(v, from_pandas=True) for k, v in columns.items()})
-            pq.write_table(table.replace_schema_metadata({META_KEY: meta}), temporary, use_dictionary=False)
-        elif path.suffix == ".csv":
-            with temporary.open("w", encoding="utf-8", newline="") as file:
-                file.write(",".join(columns) + "\n")
-                for row in zip(*(v.tolist() for v in columns.values()), strict=True):
-                    file.write(",".join("" if v != v else repr(v) for v in row) + "\n")
-            side = path.with_name(path.name + ".json")
-            side.write_text(meta + "\n", encoding="utf-8")
-        else:
-            raise AnglesError(
-                fault(str(path), f"the ending {path.suffix!r} is not known", "Use .parquet or .csv")
-            )
-        temporary.replace(path)
+        with whole(path) as new:
+            if path.suffix == ".parquet":
+                table = pa.table({k: pa.array(v, from_pandas=True) for k, v in columns.items()})
+                # A file, because pyarrow looks for addresses in names.
+                with new.open("wb") as file:
+                    pq.write_table(
+                        table.replace_schema_metadata({META_KEY: meta}), file, use_dictionary=False
+                    )
+            else:
+                with new.open("w", encoding="utf-8", newline="") as text:
+                    text.write(",".join(columns) + "\n")
+                    for row in zip(*(v.tolist() for v in columns.values()), strict=True):
+                        text.write(",".join("" if v != v else repr(v) for v in row) + "\n")
+                # Where the CSV is, its metadata are too.
+                write_text(path.with_name(path.name + ".json"), meta + "\n")
     except OSError as problem:
-        temporary.unlink(missing_ok=True)
         raise AnglesError(
             fault(str(path), f"the file cannot be written ({problem.strerror})", "Check the folder")
         ) from problem

@@ -13,10 +13,14 @@ import os
 import signal
 import sys
 from collections.abc import Iterable
+from contextlib import redirect_stderr, redirect_stdout
 from typing import Any
 
+from pydpend.cli.reads import read_by
 from pydpend.cli.words import RENAMED, CommandLine, unknown_command, unknown_option
 from pydpend.errors import PydpendError, listed, speaking
+from pydpend.output import keeping
+from pydpend.terminal import Shown
 
 COMMANDS: tuple[str, ...] = (
     "analyse",
@@ -136,19 +140,21 @@ def _look_up_numpy() -> None:
 
 def main(argv: list[str] | None = None) -> int:
     """Runs one command and returns its exit status."""
-    try:
-        args, front = _parse(sys.argv[1:] if argv is None else argv)
-    except _Refused as problem:
-        print(f"pydpend: {problem}", file=sys.stderr)
-        return 2
-    with speaking(front):
-        return _run(args)
+    with redirect_stdout(Shown(sys.stdout)), redirect_stderr(Shown(sys.stderr)):
+        try:
+            args, front = _parse(sys.argv[1:] if argv is None else argv)
+        except _Refused as problem:
+            print(f"pydpend: {problem}", file=sys.stderr)
+            return 2
+        with speaking(front):
+            return _run(args)
 
 
 def _run(args: argparse.Namespace) -> int:
     try:
         _look_up_numpy()
-        status: int = args.run(args)
+        with keeping(read_by(args)):
+            status: int = args.run(args)
         sys.stdout.flush()
         return status
     except PydpendError as error:

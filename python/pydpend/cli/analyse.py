@@ -17,6 +17,8 @@ from collections.abc import Callable
 from dataclasses import fields, replace
 from pathlib import Path
 
+from pydpend.terminal import below, shown
+
 HELP = "film, nodes or angles in, a run folder with a report out"
 
 
@@ -85,23 +87,25 @@ def run(args: argparse.Namespace) -> int:
 
 def teller() -> Callable[[int, int, str, str], None]:
     """Progress on stderr: on a terminal one line that moves, else a line as each stage starts and ends."""
-    moving = sys.stderr.isatty()
+    out = below(sys.stderr)
+    moving = out.isatty()
     begun = time.monotonic()
 
     def tell(number: int, of: int, title: str, what: str) -> None:
         nonlocal begun
-        head = f"[{number}/{of}] {title}"
+        head = f"[{number}/{of}] {shown(title)}"
+        what = shown(what)
         wipe = "\x1b[K" if moving else ""
         if what == "start":
             begun = time.monotonic()
-            print(f"{head} ...", end="\r" if moving else "\n", file=sys.stderr, flush=True)
+            print(f"{head} ...", end="\r" if moving else "\n", file=out, flush=True)
         elif what in ("done", "kept") or what.startswith(("not done", "does not apply")):
             took = f" ({time.monotonic() - begun:.1f} s)" if what == "done" else ""
-            print(f"{wipe}{head}: {what}{took}", file=sys.stderr, flush=True)
+            print(f"{wipe}{head}: {what}{took}", file=out, flush=True)
         elif what.startswith("note: "):
-            print(f"{wipe}{head}: {what}", file=sys.stderr, flush=True)
+            print(f"{wipe}{head}: {what}", file=out, flush=True)
         elif moving:
-            print(f"\x1b[K{head}: {what}{_left(what, begun)}", end="\r", file=sys.stderr, flush=True)
+            print(f"\x1b[K{head}: {what}{_left(what, begun)}", end="\r", file=out, flush=True)
 
     return tell
 

@@ -55,6 +55,7 @@ def run(args: argparse.Namespace) -> int:
 
     from pydpend.encoder import calibrate, compare, encoder_angles, read_calibration, read_encoder, read_holds
     from pydpend.errors import EncoderError, fault
+    from pydpend.output import whole, write_text
     from pydpend.plots.angles import angles_figure
     from pydpend.plots.encoder import calibration_figure, comparison_figure
     from pydpend.plots.style import save
@@ -71,8 +72,9 @@ def run(args: argparse.Namespace) -> int:
     folder = Path(args.output)
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        (folder / "compare.json").write_text(found.to_json(), encoding="utf-8")
-        pq.write_table(pa.table(found.to_columns()), folder / "residuals.parquet")
+        write_text(folder / "compare.json", found.to_json())
+        with whole(folder / "residuals.parquet") as new, new.open("wb") as file:
+            pq.write_table(pa.table(found.to_columns()), file)
         save(comparison_figure(found, label=args.label), folder / f"compare.{args.format}")
         save(angles_figure(video), folder / f"angles.{args.format}")
         if line is not None:

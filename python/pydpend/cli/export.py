@@ -28,11 +28,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Writes it."""
+    from pydpend._tracker import check_outputs
     from pydpend.export import SCALED, WRITERS, export
     from pydpend.nodes import read_nodes
 
-    if Path(args.output).exists() and not args.force:
-        raise ArgumentError(fault(args.output, "it is there already", "Choose another name, or add --force"))
+    check_outputs([args.output], [], args.force)
     ending = Path(args.output).suffix.lower()
     if args.px_per_m is not None and ending in WRITERS and ending not in SCALED:
         raise ArgumentError(

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pydpend.fit_options import FREE, INTERVALS, METHODS, RATIOS, check_fit, free_names
+from pydpend.terminal import below
 
 if TYPE_CHECKING:
     from pydpend.angles import LinkAngles
@@ -178,7 +179,7 @@ def progress(label: str, quiet: bool) -> Callable[[int, int, float], None] | Non
         print(
             f"\r{label}: step {step}, chi-square {chi2:.4g}, at most {left:.0f} s left ",
             end="",
-            file=sys.stderr,
+            file=below(sys.stderr),
         )
 
     return report

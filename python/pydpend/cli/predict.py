@@ -13,6 +13,7 @@ import json
 from pathlib import Path
 
 from pydpend.cli.fit import add_angles_arguments, add_output_arguments, read
+from pydpend.output import write_text
 
 HELP = "predict a recording from a fit to others"
 
@@ -47,7 +48,7 @@ def run(args: argparse.Namespace) -> int:
     lines = [",".join(("window_s", "start_s", *(f"phi{j + 1}_rms_deg" for j in range(links))))]
     for window, rows in result.rows.items():
         lines += [",".join((window, *(f"{v:.6f}" for v in row))) for row in rows]
-    (args.output / "windows.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    write_text(args.output / "windows.csv", "\n".join(lines) + "\n")
     from pydpend.plots.damping import windows_columns, windows_figure
     from pydpend.plots.style import save
 

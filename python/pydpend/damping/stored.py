@@ -20,6 +20,7 @@ from pydpend.errors import FIT, FitError, ModelError, Setting, fault
 from pydpend.kinds import expect
 from pydpend.model import Model
 from pydpend.model.file import MOST
+from pydpend.output import AnyPath, path_of, whole, write_text
 
 Floats = NDArray[np.float64]
 
@@ -89,10 +90,10 @@ class StoredFit:
         return initial_state(track, self.parameters, start_s, length_s)
 
 
-def load_fit(path: str | Path) -> StoredFit:
+def load_fit(path: AnyPath) -> StoredFit:
     """Reads ``fit.json`` from a folder of ``pydpend fit`` (or the file itself). Raises FitError when it is
     none."""
-    path = Path(path)
+    path = path_of(path)
     expect(path, ("fit",), FitError)
     if path.is_dir():
         path = path / "fit.json"
@@ -117,9 +118,7 @@ def load_fit(path: str | Path) -> StoredFit:
 
 def write_json(path: Path, content: dict[str, object]) -> None:
     """One JSON file, whole or not at all."""
-    temporary = path.with_name(f".{path.name}.part")
-    temporary.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-    temporary.replace(path)
+    write_text(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
 
 
 def write_fit(fit: DampingFit, folder: Path) -> None:
@@ -128,7 +127,7 @@ def write_fit(fit: DampingFit, folder: Path) -> None:
     rows = ["name,value,sigma,unit"]
     for name, e in (*fit.coefficients.items(), *((f"{k}/psi", e) for k, e in fit.ratios.items())):
         rows.append(f"{name},{e.value!r},{e.sigma!r},{e.unit}")
-    (folder / "coefficients.csv").write_text("\n".join(rows) + "\n", encoding="utf-8")
+    write_text(folder / "coefficients.csv", "\n".join(rows) + "\n")
     for k, curve in enumerate(fit.energy):
         head = ["time_s", "energy_j", "model_j", *(f"{n}_j" for n in fit.coefficients)]
         table = [curve.t_s, curve.energy_j, curve.model_j, *curve.works_j.T]
@@ -144,7 +143,8 @@ def write_fit(fit: DampingFit, folder: Path) -> None:
 def _write_table(path: Path, head: Sequence[str], columns: Sequence[Floats]) -> None:
     """A CSV table; nan where there is no number."""
     rows = np.column_stack(list(columns))
-    np.savetxt(path, rows, fmt="%.9g", delimiter=",", header=",".join(head), comments="")
+    with whole(path) as new:
+        np.savetxt(new, rows, fmt="%.9g", delimiter=",", header=",".join(head), comments="")
 
 
 def recording_suffix(fit: DampingFit, recording: int) -> str:

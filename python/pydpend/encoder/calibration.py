@@ -11,7 +11,6 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,6 +21,7 @@ from pydpend.documents import read_json
 from pydpend.encoder.holds import Hold
 from pydpend.errors import CALIBRATE, EncoderError, fault
 from pydpend.kinds import expect
+from pydpend.output import AnyPath, path_of, write_text
 
 Floats = NDArray[np.float64]
 
@@ -122,23 +122,23 @@ class Calibration:
         }
         return json.dumps(value, indent=2) + "\n"
 
-    def write(self, path: str | Path) -> None:
+    def write(self, path: AnyPath) -> None:
         """Writes the JSON. Raises :class:`EncoderError` if the file cannot be written."""
         try:
-            Path(path).write_text(self.to_json(), encoding="utf-8")
+            write_text(path, self.to_json())
         except OSError as problem:
             raise EncoderError(
                 fault(str(path), f"the file cannot be written ({problem.strerror})", "Check the folder")
             ) from problem
 
 
-def read_calibration(path: str | Path) -> Calibration:
+def read_calibration(path: AnyPath) -> Calibration:
     """Reads what :meth:`Calibration.write` wrote.
 
     Raises :class:`EncoderError` naming the file, and the key that is missing or not what it must be.
     """
-    expect(path, ("calibration",), EncoderError)
-    value = read_json(Path(path), EncoderError, "Make one with " + CALIBRATE)
+    expect(path_of(path), ("calibration",), EncoderError)
+    value = read_json(path_of(path), EncoderError, "Make one with " + CALIBRATE)
     holds = value.tables("holds")
     low, high = value.array("range_v", 2)
     covariance = value.array("covariance", 2, 2)

@@ -15,6 +15,7 @@ from pydpend.documents import unreadable
 from pydpend.errors import EncoderError, Setting, fault
 from pydpend.instants import seconds_of_numpy
 from pydpend.kinds import expect
+from pydpend.output import AnyPath, path_of
 
 Floats = NDArray[np.float64]
 Unit = Literal["v", "rad", "deg"]
@@ -63,7 +64,7 @@ class EncoderSignal:
 
 
 def read_encoder(
-    path: str | Path,
+    path: AnyPath,
     *,
     column: str | None = None,
     time_column: str | None = None,
@@ -83,7 +84,7 @@ def read_encoder(
     :class:`~pydpend.errors.EncoderError` naming file, line and column for text that is no number, times that
     are missing, repeated or falling, and columns that are not there.
     """
-    path = Path(path)
+    path = path_of(path)
     expect(path, ("encoder", "angles"), EncoderError)
     if rate_hz is not None and time_column is not None:
         raise EncoderError(

@@ -15,6 +15,7 @@ from pydpend.errors import ModelError, fault
 from pydpend.kinds import expect
 from pydpend.model.pendulum import CONSTANTS, Model, uniform_bar
 from pydpend.model.reduce import constants_of, from_parts
+from pydpend.output import AnyPath, path_of
 
 # Every number may be plain or [value, standard uncertainty]; its key ends in its unit.
 _UNITS = {
@@ -50,9 +51,9 @@ _KIND = {
 }
 
 
-def read_model(path: str | Path) -> Model:
+def read_model(path: AnyPath) -> Model:
     """The model of a TOML file. Raises ModelError naming the file and the key or part."""
-    path = Path(path)
+    path = path_of(path)
     expect(path, ("model",), ModelError)
     data = read_toml(path, ModelError, "docs/model.md has examples")
     if ("constants" in data) == ("part" in data):

@@ -15,6 +15,7 @@ from matplotlib.backend_bases import RendererBase
 from numpy.typing import NDArray
 
 from pydpend.model import Model
+from pydpend.output import AnyPath, path_of
 from pydpend.plots.moving import DPI, check_film, pictures_of, write_film
 from pydpend.plots.physics import Motion
 from pydpend.plots.style import COLORS, new_figure, style
@@ -41,7 +42,7 @@ def opened(film: Pictures, size_px: tuple[int, int]) -> Iterator[Iterator[NDArra
         "-v",
         "error",
         "-i",
-        str(film.path),
+        f"file:{film.path}",
         "-vf",
         f"scale={width}:{height}:flags=area",
     ]
@@ -102,7 +103,7 @@ def beside(
     film: Motion,
     run: Motion,
     model: Model,
-    path: str | Path,
+    path: AnyPath,
     *,
     pictures: Pictures | None = None,
     fps: float = 25.0,
@@ -114,7 +115,7 @@ def beside(
     ``speed`` is film time over real time: 0.2 is five times slowed. Returns the number of pictures. Raises
     SimulationError for another ending, rates that are not positive, or without the program ffmpeg where it is needed.
     """
-    path = Path(path)
+    path = path_of(path)
     check_film(path, fps, speed)
     times = np.arange(run.t_s[0], run.t_s[-1], speed / fps)
     seen = [np.interp(times, film.t_s, film.phi_rad[:, k]) for k in range(2)]

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from pydpend.errors import Setting, SimulationError, fault
+from pydpend.output import whole
 
 ENDINGS = (".gif", ".mp4")
 """What `write_film` writes."""
@@ -60,17 +61,14 @@ def write_film(path: Path, fps: float, pictures: Iterator[NDArray[np.uint8]]) ->
 
     Raises SimulationError if it cannot be written.
     """
-    whole = path.with_name(f"{path.stem}.new{path.suffix}")
     try:
-        if path.suffix.lower() == ".gif":
-            _write_gif(whole, fps, pictures)
-        else:
-            _write_mp4(whole, fps, pictures)
-        whole.replace(path)
+        with whole(path) as new:
+            if path.suffix.lower() == ".gif":
+                _write_gif(new, fps, pictures)
+            else:
+                _write_mp4(path, new, fps, pictures)
     except OSError as error:
         raise SimulationError(fault(str(path), f"cannot be written ({error.strerror})")) from None
-    finally:
-        whole.unlink(missing_ok=True)
 
 
 def _write_gif(path: Path, fps: float, pictures: Iterator[NDArray[np.uint8]]) -> None:
@@ -78,13 +76,15 @@ def _write_gif(path: Path, fps: float, pictures: Iterator[NDArray[np.uint8]]) ->
     next(frames).save(path, save_all=True, append_images=frames, duration=1000 / fps, loop=0)
 
 
-def _write_mp4(path: Path, fps: float, pictures: Iterator[NDArray[np.uint8]]) -> None:
+def _write_mp4(path: Path, new: Path, fps: float, pictures: Iterator[NDArray[np.uint8]]) -> None:
     first = next(pictures)
     height, width = first.shape[:2]
     words = [
         *("ffmpeg", "-v", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgba"),
         *("-s", f"{width}x{height}", "-framerate", f"{fps}", "-i", "-"),
-        *("-c:v", "libx264", "-pix_fmt", "yuv420p", "-movflags", "+faststart", str(path)),
+        *("-c:v", "libx264", "-pix_fmt", "yuv420p", "-movflags", "+faststart"),
+        # With its protocol a name is taken for nothing else.
+        f"file:{new}",
     ]
     try:
         process = subprocess.Popen(words, stdin=subprocess.PIPE, stderr=subprocess.PIPE)

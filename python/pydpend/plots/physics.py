@@ -3,7 +3,6 @@ except `animate`, which writes a film."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Protocol
 
 import numpy as np
@@ -12,6 +11,7 @@ from matplotlib.figure import Figure
 
 from pydpend.linear import Section
 from pydpend.model import Model
+from pydpend.output import AnyPath, path_of
 from pydpend.plots.moving import check_film, pictures_of, write_film
 from pydpend.plots.style import COLORS, new_figure, style
 from pydpend.simulate import LAWS, Simulation
@@ -113,13 +113,13 @@ def comparison(film: Motion, run: Motion) -> Figure:
     return figure
 
 
-def animate(motion: Motion, model: Model, path: str | Path, *, fps: float = 25.0, speed: float = 1.0) -> None:
+def animate(motion: Motion, model: Model, path: AnyPath, *, fps: float = 25.0, speed: float = 1.0) -> None:
     """Writes the pendulum's motion as a film, GIF or MP4 by the ending (MP4 needs the program ffmpeg).
 
     ``speed`` is film time over real time: 0.1 is ten times slowed. Raises SimulationError for another ending or a
     rate that is not positive.
     """
-    path = Path(path)
+    path = path_of(path)
     check_film(path, fps, speed)
     times = np.arange(motion.t_s[0], motion.t_s[-1], speed / fps)
     phi = np.stack([np.interp(times, motion.t_s, motion.phi_rad[:, k]) for k in range(2)], axis=1)

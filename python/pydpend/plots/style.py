@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any
 
 import matplotlib
@@ -14,6 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from pydpend.errors import PydpendError, fault
+from pydpend.output import AnyPath, path_of, whole
 
 COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#b8860b", "#56b4e9")
 """Okabe and Ito's colours (yellow darkened for paper): link or joint 1, link or joint 2, then others."""
@@ -58,17 +58,17 @@ def plain(text: str) -> str:
     return text.replace("$", r"\$")
 
 
-def save(figure: Figure, path: str | Path) -> None:
+def save(figure: Figure, path: AnyPath) -> None:
     """Writes PNG, SVG or PDF by the ending. The same figure gives the same bytes."""
-    path = Path(path)
+    path = path_of(path)
     kind = path.suffix.lower().lstrip(".")
     if kind not in FORMATS:
         raise PydpendError(
             fault(str(path), f"{kind or 'no ending'} is not a figure format", "Use .png, .svg or .pdf")
         )
     metadata = {"png": {"Software": None}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}[kind]
-    with matplotlib.rc_context(_SETTINGS):
-        figure.savefig(path, format=kind, metadata=metadata)
+    with matplotlib.rc_context(_SETTINGS), whole(path) as new:
+        figure.savefig(new, format=kind, metadata=metadata)
 
 
 def inline_svg(figure: Figure) -> str:

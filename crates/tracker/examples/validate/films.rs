@@ -11,6 +11,7 @@ use tracker::observation::Status;
 use tracker::rig::Rig;
 use tracker::score::{LIMIT_PX, Score, Tracked, score};
 use tracker::source::synthetic::SyntheticSource;
+use tracker::stop::Stop;
 use tracker::store::{DetectionStore, FrameStamp};
 use tracker::track::track_recording;
 
@@ -45,11 +46,11 @@ impl Filmed {
 
     /// What the tracker makes of it without a rig.
     pub fn follow(&self) -> Result<Followed> {
-        let rig = discover(&self.store, self.film.scene().image_px)?.rig;
+        let rig = discover(&self.store, self.film.scene().image_px, &Stop::default())?.rig;
         let mut tracked =
             Tracked { nodes: rig.nodes.iter().map(|n| n.name.clone()).collect(), ..Tracked::default() };
         let mut status = Vec::new();
-        track_recording(&self.store, &rig, &mut |stamp, row| {
+        track_recording(&self.store, &rig, &Stop::default(), &mut |stamp, row| {
             tracked.frames.push(stamp.index);
             for o in row {
                 tracked.xy_px.push([o.x_px, o.y_px]);

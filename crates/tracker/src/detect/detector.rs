@@ -100,6 +100,8 @@ impl Detector {
         if let Some(lens) = &mut self.lens {
             lens.apply(out)?;
         }
+        // A lens that is undone far outside its image may send a centre anywhere.
+        out.retain(is_sound);
         out.sort_unstable_by(|a, b| a.y_px.total_cmp(&b.y_px).then(a.x_px.total_cmp(&b.x_px)));
         Ok(())
     }
@@ -246,6 +248,15 @@ impl Detector {
         }
         Ok(())
     }
+}
+
+/// Whether its numbers are what every reader of them may rely on: a place, and an uncertainty above 0.
+fn is_sound(d: &Detection) -> bool {
+    d.x_px.is_finite()
+        && d.y_px.is_finite()
+        && d.sigma_px.is_finite()
+        && d.sigma_px > 0.0
+        && d.area_px.is_finite()
 }
 
 fn disc_fit<'a>(table: &'a EdgeTable, levels: &Levels) -> DiscFit<'a> {

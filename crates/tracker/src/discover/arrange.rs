@@ -5,11 +5,13 @@
 use nalgebra::{Isometry2, Vector2};
 
 use super::circle::Circle;
+use crate::error::Result;
 use crate::rig::{Body, Joint, Node, RIG_SCHEMA, Rig};
 use crate::rigid::body::Link;
 use crate::rigid::forecast::hung_at;
 use crate::rigid::joint::{Shared, Turning};
 use crate::rigid::pose::{place, pose_at};
+use crate::stop::Stop;
 
 /// A body and its pose in each frame of the sample.
 #[derive(Debug, Clone)]
@@ -109,7 +111,16 @@ fn joint(a: &Found, b: Option<&Found>) -> Option<Turning> {
 
 /// The rig of the bodies: joints found, bodies ordered and named, nodes ordered along them, placed as in frame
 /// `reference` of the sample.
-pub fn arrange(found: &[Found], reference: usize, reference_frame: Option<u64>, image_px: [u32; 2]) -> Rig {
+///
+/// # Errors
+/// [`crate::error::Error::Interrupted`] once `stop` was asked for.
+pub fn arrange(
+    found: &[Found],
+    reference: usize,
+    reference_frame: Option<u64>,
+    image_px: [u32; 2],
+    stop: &Stop,
+) -> Result<Rig> {
     let n = found.len();
     let mut found = found.to_vec();
     // What each body hangs on: the ground first, then bodies already hung.
@@ -131,6 +142,7 @@ pub fn arrange(found: &[Found], reference: usize, reference_frame: Option<u64>, 
     loop {
         let mut best: Option<(f64, usize, usize, Turning)> = None;
         for b in (0..n).filter(|b| !order.contains(b)) {
+            stop.heed()?;
             for &o in order.iter().filter(|&&o| held[o].is_some() || !found[o].is_lone()) {
                 if let Some(t) = joint(&found[b], Some(&found[o]))
                     && best.as_ref().is_none_or(|x| t.rms_px < x.0)
@@ -230,7 +242,7 @@ pub fn arrange(found: &[Found], reference: usize, reference_frame: Option<u64>, 
         };
         rig.joints.push(Joint { name, bodies, x_px: p.x, y_px: p.y });
     }
-    rig
+    Ok(rig)
 }
 
 fn longest(link: &Link) -> Vector2<f64> {

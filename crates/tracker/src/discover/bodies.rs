@@ -12,10 +12,12 @@ use rayon::prelude::*;
 use super::median::middle;
 use super::sample::Sample;
 use crate::detect::{Detection, Flags};
+use crate::error::Result;
 use crate::rigid::body::Link;
 use crate::rigid::index::Sky;
 use crate::rigid::pose::place;
 use crate::rigid::search::{Search, Sighting};
+use crate::stop::Stop;
 
 /// Frames from which bodies are sought.
 const BASES: usize = 16;
@@ -89,28 +91,33 @@ pub fn poses(links: &[Link], frame: &[Detection]) -> Vec<Option<Sighting>> {
 }
 
 /// Two bodies of which one has all markers of the other at the same distances.
-pub fn alike(links: &[Link]) -> Option<(usize, usize)> {
+///
+/// # Errors
+/// [`crate::error::Error::Interrupted`] once `stop` was asked for.
+pub fn alike(links: &[Link], stop: &Stop) -> Result<Option<(usize, usize)>> {
     for a in 0..links.len() {
         for b in (0..links.len()).filter(|&b| b != a && links[b].nodes.len() >= links[a].nodes.len()) {
+            stop.heed()?;
             let point = |p: &Vector2<f64>| Detection { x_px: p.x, y_px: p.y, ..Default::default() };
             let points: Vec<Detection> = links[b].template.iter().map(point).collect();
             let found = sightings(&links[a], &Sky::new(&points), &vec![true; points.len()], PAIRS);
             if found.first().is_some_and(|s| s.support == links[a].nodes.len()) {
-                return Some((a, b));
+                return Ok(Some((a, b)));
             }
         }
     }
-    None
+    Ok(None)
 }
 
 /// Groups of points of one frame that keep their distances: for each body its points, px.
-fn groups(base: &[Detection], others: &[&[Detection]]) -> Vec<Vec<Vector2<f64>>> {
+fn groups(base: &[Detection], others: &[&[Detection]], stop: &Stop) -> Result<Vec<Vec<Vector2<f64>>>> {
     let n = base.len();
     let link = link_of(base.iter().map(at).collect(), FLOOR_PX);
     let mut together = vec![0_u32; n * n];
     let mut both = vec![0_u32; n * n];
     let mut seen = vec![0_u32; n];
     for other in others {
+        stop.heed()?;
         let sky = Sky::new(other);
         let mut used_b = vec![false; other.len()];
         let mut motion: Vec<Option<usize>> = vec![None; n];
@@ -161,16 +168,19 @@ fn groups(base: &[Detection], others: &[&[Detection]]) -> Vec<Vec<Vector2<f64>>>
             out.push(members.iter().map(|&j| at(&base[j])).collect());
         }
     }
-    out
+    Ok(out)
 }
 
 /// The bodies of three or more nodes, each in its own coordinates.
-pub fn find_bodies(sample: &Sample) -> Vec<Link> {
+///
+/// # Errors
+/// [`crate::error::Error::Interrupted`] once `stop` was asked for.
+pub fn find_bodies(sample: &Sample, stop: &Stop) -> Result<Vec<Link>> {
     let m = sample.frames.len();
     // Bases: the frames with most detections that are not a crowd of glints, spread over the recording.
     let mut counts: Vec<usize> = sample.moving.iter().map(Vec::len).collect();
     counts.sort_unstable();
-    let Some(&usual) = counts.get(m / 2) else { return Vec::new() };
+    let Some(&usual) = counts.get(m / 2) else { return Ok(Vec::new()) };
     let mut bases: Vec<usize> = (0..m)
         .filter(|&f| sample.moving[f].len() >= usual.max(3) && sample.moving[f].len() <= CROWD)
         .collect();
@@ -182,7 +192,8 @@ pub fn find_bodies(sample: &Sample) -> Vec<Link> {
         .filter(|d| d.len() >= 3)
         .collect();
     let mut best: Vec<Vec<Vector2<f64>>> = Vec::new();
-    let all: Vec<_> = bases.par_iter().map(|&f| groups(&sample.moving[f], &compared)).collect();
+    let all: Vec<_> =
+        bases.par_iter().map(|&f| groups(&sample.moving[f], &compared, stop)).collect::<Result<_>>()?;
     for found in all {
         let size = |g: &[Vec<Vector2<f64>>]| g.iter().map(Vec::len).sum::<usize>();
         // More nodes; for as many the more bodies: two that stood alike are not one.
@@ -192,10 +203,10 @@ pub fn find_bodies(sample: &Sample) -> Vec<Link> {
     }
     let mut links: Vec<Link> = best.into_iter().map(|p| link_of(p, FLOOR_PX)).collect();
     // Two equal bodies are never told apart, so nothing can be added to them.
-    if alike(&links).is_none_or(|(a, b)| links[a].nodes.len() != links[b].nodes.len()) {
-        complete(&mut links, sample);
+    if alike(&links, stop)?.is_none_or(|(a, b)| links[a].nodes.len() != links[b].nodes.len()) {
+        complete(&mut links, sample, stop)?;
     }
-    links
+    Ok(links)
 }
 
 /// Whether a detection is the whole of one marker, as far as its picture tells.
@@ -204,7 +215,7 @@ pub fn looks_whole(d: &Detection) -> bool {
 }
 
 /// Adds to each body the points that stay with it in several frames, and drops nodes that are never seen.
-fn complete(links: &mut Vec<Link>, sample: &Sample) {
+fn complete(links: &mut Vec<Link>, sample: &Sample, stop: &Stop) -> Result<()> {
     let mut areas: Vec<f32> = sample.moving.iter().flatten().map(|d| d.area_px).collect();
     areas.sort_by(f32::total_cmp);
     let usual = areas.get(areas.len() / 2).copied().unwrap_or(0.0);
@@ -214,7 +225,11 @@ fn complete(links: &mut Vec<Link>, sample: &Sample) {
             links.iter().map(|l| vec![Vec::new(); l.nodes.len()]).collect();
         let mut spare: Vec<Vec<(usize, Vector2<f64>)>> = vec![Vec::new(); links.len()];
         let mut known = vec![0_usize; links.len()];
-        let posed: Vec<_> = sample.moving.par_iter().map(|frame| poses(links, frame)).collect();
+        let posed: Vec<_> = sample
+            .moving
+            .par_iter()
+            .map(|frame| stop.heed().map(|()| poses(links, frame)))
+            .collect::<Result<_>>()?;
         for (f, (frame, found)) in sample.moving.iter().zip(posed).enumerate() {
             let mut used = vec![false; frame.len()];
             for s in found.iter().flatten() {
@@ -240,6 +255,7 @@ fn complete(links: &mut Vec<Link>, sample: &Sample) {
         }
         let mut changed = false;
         for (b, link) in links.iter_mut().enumerate() {
+            stop.heed()?;
             let mut points: Vec<Vector2<f64>> = Vec::new();
             for seen in &local[b] {
                 if seen.len() * 50 >= known[b] && seen.len() >= 3 {
@@ -262,9 +278,10 @@ fn complete(links: &mut Vec<Link>, sample: &Sample) {
         }
         links.retain(|l| l.nodes.len() >= 3);
         if !changed {
-            return;
+            break;
         }
     }
+    Ok(())
 }
 
 /// Places to which points of at least `least` frames come.

@@ -9,8 +9,10 @@ use super::arrange::Found;
 use super::bodies::{self, FLOOR_PX, link_of, looks_whole};
 use super::sample::Sample;
 use crate::detect::Detection;
+use crate::error::Result;
 use crate::rigid::body::Link;
 use crate::rigid::pose::{Pair, fit_pose, place};
+use crate::stop::Stop;
 use crate::store::DetectionStore;
 
 /// Frames linked at most.
@@ -81,24 +83,36 @@ fn left_over(links: &[Link], frame: &[Detection]) -> Option<Vec<Detection>> {
 }
 
 /// Whether something moves that is no node of the bodies, in most of the sample's frames that show them all.
-pub fn others_move(sample: &Sample, links: &[Link]) -> bool {
-    let rest: Vec<usize> =
-        sample.moving.par_iter().filter_map(|f| left_over(links, f)).map(|rest| rest.len()).collect();
-    2 * rest.iter().filter(|&&n| n > 0).count() > rest.len()
+///
+/// # Errors
+/// [`crate::error::Error::Interrupted`] once `stop` was asked for.
+pub fn others_move(sample: &Sample, links: &[Link], stop: &Stop) -> Result<bool> {
+    let rest: Vec<usize> = sample
+        .moving
+        .par_iter()
+        .filter_map(|f| stop.heed().map(|()| left_over(links, f)).transpose())
+        .map(|rest| rest.map(|rest| rest.len()))
+        .collect::<Result<_>>()?;
+    Ok(2 * rest.iter().filter(|&&n| n > 0).count() > rest.len())
 }
 
 /// Markers that are on no body of three, with their places in the sample's frames.
+///
+/// # Errors
+/// [`crate::error::Error::Interrupted`] once `stop` was asked for.
 pub fn find_lone(
     store: &DetectionStore,
     sample: &Sample,
     standing: &[Vector2<f64>],
     links: &[Link],
-) -> Vec<Found> {
+    stop: &Stop,
+) -> Result<Vec<Found>> {
     let mut linked = 0;
     let mut open: Vec<Path> = Vec::new();
     let mut done: Vec<Path> = Vec::new();
     let mut scratch = Vec::new();
     for i in 0..store.len().min(FRAMES) {
+        stop.heed()?;
         store.read(i, &mut scratch);
         let Some(rest) = left_over(links, &scratch) else { continue };
         linked += 1;
@@ -153,6 +167,7 @@ pub fn find_lone(
     // Paths that overlap in time are different markers; one that fits none beside it may be any of them.
     let mut kept: Vec<Path> = Vec::new();
     for path in done {
+        stop.heed()?;
         let span = |p: &Path| (p.at[0].0, p.at[p.at.len() - 1].0);
         let (a, b) = span(&path);
         let overlaps = |q: &Path| {
@@ -163,7 +178,8 @@ pub fn find_lone(
             kept.push(path);
         }
     }
-    kept.iter()
+    Ok(kept
+        .iter()
         .map(|path| {
             let mut poses = vec![None; sample.frames.len()];
             for (&(f, p), _) in path.at.iter().zip(&path.whole).filter(|(_, whole)| **whole) {
@@ -173,19 +189,23 @@ pub fn find_lone(
             }
             Found { link: link_of(vec![path.at[0].1], FLOOR_PX), poses }
         })
-        .collect()
+        .collect())
 }
 
 /// Makes one body of every two lone markers that keep their distance, unless one hangs on the other: then one of them
 /// goes about a point of the ground or of a body, and the other does not.
-pub fn pair_up(found: &mut Vec<Found>) {
-    while let Some((i, j, body)) = next_pair(found) {
+///
+/// # Errors
+/// [`crate::error::Error::Interrupted`] once `stop` was asked for.
+pub fn pair_up(found: &mut Vec<Found>, stop: &Stop) -> Result<()> {
+    while let Some((i, j, body)) = next_pair(found, stop)? {
         found[i] = body;
         found.remove(j);
     }
+    Ok(())
 }
 
-fn next_pair(found: &[Found]) -> Option<(usize, usize, Found)> {
+fn next_pair(found: &[Found], stop: &Stop) -> Result<Option<(usize, usize, Found)>> {
     let lone: Vec<usize> = (0..found.len()).filter(|&k| found[k].link.nodes.len() == 1).collect();
     // What a marker goes about: the first of the ground and the bodies that it circles, and where.
     let about = |k: usize| {
@@ -195,23 +215,25 @@ fn next_pair(found: &[Found]) -> Option<(usize, usize, Found)> {
             .filter(|(_, b)| b.is_none_or(|b| b.link.nodes.len() > 1))
             .find_map(|(h, b)| found[k].circle(b).map(|c| (h, c.middle)))
     };
-    let joints: Vec<Option<(usize, Vector2<f64>)>> = lone.iter().map(|&k| about(k)).collect();
+    let joints: Vec<Option<(usize, Vector2<f64>)>> =
+        lone.iter().map(|&k| stop.heed().map(|()| about(k))).collect::<Result<_>>()?;
     // Those about one point first: a body found may be what the next hang on.
     for together in [true, false] {
         for (a, &i) in lone.iter().enumerate() {
             for (b, &j) in lone.iter().enumerate().skip(a + 1) {
+                stop.heed()?;
                 let one = match (&joints[a], &joints[b]) {
                     (Some(p), Some(q)) => together && p.0 == q.0 && (p.1 - q.1).norm() < SAME_JOINT_PX,
                     (None, None) => !together,
                     _ => false,
                 };
                 if one && let Some(body) = rigid_pair(&found[i], &found[j]) {
-                    return Some((i, j, body));
+                    return Ok(Some((i, j, body)));
                 }
             }
         }
     }
-    None
+    Ok(None)
 }
 
 /// Two lone markers as one body, if they keep their distance while they turn.

@@ -19,6 +19,7 @@ use crate::message::{Message, SETUP, Setting};
 use crate::rig::Rig;
 use crate::rigid::body::Link;
 use crate::rigid::pose::place;
+use crate::stop::Stop;
 use crate::store::DetectionStore;
 use arrange::Found;
 use sample::Sample;
@@ -37,9 +38,9 @@ pub struct Discovery {
 /// Finds the rig of a recording of `image_px` (width, height) pixels.
 ///
 /// # Errors
-/// [`Error::Rig`] if there are no markers or none moves.
-pub fn discover(store: &DetectionStore, image_px: [u32; 2]) -> Result<Discovery> {
-    let sample = Sample::take(store);
+/// [`Error::Rig`] if there are no markers or none moves; [`Error::Interrupted`] once `stop` was asked for.
+pub fn discover(store: &DetectionStore, image_px: [u32; 2], stop: &Stop) -> Result<Discovery> {
+    let sample = Sample::take(store, stop)?;
     if sample.frames.is_empty() {
         return Err(Error::Rig(
             Fault::new("recording", "no markers are seen in any frame")
@@ -54,12 +55,12 @@ pub fn discover(store: &DetectionStore, image_px: [u32; 2]) -> Result<Discovery>
         ));
     }
     let mut sample = sample;
-    let mut found = moving_bodies(&mut sample);
+    let mut found = moving_bodies(&mut sample, stop)?;
     let standing = sample.standing.clone();
     let links: Vec<Link> = found.iter().map(|f| f.link.clone()).collect();
-    if links.is_empty() || lone::others_move(&sample, &links) {
-        found.extend(lone::find_lone(store, &sample, &standing, &links));
-        lone::pair_up(&mut found);
+    if links.is_empty() || lone::others_move(&sample, &links, stop)? {
+        found.extend(lone::find_lone(store, &sample, &standing, &links, stop)?);
+        lone::pair_up(&mut found, stop)?;
     }
     if found.is_empty() {
         return Err(Error::Rig(
@@ -67,7 +68,7 @@ pub fn discover(store: &DetectionStore, image_px: [u32; 2]) -> Result<Discovery>
                 .advice("Look at the picture of " + SETUP + ", or give a rig with " + Setting::Rig),
         ));
     }
-    if let Some((a, b)) = bodies::alike(&links) {
+    if let Some((a, b)) = bodies::alike(&links, stop)? {
         let (a, b) = (place_words(&found[a]), place_words(&found[b]));
         return Err(Error::Rig(
             Fault::new(
@@ -79,13 +80,27 @@ pub fn discover(store: &DetectionStore, image_px: [u32; 2]) -> Result<Discovery>
             ),
         ));
     }
-    let (reference, whole) = reference(&sample, &found, image_px);
+    let (reference, whole) = reference(&sample, &found, image_px, stop)?;
     if !whole {
         warnings
             .push("no frame shows every marker: their places are put together from several frames".into());
     }
     let index = store.stamp(sample.frames[reference]).index;
-    let rig = arrange::arrange(&found, reference, Some(index), image_px);
+    let mut rig = arrange::arrange(&found, reference, Some(index), image_px, stop)?;
+    let lost = rig.leave_out_unreachable();
+    if !lost.is_empty() {
+        warnings.push(
+            format!("left out, because they would be far outside the image: {}", lost.join(", ")).into(),
+        );
+    }
+    let beyond: Vec<&str> =
+        rig.nodes.iter().filter(|n| !rig.in_image([n.x_px, n.y_px])).map(|n| n.name.as_str()).collect();
+    if !beyond.is_empty() {
+        let beyond = beyond.join(", ");
+        warnings.push(
+            format!("outside the image in the reference frame, where their links put them: {beyond}").into(),
+        );
+    }
     rig.check("discovered rig")?;
     if !standing.is_empty() {
         let n = standing.len();
@@ -103,14 +118,18 @@ pub fn discover(store: &DetectionStore, image_px: [u32; 2]) -> Result<Discovery>
 }
 
 /// Bodies with their poses. Those that do not move are no bodies: their points are counted among the standing.
-fn moving_bodies(sample: &mut Sample) -> Vec<Found> {
+fn moving_bodies(sample: &mut Sample, stop: &Stop) -> Result<Vec<Found>> {
     loop {
-        let links = bodies::find_bodies(sample);
+        let links = bodies::find_bodies(sample, stop)?;
         let mut found: Vec<Found> = links
             .iter()
             .map(|link| Found { link: link.clone(), poses: Vec::with_capacity(sample.frames.len()) })
             .collect();
-        let posed: Vec<_> = sample.moving.par_iter().map(|frame| bodies::poses(&links, frame)).collect();
+        let posed: Vec<_> = sample
+            .moving
+            .par_iter()
+            .map(|frame| stop.heed().map(|()| bodies::poses(&links, frame)))
+            .collect::<Result<_>>()?;
         for frame in posed {
             for (f, s) in found.iter_mut().zip(frame) {
                 f.poses.push(s.map(|s| s.fit.pose));
@@ -133,40 +152,39 @@ fn moving_bodies(sample: &mut Sample) -> Vec<Found> {
             }
         }
         if !changed {
-            return found;
+            return Ok(found);
         }
     }
 }
 
 /// The frame of the sample in which most nodes are seen, the first of those, and whether it shows all.
-fn reference(sample: &Sample, found: &[Found], image_px: [u32; 2]) -> (usize, bool) {
+fn reference(sample: &Sample, found: &[Found], image_px: [u32; 2], stop: &Stop) -> Result<(usize, bool)> {
     let [w, h] = image_px.map(f64::from);
     let inside = |p: Vector2<f64>| p.x > 0.0 && p.y > 0.0 && p.x < w - 1.0 && p.y < h - 1.0;
     let all: usize = found.iter().map(|f| f.link.nodes.len()).sum();
-    let mut best = (0, 0);
+    let (mut best, mut index) = ((false, 0), 0);
     for (k, frame) in sample.moving.iter().enumerate() {
+        stop.heed()?;
         let sky = crate::rigid::index::Sky::new(frame);
-        let mut seen = 0;
+        // A frame is better in which no node is outside the image, and then one in which more are seen.
+        let mut rank = (true, 0);
         for f in found {
             let Some(pose) = &f.poses[k] else { continue };
             for &t in &f.link.template {
                 let p = place(pose, t);
-                if !inside(p) {
-                    // A node outside the image cannot be written into a rig.
-                    seen = 0;
-                    break;
-                }
-                seen += usize::from(sky.nearest(p, 1.5).is_some_and(|(d, _)| sky.whole(d)));
+                rank.0 &= inside(p);
+                rank.1 += usize::from(sky.nearest(p, 1.5).is_some_and(|(d, _)| sky.whole(d)));
             }
         }
-        if seen > best.1 {
-            best = (k, seen);
+        // One that shows nothing is no reference for being inside.
+        if rank.1 > 0 && rank > best {
+            (best, index) = (rank, k);
         }
-        if best.1 == all {
+        if best == (true, all) {
             break;
         }
     }
-    (best.0, best.1 == all)
+    Ok((index, best.1 == all))
 }
 
 /// Where a body was found, for a message.

@@ -6,7 +6,9 @@ use nalgebra::Vector2;
 
 use super::median::middle;
 use crate::detect::Detection;
+use crate::error::Result;
 use crate::rigid::index::Sky;
+use crate::stop::Stop;
 use crate::store::DetectionStore;
 
 /// Frames looked at, at most.
@@ -40,11 +42,15 @@ fn at(d: &Detection) -> Vector2<f64> {
 
 impl Sample {
     /// Looks through a recording.
-    pub fn take(store: &DetectionStore) -> Self {
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Interrupted`] once `stop` was asked for.
+    pub fn take(store: &DetectionStore, stop: &Stop) -> Result<Self> {
         let n = store.len();
         let mut all: Vec<(usize, Vec<Detection>)> = Vec::new();
         let mut scratch = Vec::new();
         for k in 0..n.min(FRAMES) {
+            stop.heed()?;
             let i = if n <= FRAMES { k } else { (k as u128 * n as u128 / FRAMES as u128) as usize };
             store.read(i, &mut scratch);
             if scratch.is_empty() {
@@ -72,7 +78,7 @@ impl Sample {
         };
         let mut sample = Self { at_rest: kept.len() < 5, ..Self::default() };
         if !sample.at_rest {
-            sample.standing = standing(&kept);
+            sample.standing = standing(&kept, stop)?;
         }
         let still: Vec<Detection> = sample
             .standing
@@ -86,7 +92,7 @@ impl Sample {
                 detections.into_iter().filter(|d| sky.nearest(at(d), SAME_PLACE_PX).is_none()).collect(),
             );
         }
-        sample
+        Ok(sample)
     }
 }
 
@@ -118,12 +124,13 @@ pub fn still_place(places: &[Vector2<f64>]) -> Option<Vector2<f64>> {
 }
 
 /// Places at which something is seen in most of the frames.
-fn standing(kept: &[(usize, Vec<Detection>)]) -> Vec<Vector2<f64>> {
+fn standing(kept: &[(usize, Vec<Detection>)], stop: &Stop) -> Result<Vec<Vector2<f64>>> {
     let skies: Vec<Sky<'_>> = kept.iter().map(|(_, d)| Sky::new(d)).collect();
     let mut out: Vec<Vector2<f64>> = Vec::new();
     // A standing point is in most frames, so in one of a few.
     for seed in [0, kept.len() / 4, kept.len() / 2, 3 * kept.len() / 4, kept.len() - 1] {
         for d in &kept[seed].1 {
+            stop.heed()?;
             let place = at(d);
             if out.iter().any(|p| (p - place).norm() < SAME_PLACE_PX) {
                 continue;
@@ -138,5 +145,5 @@ fn standing(kept: &[(usize, Vec<Detection>)]) -> Vec<Vector2<f64>> {
         }
     }
     out.sort_by(|a, b| a.y.total_cmp(&b.y).then(a.x.total_cmp(&b.x)));
-    out
+    Ok(out)
 }

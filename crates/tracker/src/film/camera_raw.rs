@@ -5,12 +5,17 @@ use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use super::Film;
+use super::encode::cannot_write;
 use crate::error::{Error, Fault, Place, Result};
+use crate::name::text;
+use crate::output::NewFile;
 
 /// A pair of files being written.
 pub(crate) struct MrawWriter {
     name: String,
     pixels: BufWriter<File>,
+    /// The files of pixels and of facts, in the order in which they take their names.
+    new: [NewFile; 2],
     bits: u32,
     deep: bool,
     packed: Vec<u8>,
@@ -28,7 +33,7 @@ impl MrawWriter {
         let depth = scene.camera.depth_bits;
         let bits = bits.unwrap_or_else(|| [8, 10, 12, 16].into_iter().find(|&b| b >= depth).unwrap_or(16));
         let [pixels, header] = pair(path);
-        let name = pixels.display().to_string();
+        let name = text(&pixels);
         let refuse = |problem: String, advice: &str| {
             Err(Error::Film(Fault::new(&name, problem).at(Place::Key("bits".into())).advice(advice)))
         };
@@ -45,12 +50,13 @@ impl MrawWriter {
                 "Give a width that is a multiple of 4",
             );
         }
-        let made = |path: &Path, e: std::io::Error| {
-            Error::Film(Fault::new(path.display(), format!("it cannot be written ({e})")))
-        };
-        std::fs::write(&header, cih(film, bits)).map_err(|e| made(&header, e))?;
-        let pixels = BufWriter::with_capacity(1 << 20, File::create(&pixels).map_err(|e| made(&pixels, e))?);
-        Ok(Self { name, pixels, bits, deep: depth > 8, packed: Vec::new() })
+        let facts = NewFile::create(&header)
+            .and_then(|new| new.file().write_all(cih(film, bits).as_bytes()).map(|()| new))
+            .map_err(|e| cannot_write(&text(&header), &e))?;
+        let new = NewFile::create(&pixels).map_err(|e| cannot_write(&name, &e))?;
+        let file = new.file().try_clone().map_err(|e| cannot_write(&name, &e))?;
+        let pixels = BufWriter::with_capacity(1 << 20, file);
+        Ok(Self { name, pixels, new: [new, facts], bits, deep: depth > 8, packed: Vec::new() })
     }
 
     /// Adds a frame of recorded samples.
@@ -63,7 +69,12 @@ impl MrawWriter {
 
     /// Ends the pair.
     pub(crate) fn finish(mut self) -> Result<()> {
-        self.pixels.flush().map_err(|e| Error::Film(Fault::new(&self.name, format!("writing failed ({e})"))))
+        let [pixels, facts] = self.new;
+        self.pixels
+            .flush()
+            .and_then(|()| pixels.publish(true))
+            .and_then(|()| facts.publish(true))
+            .map_err(|e| cannot_write(&self.name, &e))
     }
 }
 

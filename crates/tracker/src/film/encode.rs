@@ -2,16 +2,20 @@
 //!
 //! Owns: [`Codec`], [`VideoWriter`], [`encode_image`]. Must not: know of scenes; whoever has gray frames may use it.
 
+use std::io::ErrorKind;
 use std::path::Path;
 
 use ffmpeg_next as ffmpeg;
 
 use ffmpeg::codec::{Context, Id, encoder};
 use ffmpeg::format::Pixel;
+use ffmpeg::format::context::StreamIo;
 use ffmpeg::{Dictionary, Packet, Rational, color, format, frame};
 
 use crate::error::{Error, Fault, Place, Result};
 use crate::frame::TimeBase;
+use crate::name::text;
+use crate::output::NewFile;
 
 /// How a video file holds its frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -52,6 +56,7 @@ pub struct VideoSettings {
 /// A video file being written.
 pub struct VideoWriter {
     name: String,
+    new: NewFile,
     output: format::context::Output,
     encoder: encoder::Video,
     time_base: Rational,
@@ -67,20 +72,31 @@ fn fault(name: &str, problem: String, advice: &str) -> Error {
     Error::Film(Fault::new(name, problem).advice(advice))
 }
 
+/// A file that cannot be written.
+pub(super) fn cannot_write(name: &str, e: &std::io::Error) -> Error {
+    let advice = match e.kind() {
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded => "Free some space",
+        ErrorKind::InvalidFilename => "Choose a shorter name",
+        _ => "Check that the folder exists and may be written to",
+    };
+    fault(name, format!("it cannot be written ({e})"), advice)
+}
+
 /// An error of FFmpeg's as ours.
 fn failed<'a>(name: &'a str, what: &'a str) -> impl Fn(ffmpeg::Error) -> Error + 'a {
     move |e| Error::Film(Fault::new(name, format!("{what} failed ({e})")))
 }
 
 impl VideoWriter {
-    /// Begins a file; its container is known by its ending.
+    /// Begins a file; its container is known by its ending. Whatever its name looks like, an address, a pattern or a
+    /// list, it is the name of one file.
     ///
     /// # Errors
     /// [`Error::Film`] if the codec cannot hold such frames or the file cannot be made.
     pub fn create(path: &Path, settings: &VideoSettings) -> Result<Self> {
         ffmpeg::init().map_err(failed("FFmpeg", "its start"))?;
         ffmpeg::log::set_level(ffmpeg::log::Level::Error);
-        let name = path.display().to_string();
+        let name = text(path);
         let (codec_name, pixel) = pixel_format(&name, settings)?;
         let TimeBase { numerator, denominator } = settings.time_base;
         let (Ok(numerator), Ok(denominator)) = (i32::try_from(numerator), i32::try_from(denominator)) else {
@@ -95,7 +111,8 @@ impl VideoWriter {
                 "Name it .mp4, .mov or .avi, which keep every rate",
             ));
         }
-        let mut output = format::output(path).map_err(failed(&name, "making the file"))?;
+        let new = NewFile::create(path).map_err(|e| cannot_write(&name, &e))?;
+        let mut output = muxer(&name, path, &new)?;
         let codec = encoder::find_by_name(codec_name).ok_or_else(|| {
             fault(&name, format!("this FFmpeg has no encoder {codec_name}"), "Install FFmpeg with it")
         })?;
@@ -145,6 +162,7 @@ impl VideoWriter {
         let stream_time_base = output.stream(0).map_or(time_base, |s| s.time_base());
         Ok(Self {
             name,
+            new,
             output,
             encoder: opened,
             time_base,
@@ -221,7 +239,10 @@ impl VideoWriter {
     pub fn finish(mut self) -> Result<()> {
         self.encoder.send_eof().map_err(failed(&self.name, "encoding"))?;
         self.drain()?;
-        self.output.write_trailer().map_err(failed(&self.name, "writing the end"))
+        self.output.write_trailer().map_err(failed(&self.name, "writing the end"))?;
+        // Closed first: what FFmpeg still holds goes into the file.
+        drop(self.output);
+        self.new.publish(true).map_err(|e| cannot_write(&self.name, &e))
     }
 }
 
@@ -230,6 +251,29 @@ impl VideoWriter {
 fn keeps_milliseconds(path: &Path) -> bool {
     let ending = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
     matches!(ending.as_deref(), Some("mkv" | "mk3d" | "webm"))
+}
+
+/// The container that the ending of `path` names, writing into `new` and nowhere else.
+fn muxer(name: &str, path: &Path, new: &NewFile) -> Result<format::context::Output> {
+    let ending = path.extension().map(text).unwrap_or_default();
+    let file = new.file().try_clone().map_err(|e| cannot_write(name, &e))?;
+    let stream = match new.is_stream() {
+        true => StreamIo::from_write(file),
+        false => StreamIo::from_write_seek(file),
+    };
+    // FFmpeg is told the ending and not the name, in which it would look for addresses and patterns. A container that
+    // opens files of its own, for pictures or for parts of a film, is refused by the call.
+    // It would print what is said below.
+    ffmpeg::log::set_level(ffmpeg::log::Level::Quiet);
+    let made = stream.and_then(|s| format::output_to_stream(s, Some(&format!("film.{ending}")), None));
+    ffmpeg::log::set_level(ffmpeg::log::Level::Error);
+    made.map_err(|_| {
+        fault(
+            name,
+            format!("no film is written to a file that ends in {ending:?}"),
+            "Choose .mp4, .mov, .mkv or .avi",
+        )
+    })
 }
 
 /// The encoder's name and what it takes.

@@ -27,9 +27,12 @@ use parquet::file::properties::WriterProperties;
 
 use super::Film;
 use super::truth::FrameTruth;
+use crate::csv_text::{Cells, read_cell, split};
 use crate::error::{Error, Fault, Place, Result};
 use crate::kind::{self, Kind};
 use crate::message::FILM_TRUTH;
+use crate::name::text;
+use crate::output::NewFile;
 
 /// Frames per record batch.
 const BATCH_FRAMES: usize = 2000;
@@ -40,6 +43,7 @@ pub struct TruthWriter {
     nodes: Vec<(String, String)>,
     links: usize,
     to: To,
+    new: NewFile,
 }
 
 enum To {
@@ -52,24 +56,39 @@ fn failed(name: &str, e: impl std::fmt::Display) -> Error {
 }
 
 impl TruthWriter {
-    /// Begins the table of a film.
+    /// Begins the table of a film; `cells` is how a CSV writes names.
     ///
     /// # Errors
     /// [`Error::Film`] for an ending that is neither `.csv` nor `.parquet`, or a file that cannot be made.
-    pub fn create(path: &Path, film: &Film) -> Result<Self> {
-        let name = path.display().to_string();
+    pub fn create(path: &Path, film: &Film, cells: Cells) -> Result<Self> {
+        let name = text(path);
         let scene = film.scene();
         let links = scene.links.len();
         let angle = |k: usize| format!("phi{}_rad", k + 1);
-        let to = match path.extension().and_then(|e| e.to_str()) {
+        let ending = path.extension().and_then(|e| e.to_str());
+        if !matches!(ending, Some("csv" | "parquet")) {
+            return Err(Error::Film(
+                Fault::new(&name, "the truth is written to .parquet or .csv")
+                    .advice("Give the file one of these endings"),
+            ));
+        }
+        let new = NewFile::create(path).map_err(|e| failed(&name, e))?;
+        let file = new.file().try_clone().map_err(|e| failed(&name, e))?;
+        let mut nodes: Vec<_> = scene.markers.iter().map(|m| (m.name.clone(), m.link.clone())).collect();
+        let to = match ending {
             Some("csv") => {
-                let mut out = BufWriter::new(File::create(path).map_err(|e| failed(&name, e))?);
+                for name in nodes.iter_mut().flat_map(|n| [&mut n.0, &mut n.1]) {
+                    *name = cells.field(name).map_err(|problem| {
+                        Error::Film(Fault::new("scene", problem).advice("Rename it, or write Parquet"))
+                    })?;
+                }
+                let mut out = BufWriter::new(file);
                 let angles: String = (0..links).map(|k| format!(",{}", angle(k))).collect();
                 writeln!(out, "frame,time_s,node,body,x_px,y_px,visible{angles}")
                     .map_err(|e| failed(&name, e))?;
                 To::Csv(out)
             }
-            Some("parquet") => {
+            _ => {
                 let word = DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8));
                 let mut fields = vec![
                     Field::new("frame", DataType::Int64, false),
@@ -86,20 +105,12 @@ impl TruthWriter {
                     .set_compression(Compression::ZSTD(ZstdLevel::default()))
                     .set_key_value_metadata(Some(vec![KeyValue::new("scene".into(), scene.to_toml()?)]))
                     .build();
-                let file = File::create(path).map_err(|e| failed(&name, e))?;
                 let writer = ArrowWriter::try_new(file, schema.clone(), Some(properties))
                     .map_err(|e| failed(&name, e))?;
                 To::Parquet { writer: Box::new(writer), schema, held: Vec::new() }
             }
-            _ => {
-                return Err(Error::Film(
-                    Fault::new(&name, "the truth is written to .parquet or .csv")
-                        .advice("Give the file one of these endings"),
-                ));
-            }
         };
-        let nodes = scene.markers.iter().map(|m| (m.name.clone(), m.link.clone())).collect();
-        Ok(Self { name, nodes, links, to })
+        Ok(Self { name, nodes, links, to, new })
     }
 
     /// Adds a frame.
@@ -184,9 +195,10 @@ impl TruthWriter {
     pub fn finish(mut self) -> Result<()> {
         self.flush()?;
         match self.to {
-            To::Csv(mut out) => out.flush().map_err(|e| failed(&self.name, e)),
-            To::Parquet { writer, .. } => writer.close().map(|_| ()).map_err(|e| failed(&self.name, e)),
+            To::Csv(mut out) => out.flush().map_err(|e| failed(&self.name, e))?,
+            To::Parquet { writer, .. } => writer.close().map(|_| ()).map_err(|e| failed(&self.name, e))?,
         }
+        self.new.publish(true).map_err(|e| failed(&self.name, e))
     }
 }
 
@@ -313,18 +325,23 @@ fn read_csv(path: &Path, name: &str) -> Result<Columns> {
     let (frame, node, body) = (find("frame")?, find("node")?, find("body")?);
     let wanted = number_columns(&header).iter().map(|c| find(c)).collect::<Result<Vec<_>>>()?;
     let mut columns = Columns { numbers: vec![Vec::new(); wanted.len()], ..Columns::default() };
+    let (mut unquoted, mut ends) = (String::new(), Vec::new());
     for (i, line) in lines.enumerate().filter(|(_, l)| !l.trim().is_empty()) {
-        let fields: Vec<&str> = line.split(',').map(str::trim).collect();
         let bad = |what: &str| Error::Film(Fault::new(name, what.to_string()).at(Place::Line(i as u64 + 2)));
-        if fields.len() != header.len() {
-            return Err(bad(&format!("{} fields under {} headings", fields.len(), header.len())));
+        split(line, &mut unquoted, &mut ends).map_err(|problem| bad(&problem))?;
+        if ends.len() != header.len() {
+            return Err(bad(&format!("{} fields under {} headings", ends.len(), header.len())));
         }
-        let field = |k: usize| fields.get(k).copied().ok_or_else(|| bad("fields are missing"));
-        columns.frame.push(field(frame)?.parse().map_err(|_| bad("frame is not a whole number"))?);
-        columns.node.push(field(node)?.to_string());
-        columns.body.push(field(body)?.to_string());
+        let field = |k: usize| match ends.get(k) {
+            Some(&end) => Ok(&unquoted[if k == 0 { 0 } else { ends[k - 1] }..end]),
+            None => Err(bad("fields are missing")),
+        };
+        columns.frame.push(field(frame)?.trim().parse().map_err(|_| bad("frame is not a whole number"))?);
+        columns.node.push(read_cell(field(node)?).to_string());
+        columns.body.push(read_cell(field(body)?).to_string());
         for (column, &k) in columns.numbers.iter_mut().zip(&wanted) {
-            let number = field(k)?.parse().map_err(|_| bad(&format!("{} is not a number", header[k])))?;
+            let number =
+                field(k)?.trim().parse().map_err(|_| bad(&format!("{} is not a number", header[k])))?;
             column.push(number);
         }
     }

@@ -3,8 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use super::encode::Codec;
+use crate::csv_text::Cells;
 use crate::error::{Error, Fault, Result};
 use crate::message::Setting;
+use crate::name::text;
 
 /// How a film is written. The default follows the name's ending.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -21,6 +23,12 @@ pub struct WriteOptions {
     pub bits: Option<u32>,
     /// Where the truth goes, Parquet or CSV by the ending.
     pub truth: Option<PathBuf>,
+    /// How a CSV of the truth writes names.
+    pub cells: Cells,
+    /// Whether files that are there already are replaced.
+    pub replace: bool,
+    /// Files that the film is made from, which are never replaced.
+    pub reads: Vec<PathBuf>,
 }
 
 /// Presets of x264, the fastest first.
@@ -58,7 +66,7 @@ pub(super) fn codec_of(path: &Path, given: Option<Codec>) -> Option<Codec> {
 
 /// The ending of a name in lower case.
 pub(super) fn ending(path: &Path) -> String {
-    path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase()
+    path.extension().map(text).unwrap_or_default().to_ascii_lowercase()
 }
 
 impl WriteOptions {
@@ -84,7 +92,7 @@ impl WriteOptions {
         ];
         if let Some((setting, _, of)) = wrong.into_iter().find(|(_, wrong, _)| *wrong) {
             return Err(Error::Film(
-                Fault::of(setting, format!("it is of {of}, and {} is none", path.display()))
+                Fault::of(setting, format!("it is of {of}, and {} is none", text(path)))
                     .advice("Leave it out, or choose another ending or codec"),
             ));
         }

@@ -14,8 +14,9 @@ use crate::film::encode::{Codec, VideoSettings, VideoWriter};
 use crate::frame::TimeBase;
 use crate::message::Setting;
 use crate::observation::Observation;
+use crate::output;
 use crate::pipeline::{self, Observer, Stage};
-use crate::source::OpenOptions;
+use crate::source::{self, OpenOptions};
 use crate::table::NodeTable;
 
 /// How the film with the drawings is written.
@@ -40,7 +41,7 @@ impl Default for FilmSettings {
 }
 
 impl FilmSettings {
-    fn check(&self, output: &Path) -> Result<()> {
+    fn check(&self) -> Result<()> {
         let wrong = [
             (Setting::PlayFps, self.play_fps == 0 || self.play_fps > 1000, "Give 1 to 1000 frames a second"),
             (Setting::Quality, self.quality > 51, "Give x264's rate factor, 0 (best) to 51"),
@@ -53,9 +54,6 @@ impl FilmSettings {
         ];
         if let Some((name, _, advice)) = wrong.iter().find(|(_, wrong, _)| *wrong) {
             return Err(Error::Argument(Fault::of(*name, "it is out of range").advice(*advice)));
-        }
-        if output.exists() && !self.replace {
-            return Err(Error::Film(Fault::exists(output)));
         }
         Ok(())
     }
@@ -74,7 +72,7 @@ pub struct Filmed {
 ///
 /// # Errors
 /// [`Error::Source`] if the recording cannot be read, [`Error::Table`] if it is not the table's,
-/// [`Error::Film`] if the film is there already or cannot be written, [`Error::Argument`] for settings out of range,
+/// [`Error::Film`] if the film is there already, is the recording, or cannot be written, [`Error::Argument`] for settings out of range,
 /// [`Error::Interrupted`] if the observer asks to stop: what was drawn is then a whole film.
 pub fn film(
     input: &str,
@@ -84,7 +82,9 @@ pub fn film(
     settings: &FilmSettings,
     observer: &mut dyn Observer,
 ) -> Result<Filmed> {
-    settings.check(output)?;
+    settings.check()?;
+    let outputs = [output.to_owned()];
+    output::check(&outputs, &source::files(input)?, settings.replace).map_err(Error::Film)?;
     let rig = &table.meta.rig;
     let n = rig.nodes.len();
     observer.stage(Stage::Open, None);

@@ -11,6 +11,8 @@ use opencv::{imgcodecs, imgproc};
 use super::failed;
 use crate::error::{Error, Fault, Result};
 use crate::frame::{Frame, PixelFormat};
+use crate::name::text;
+use crate::output;
 
 /// The frame's brightness as an 8-bit picture of three channels, `size` px; black where it could not be decoded. Deep
 /// recordings are shown by their upper 8 bits.
@@ -91,8 +93,8 @@ pub fn rgb(picture: &Mat) -> Result<Vec<u8>> {
 /// # Errors
 /// [`Error::Film`] if the ending is not known or the file cannot be written.
 pub fn save(picture: &Mat, path: &Path) -> Result<()> {
-    let name = path.display().to_string();
-    let ending = path.extension().map_or_else(String::new, |e| format!(".{}", e.to_string_lossy()));
+    let name = text(path);
+    let ending = path.extension().map_or_else(String::new, |e| format!(".{}", text(e)));
     let mut bytes: Vector<u8> = Vector::new();
     let done = imgcodecs::imencode_def(&ending, picture, &mut bytes).unwrap_or(false);
     if !done {
@@ -100,7 +102,7 @@ pub fn save(picture: &Mat, path: &Path) -> Result<()> {
             Fault::new(&name, format!("pictures cannot be written as {ending:?}")).advice("Name it .png"),
         ));
     }
-    std::fs::write(path, bytes.as_slice())
+    output::write(path, bytes.as_slice())
         .map_err(|e| Error::Film(Fault::new(&name, format!("the picture cannot be written ({e})"))))
 }
 

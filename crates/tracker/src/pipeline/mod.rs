@@ -13,24 +13,30 @@ mod times;
 use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 
 use serde_json::json;
 
 pub use observer::{Observer, Silent, Stage};
 pub use opening::open;
+pub(crate) use opening::{learn, sample};
 pub use state::partial_path;
 pub use times::{survey, times};
 
+use crate::csv_text::Cells;
 use crate::detect::{DetectSettings, Levels};
 use crate::discover::{Discovery, discover};
 use crate::error::{Error, Fault, Result};
 use crate::frame::{Ending, FrameSource, SourceInfo};
 use crate::message::{Message, SETUP, Setting};
+use crate::name::{shown, text};
+use crate::output;
 use crate::rig::Rig;
-use crate::source::OpenOptions;
-use crate::store::DetectionStore;
+use crate::source::{self, OpenOptions, threads_note};
+use crate::store::{DetectionStore, Spool};
 use crate::table::{
-    Form, NodeSummary, NodeTable, Rows, RunEnding, SCHEMA_VERSION, SourceFacts, TableMeta, TableWriter, Tally,
+    Fingerprint, NodeSummary, NodeTable, Rows, RunEnding, SCHEMA_VERSION, SourceFacts, TableMeta,
+    TableWriter, Tally, changed, table_files,
 };
 use crate::timing::{self, Clock, Steps, Timing};
 use crate::track::track_recording;
@@ -69,6 +75,10 @@ pub struct RunSettings {
     pub detect: DetectSettings,
     /// Threads for detection; 0 is one for each core. The result is the same for any number.
     pub threads: usize,
+    /// How a CSV writes names.
+    pub cells: Cells,
+    /// Files besides the recording that are read, which the output never replaces.
+    pub reads: Vec<PathBuf>,
 }
 
 impl RunSettings {
@@ -87,6 +97,8 @@ pub struct RunSummary {
     pub frames: u64,
     /// Frames taken over from an earlier run.
     pub resumed: u64,
+    /// Whether a run that was stopped can go on, with what it left beside the table.
+    pub resumable: bool,
     /// What became of each node.
     pub nodes: Vec<NodeSummary>,
     /// What a user should know, a sentence each.
@@ -114,10 +126,10 @@ const SAMPLES: usize = 12;
 /// The error of the part that failed; [`Error::Interrupted`] if the run was stopped before there was anything to
 /// write; [`Error::Table`] if the output is there already.
 pub fn run(settings: &RunSettings, observer: &mut dyn Observer) -> Result<RunSummary> {
-    check(settings)?;
+    let files = check(settings)?;
     observer.stage(Stage::Open, None);
     let source = open(&settings.input, &settings.open, observer)?;
-    let request = Request::new(settings, source.info())?;
+    let request = Request::new(settings, source.info(), files)?;
     if let Some(done) = already_done(settings, &request)? {
         return Ok(done);
     }
@@ -133,8 +145,8 @@ pub fn run(settings: &RunSettings, observer: &mut dyn Observer) -> Result<RunSum
     outcome
 }
 
-/// What can be refused before anything is read.
-fn check(settings: &RunSettings) -> Result<()> {
+/// What can be refused before anything is read. Gives the files of the recording.
+fn check(settings: &RunSettings) -> Result<Vec<PathBuf>> {
     if let Some(frames) = &settings.frames
         && frames.is_empty()
     {
@@ -143,31 +155,34 @@ fn check(settings: &RunSettings) -> Result<()> {
                 .advice("Give the first frame and one past the last"),
         ));
     }
-    let Some(output) = &settings.output else { return Ok(()) };
-    Form::of(output)?;
-    let resume = settings.existing == Existing::Resume;
-    if resume && settings.input == "-" {
+    let files = source::files(&settings.input)?;
+    let Some(output) = &settings.output else { return Ok(files) };
+    let tables = table_files(output)?;
+    let replace = settings.existing != Existing::Refuse;
+    let reads = [&files[..], &settings.reads].concat();
+    output::check(&tables, &reads, replace).map_err(Error::Table)?;
+    let partial = partial_path(output);
+    output::check(std::slice::from_ref(&partial), &reads, true).map_err(Error::Table)?;
+    if settings.existing == Existing::Resume && source::is_read_once(&settings.input) {
+        let what = if settings.input == "-" { "standard input" } else { "a pipe or an address" };
         return Err(Error::Argument(
-            Fault::of(Setting::Resume, "standard input cannot be read again").advice("Give a file"),
+            Fault::of(Setting::Resume, format!("{what} cannot be read again")).advice("Give a file"),
         ));
     }
-    if settings.existing == Existing::Refuse {
-        if output.exists() {
-            return Err(Error::Table(Fault::exists(output)));
-        }
-        let partial = partial_path(output);
-        if partial.exists() {
-            return Err(Error::Table(
-                Fault::new(partial.display(), "an earlier run was stopped and can go on")
-                    .advice("Go on with " + Setting::Resume + ", or begin anew with " + Setting::Force),
-            ));
-        }
+    // Whatever else lies where the state would, it is refused now and not when the recording is open.
+    if Spool::is_at(&partial)? && !replace {
+        return Err(Error::Table(
+            Fault::new(text(&partial), "an earlier run was stopped and can go on")
+                .advice("Go on with " + Setting::Resume + ", or begin anew with " + Setting::Force),
+        ));
     }
-    Ok(())
+    Ok(files)
 }
 
 /// What is asked of a recording, once it is open.
 struct Request {
+    /// None where the recording cannot be read again.
+    files: Vec<PathBuf>,
     facts: SourceFacts,
     info: SourceInfo,
     detect: DetectSettings,
@@ -175,16 +190,16 @@ struct Request {
 }
 
 impl Request {
-    fn new(settings: &RunSettings, info: &SourceInfo) -> Result<Self> {
-        let facts = SourceFacts::of(info);
+    fn new(settings: &RunSettings, info: &SourceInfo, files: Vec<PathBuf>) -> Result<Self> {
+        let facts = SourceFacts::of(info, &files)?;
         let mut detect = settings.detect.clone();
         if let Some(rig) = &settings.rig {
             fits(rig, &facts)?;
             detect.region = detect.region.or_else(|| rig.region.clone());
             detect.lens = detect.lens.or_else(|| rig.lens.clone());
         }
-        let state = State::new(settings, &facts, &detect);
-        Ok(Self { facts, info: info.clone(), detect, state })
+        let state = State::new(settings, &facts, &detect, &files)?;
+        Ok(Self { files, facts, info: info.clone(), detect, state })
     }
 }
 
@@ -199,25 +214,35 @@ fn already_done(settings: &RunSettings, request: &Request) -> Result<Option<RunS
         let partial = partial_path(output);
         return Err(Error::Table(
             Fault::new(
-                output.display(),
-                format!("its run was stopped, but its state {} is gone", partial.display()),
+                text(output),
+                format!("its run was stopped, but its state {} is gone", text(&partial)),
             )
             .advice(state::anew()),
         ));
     }
     request.state.made(&table.meta, output)?;
+    if let Some(file) = changed(&request.files, output)? {
+        return Err(Error::Table(
+            Fault::new(
+                text(output),
+                format!("its run is complete, and {} was written or replaced since then", text(file)),
+            )
+            .advice(state::anew()),
+        ));
+    }
     let rig = (table.meta.settings["rig"] == "given").then_some(&table.meta.rig);
     if rig != settings.rig.as_ref() {
         return Err(Error::Table(
-            Fault::new(output.display(), "its run is complete and had another rig")
+            Fault::new(text(output), "its run is complete and had another rig")
                 .advice("Give " + Setting::Rig + " as it was then, or begin anew with " + Setting::Force),
         ));
     }
     Ok(Some(RunSummary {
         frames: table.frames() as u64,
         resumed: table.frames() as u64,
+        resumable: false,
         nodes: table.summary(),
-        warnings: vec![format!("{} was complete already", output.display()).into()],
+        warnings: vec![format!("{} was complete already", text(output)).into()],
         meta: table.meta.clone(),
         table: settings.collect.then_some(table),
     }))
@@ -226,6 +251,10 @@ fn already_done(settings: &RunSettings, request: &Request) -> Result<Option<RunS
 /// A run between its steps.
 struct Run<'a> {
     settings: &'a RunSettings,
+    /// Those of the recording; none where it cannot be read again.
+    files: Vec<PathBuf>,
+    /// When they were changed, as the run found them.
+    changes: Option<String>,
     detect: DetectSettings,
     facts: SourceFacts,
     info: SourceInfo,
@@ -245,8 +274,10 @@ impl<'a> Run<'a> {
         source: Box<dyn FrameSource>,
         observer: &mut dyn Observer,
     ) -> Result<(Self, Box<dyn FrameSource>)> {
-        let Request { facts, info, detect, state } = request;
-        let warnings = source.info().warnings.clone();
+        let Request { files, facts, info, detect, state } = request;
+        let changes = state.changes.clone();
+        let mut warnings = source.info().warnings.clone();
+        warnings.extend(threads_note(settings.threads));
         if settings.existing == Existing::Resume
             && let Some(output) = &settings.output
             && let Some(earlier) = state.resume(output)?
@@ -254,22 +285,50 @@ impl<'a> Run<'a> {
             let store = DetectionStore::on_spool(earlier.spool)?;
             let (resumed, levels) = (store.len() as u64, Arc::new(earlier.levels));
             let finished = earlier.ending;
-            let run = Self { settings, detect, facts, info, levels, store, resumed, finished, warnings };
+            let run = Self {
+                settings,
+                files,
+                changes,
+                detect,
+                facts,
+                info,
+                levels,
+                store,
+                resumed,
+                finished,
+                warnings,
+            };
             return Ok((run, source));
         }
         observer.stage(Stage::Learn, None);
-        let (source, samples) = opening::sample(source, SAMPLES, observer)?;
-        let levels = opening::on_threads(settings.threads, || Levels::learn(&samples, &detect))?;
-        drop(samples);
+        let (source, samples) = sample(source, SAMPLES, observer)?;
+        let levels = learn(samples, &detect, settings.threads, observer)?;
         if observer.interrupted() {
             return Err(Error::Interrupted);
         }
         let store = match &settings.output {
+            Some(output) if files.is_empty() => {
+                // Nothing could go on from a state of this run; one of an earlier run is not this run's.
+                state::remove(output)?;
+                DetectionStore::new()
+            }
             Some(output) => DetectionStore::on_spool(state.create(output, &levels)?)?,
             None => DetectionStore::new(),
         };
-        let levels = Arc::new(levels);
-        let run = Self { settings, detect, facts, info, levels, store, resumed: 0, finished: None, warnings };
+        let (resumed, finished, levels) = (0, None, Arc::new(levels));
+        let run = Self {
+            settings,
+            files,
+            changes,
+            detect,
+            facts,
+            info,
+            levels,
+            store,
+            resumed,
+            finished,
+            warnings,
+        };
         Ok((run, source))
     }
 
@@ -296,9 +355,20 @@ impl<'a> Run<'a> {
                 return Err(error);
             }
         };
+        let ending = ending.map(|ending| self.unchanged(ending)).transpose()?;
         let finished = ending.as_ref().map(state::finished).transpose()?;
         self.store.close(finished.as_ref())?;
         Ok(ending)
+    }
+
+    /// How the recording ended; not well if it became another one while it was read.
+    fn unchanged(&self, ending: Ending) -> Result<Ending> {
+        if self.files.is_empty() || self.changes == Some(Fingerprint::of(&self.files)?.changes) {
+            return Ok(ending);
+        }
+        let reason =
+            "it was written or replaced while it was read, so its frames may be of two recordings".into();
+        Ok(Ending::Early { frames: self.store.len() as u64, byte: None, reason })
     }
 
     /// Finds the rig if it is not given, follows the markers, writes the table.
@@ -315,11 +385,14 @@ impl<'a> Run<'a> {
         followed
     }
 
-    /// Finds the rig in what was detected.
-    fn find(&self, observer: &mut dyn Observer) -> Result<Discovery> {
+    /// Finds the rig in what was detected, which is not all where the reading was `stopped`.
+    fn find(&self, stopped: bool, observer: &mut dyn Observer) -> Result<Discovery> {
         observer.stage(Stage::Rig, None);
         let image_px = [self.facts.width, self.facts.height];
-        let mut found = opening::on_threads(self.settings.threads, || discover(&self.store, image_px))?;
+        let leave = |o: &mut dyn Observer| if stopped { o.abandoned() } else { o.interrupted() };
+        let mut found = opening::Attended::default().run(observer, leave, |attended| {
+            opening::on_threads(self.settings.threads, || discover(&self.store, image_px, &attended.stop))
+        })?;
         self.store.check()?;
         found.rig.region = found.rig.region.or_else(|| self.detect.region.clone());
         found.rig.lens = found.rig.lens.or_else(|| self.detect.lens.clone());
@@ -335,7 +408,7 @@ impl<'a> Run<'a> {
         let rig = match &self.settings.rig {
             Some(rig) => rig.clone(),
             None => {
-                let mut found = self.find(observer)?;
+                let mut found = self.find(ending.is_none(), observer)?;
                 self.warnings.append(&mut found.warnings);
                 found.rig
             }
@@ -343,7 +416,7 @@ impl<'a> Run<'a> {
         let total = self.store.len() as u64;
         observer.stage(Stage::Track, Some(total));
         let mut writer = match &self.settings.output {
-            Some(output) => Some(TableWriter::create(output, &rig)?),
+            Some(output) => Some(TableWriter::create(output, &rig, self.settings.cells)?),
             None => None,
         };
         let mut rows = self.settings.collect.then(Rows::default);
@@ -352,29 +425,27 @@ impl<'a> Run<'a> {
         let mut stop = ending.is_none();
         let reading_was_stopped = stop;
         let mut done = 0;
-        let tracked = track_recording(&self.store, &rig, &mut |stamp, observations| {
-            let time_s = clock.seconds(done, stamp.ticks);
-            if let Some(writer) = &mut writer {
-                writer.push(stamp.index, time_s, observations)?;
-            }
-            if let Some(rows) = &mut rows {
-                rows.push(stamp.index, time_s, observations);
-            }
-            tally.push(observations);
-            done += 1;
-            if done % 256 == 0 {
-                observer.progress(done);
-                let leave = if reading_was_stopped { observer.abandoned() } else { observer.interrupted() };
-                if leave {
-                    stop = true;
-                    return Err(Error::Interrupted);
+        let attended = opening::Attended::default();
+        let leave = |o: &mut dyn Observer| if reading_was_stopped { o.abandoned() } else { o.interrupted() };
+        let tracked = attended.run(observer, leave, |attended| {
+            track_recording(&self.store, &rig, &attended.stop, &mut |stamp, observations| {
+                let time_s = clock.seconds(done, stamp.ticks);
+                if let Some(writer) = &mut writer {
+                    writer.push(stamp.index, time_s, observations)?;
                 }
-            }
-            Ok(())
+                if let Some(rows) = &mut rows {
+                    rows.push(stamp.index, time_s, observations);
+                }
+                tally.push(observations);
+                done += 1;
+                attended.done.store(done, Ordering::Relaxed);
+                attended.stop.heed()
+            })
         });
+        stop |= attended.stop.asked();
         match tracked {
             Ok(_) => observer.progress(done),
-            Err(Error::Interrupted) if stop && done > 0 => {}
+            Err(Error::Interrupted) if done > 0 => {}
             Err(error) => return Err(error),
         }
         self.store.check()?;
@@ -406,6 +477,7 @@ impl<'a> Run<'a> {
         Ok(RunSummary {
             frames: done,
             resumed: self.resumed,
+            resumable: stop && self.settings.output.is_some() && !self.files.is_empty(),
             nodes: tally.summary(),
             warnings: std::mem::take(&mut self.warnings),
             table: rows.map(|rows| NodeTable { meta: meta.clone(), rows }),
@@ -454,8 +526,10 @@ impl<'a> Run<'a> {
     }
 
     /// A message with the recording's name without its folder.
-    fn base_names(&self, text: &str) -> String {
-        text.replace(&self.settings.input, &self.facts.name)
+    fn base_names(&self, words: &str) -> String {
+        words
+            .replace(&self.settings.input, &self.facts.name)
+            .replace(&shown(&self.settings.input), &self.facts.name)
     }
 }
 

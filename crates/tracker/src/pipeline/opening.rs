@@ -2,16 +2,19 @@
 //!
 //! Owns: [`open`]. Must not: read a recording through.
 
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use crossbeam_channel::{RecvTimeoutError, bounded};
 use rayon::ThreadPoolBuilder;
 
 use super::Observer;
+use crate::detect::{DetectSettings, Levels};
 use crate::error::{Error, Fault, Result};
 use crate::frame::{Frame, FrameSource};
 use crate::message::Setting;
 use crate::source::{self, OpenOptions, cores};
+use crate::stop::Stop;
 
 /// How long to wait before looking whether the user wants to stop.
 const PATIENCE: Duration = Duration::from_millis(50);
@@ -26,12 +29,62 @@ pub fn open(input: &str, options: &OpenOptions, observer: &mut dyn Observer) -> 
 }
 
 /// A source and some of its frames, as [`FrameSource::sample`] gives them.
-pub(super) fn sample(
+pub(crate) fn sample(
     mut source: Box<dyn FrameSource>,
     count: usize,
     observer: &mut dyn Observer,
 ) -> Result<(Box<dyn FrameSource>, Vec<Frame>)> {
     watched(observer, move || source.sample(count).map(|frames| (source, frames)))
+}
+
+/// Learns from samples, as [`Levels::learn`] does.
+pub(crate) fn learn(
+    samples: Vec<Frame>,
+    detect: &DetectSettings,
+    threads: usize,
+    observer: &mut dyn Observer,
+) -> Result<Levels> {
+    let detect = detect.clone();
+    watched(observer, move || on_threads(threads, || Levels::learn(&samples, &detect)))
+}
+
+/// Work done on a thread of its own, so that this one hears the user.
+#[derive(Debug, Default)]
+pub(super) struct Attended {
+    /// The work stops soon after it is asked to.
+    pub stop: Stop,
+    /// What the work says of how far it is.
+    pub done: AtomicU64,
+}
+
+impl Attended {
+    /// Does the work. It is asked to stop once `leave` says so; what it then gives is what comes back.
+    pub(super) fn run<T: Send>(
+        &self,
+        observer: &mut dyn Observer,
+        leave: impl Fn(&mut dyn Observer) -> bool,
+        work: impl FnOnce(&Self) -> Result<T> + Send,
+    ) -> Result<T> {
+        std::thread::scope(|scope| {
+            let (sender, receiver) = bounded(1);
+            let begun = std::thread::Builder::new().name("work".into()).spawn_scoped(scope, move || {
+                // Where the work panics nothing is sent, and the receiver is told that nobody will.
+                let outcome = work(self);
+                let _ = sender.send(());
+                outcome
+            });
+            let worker = begun.map_err(|e| {
+                Error::Argument(Fault::new("threads", format!("no thread could be started ({e})")))
+            })?;
+            while let Err(RecvTimeoutError::Timeout) = receiver.recv_timeout(PATIENCE) {
+                observer.progress(self.done.load(Ordering::Relaxed));
+                if leave(observer) {
+                    self.stop.ask();
+                }
+            }
+            worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+        })
+    }
 }
 
 /// Does what is shared out by rayon on `threads` threads; 0 is one for each core.

@@ -7,25 +7,39 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
+use sha2::{Digest, Sha256};
 
 use super::RunSettings;
 use crate::detect::{DetectSettings, Levels};
 use crate::error::{Error, Fault, Place, Result};
 use crate::frame::{Ending, RateOrigin};
 use crate::message::{Message, Setting};
+use crate::name::text;
+use crate::output::LONGEST_NAME;
 use crate::store::{Finished, Spool};
-use crate::table::{SourceFacts, TableMeta};
+use crate::table::{Fingerprint, SourceFacts, TableMeta};
 
 /// Where the state of a run for `output` is kept.
 pub fn partial_path(output: &Path) -> PathBuf {
-    let mut name = output.as_os_str().to_owned();
+    let mut name = output.file_name().unwrap_or_default().to_owned();
     name.push(".partial");
-    PathBuf::from(name)
+    if name.len() > LONGEST_NAME {
+        // No name so long is possible: the hash of the output's stands for it.
+        let hash = Sha256::digest(output.file_name().unwrap_or_default().as_encoded_bytes());
+        let hash: String = hash.iter().take(16).map(|b| format!("{b:02x}")).collect();
+        name = format!("{hash}.partial").into();
+    }
+    output.with_file_name(name)
 }
+
+/// When the files of the recording were written, in the identity of a run.
+const TIMES: &str = "recording's times";
 
 /// What must be the same for a run to go on: recording, detection, range of frames, program.
 pub struct State {
     identity: Value,
+    /// When the recording's files were changed, see [`Fingerprint::changes`]; `None` where it has none.
+    pub changes: Option<String>,
 }
 
 /// What an earlier run left.
@@ -49,16 +63,24 @@ fn identity(facts: &SourceFacts) -> SourceFacts {
 }
 
 impl State {
-    pub fn new(settings: &RunSettings, facts: &SourceFacts, detect: &DetectSettings) -> Self {
+    pub fn new(
+        settings: &RunSettings,
+        facts: &SourceFacts,
+        detect: &DetectSettings,
+        files: &[PathBuf],
+    ) -> Result<Self> {
+        let print = if files.is_empty() { None } else { Some(Fingerprint::of(files)?) };
         let identity = json!({
             "program": TableMeta::this_tool(),
             "recording": identity(facts),
+            // A finished table does not know these: a copy of the recording has the same table.
+            TIMES: print.as_ref().map(|p| json!({"newest, s since 1970,": p.newest_s, "all": p.changes})),
             "detection settings": detect,
             "decoder": settings.open.decoder,
             "fps": settings.open.fps,
             "frames": settings.frames_json(),
         });
-        Self { identity }
+        Ok(Self { identity, changes: print.map(|p| p.changes) })
     }
 
     /// Whether a finished table is what a run would make now.
@@ -66,6 +88,7 @@ impl State {
         let before = json!({
             "program": meta.tool,
             "recording": identity(&meta.source),
+            TIMES: self.identity[TIMES],
             "detection settings": meta.settings["detect"],
             "decoder": meta.settings["decoder"],
             "fps": meta.settings["fps"],
@@ -80,7 +103,7 @@ impl State {
         match object.iter().find(|&(key, value)| before.get(key) != Some(value)) {
             None => Ok(()),
             Some((key, value)) => Err(Error::Table(
-                Fault::new(path.display(), Message::from(format!("{what} ")) + named(key))
+                Fault::new(text(path), Message::from(format!("{what} ")) + named(key))
                     .at(Place::Key(difference(before.get(key), value)))
                     .advice("Run with what it had, or begin anew with " + Setting::Force),
             )),
@@ -90,21 +113,21 @@ impl State {
     /// Begins a new state; an older one is gone.
     pub fn create(&self, output: &Path, levels: &Levels) -> Result<Spool> {
         let header = Header { identity: self.identity.clone(), levels: levels.clone() };
-        let text =
+        let head =
             serde_json::to_string(&header).map_err(|e| Error::Table(Fault::new("state", e.to_string())))?;
-        Spool::create(&partial_path(output), &text)
+        Spool::create(&partial_path(output), &head)
     }
 
     /// Opens what an earlier run left, if one did.
     pub fn resume(&self, output: &Path) -> Result<Option<Earlier>> {
         let path = partial_path(output);
-        if !path.exists() {
+        if !Spool::is_at(&path)? {
             return Ok(None);
         }
-        let (spool, text) = Spool::resume(&path)?;
-        let header: Header = serde_json::from_str(&text).map_err(|e| {
+        let (spool, head) = Spool::resume(&path)?;
+        let header: Header = serde_json::from_str(&head).map_err(|e| {
             Error::Table(
-                Fault::new(path.display(), format!("its header is of another program ({e})")).advice(anew()),
+                Fault::new(text(&path), format!("its header is of another program ({e})")).advice(anew()),
             )
         })?;
         self.same(&header.identity, &path, "the earlier run had another")?;
@@ -151,24 +174,27 @@ pub fn finished(ending: &Ending) -> Result<Finished> {
     Ok(Finished { ending })
 }
 
-fn read_ending(text: &str, path: &Path) -> Result<Ending> {
-    let text: EndingText = serde_json::from_str(text).map_err(|e| {
+fn read_ending(words: &str, path: &Path) -> Result<Ending> {
+    let ending: EndingText = serde_json::from_str(words).map_err(|e| {
         Error::Table(
-            Fault::new(path.display(), format!("its last record is of another program ({e})")).advice(anew()),
+            Fault::new(text(path), format!("its last record is of another program ({e})")).advice(anew()),
         )
     })?;
-    Ok(match text.early {
+    Ok(match ending.early {
         None => Ending::Complete,
         Some((frames, byte, reason)) => Ending::Early { frames, byte, reason },
     })
 }
 
-/// Removes the state of a run whose table is whole.
+/// Removes the state of a run, if there is one.
 pub fn remove(output: &Path) -> Result<()> {
     let path = partial_path(output);
+    if !Spool::is_at(&path)? {
+        return Ok(());
+    }
     std::fs::remove_file(&path).map_err(|e| {
         Error::Table(
-            Fault::new(path.display(), format!("the table is whole, but this cannot be removed ({e})"))
+            Fault::new(text(&path), format!("no run needs this any more, and it cannot be removed ({e})"))
                 .advice("Remove it yourself"),
         )
     })

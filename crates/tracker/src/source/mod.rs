@@ -15,13 +15,14 @@ pub mod synthetic;
 
 use std::fs::{self, File};
 use std::io::Read;
-use std::path::Path;
+use std::path::PathBuf;
 
 use crate::error::{Error, Fault, Result};
 use crate::kind::{self, Kind};
 use crate::message::Setting;
-pub(crate) use options::cores;
+use crate::name::path;
 pub use options::{Decoder, OpenOptions};
+pub(crate) use options::{cores, threads_note};
 
 pub use crate::frame::{Ending, FrameSource, SourceInfo};
 
@@ -40,7 +41,7 @@ impl Input {
         if name == "-" {
             return Ok(Input::Pipe("pipe:0".into()));
         }
-        let Ok(facts) = fs::metadata(name) else {
+        let Ok(facts) = fs::metadata(path(name)) else {
             return Self::address(name, options);
         };
         let kind = facts.file_type();
@@ -79,14 +80,46 @@ impl Input {
     }
 }
 
-/// Opens a recording by what its first bytes say it is, whatever its name; `-` is standard input.
+/// Whether what a name stands for gives its bytes once: a pipe, a device, an address.
+pub(crate) fn is_read_once(name: &str) -> bool {
+    match fs::metadata(path(name)) {
+        Ok(facts) => !facts.is_file() && !facts.is_dir(),
+        Err(_) => name == "-" || ffmpeg::formats::is_address(name),
+    }
+}
+
+/// Whether a name stands for pictures of a folder.
+fn is_sequence(name: &str) -> bool {
+    path(name).is_dir() || images::names::is_pattern(name) && !path(name).exists()
+}
+
+/// The files that a recording is read from: all pictures of a folder, both files of a Photron pair. None for what can
+/// be read once only, a pipe or an address.
+///
+/// # Errors
+/// [`Error::Source`] if a file of it is not there.
+pub fn files(name: &str) -> Result<Vec<PathBuf>> {
+    if is_sequence(name) {
+        return Ok(images::names::list(name)?.files.into_iter().flatten().collect());
+    }
+    if !path(name).is_file() {
+        return Ok(Vec::new());
+    }
+    if mraw::is_photron(name, &first_bytes(name).unwrap_or_default()) {
+        return mraw::pair(name).map(|pair| vec![pair.header, pair.pixels]);
+    }
+    Ok(vec![path(name)])
+}
+
+/// Opens a recording by what its first bytes say it is, whatever its name; `-` is standard input. A name that is not
+/// UTF-8 is given as [`crate::name::text`] makes it.
 ///
 /// # Errors
 /// [`Error::Source`] if there is no such file or nothing here reads it; [`Error::Argument`] for options that
 /// make no sense.
 pub fn open(name: &str, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
-    kind::expect(Path::new(name), &[Kind::Film, Kind::Pictures], Error::Source)?;
-    if Path::new(name).is_dir() || images::names::is_pattern(name) && !Path::new(name).exists() {
+    kind::expect(&path(name), &[Kind::Film, Kind::Pictures], Error::Source)?;
+    if is_sequence(name) {
         if options.decoder == Decoder::Opencv {
             return Err(Error::Source(
                 Fault::new(name, "pictures are read without OpenCV's decoder")
@@ -144,11 +177,7 @@ fn first_bytes(name: &str) -> Result<Vec<u8>> {
         )
     };
     let mut bytes = Vec::new();
-    File::open(Path::new(name))
-        .map_err(unreadable)?
-        .take(4096)
-        .read_to_end(&mut bytes)
-        .map_err(unreadable)?;
+    File::open(path(name)).map_err(unreadable)?.take(4096).read_to_end(&mut bytes).map_err(unreadable)?;
     if bytes.is_empty() {
         return Err(Error::Source(
             Fault::new(name, "the file is empty").advice("Check that it was copied whole"),

@@ -1,5 +1,7 @@
 //! What a user may say about reading a recording.
 
+use crate::message::Message;
+
 /// Which decoder reads compressed film.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -26,10 +28,24 @@ pub struct OpenOptions {
     pub threads: usize,
 }
 
-/// How many threads `threads` stands for: 0 is one for each core.
+/// Threads for each core at most. Threads that wait for the disk are worth having beside those that compute; with more
+/// than four for each core nothing is faster, and each takes memory.
+const THREADS_PER_CORE: usize = 4;
+
+/// How many threads `threads` stands for: 0 is one for each core, and no more than a few for each are begun.
 pub(crate) fn cores(threads: usize) -> usize {
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
     match threads {
-        0 => std::thread::available_parallelism().map_or(1, usize::from),
-        n => n,
+        0 => cores,
+        n => n.min(THREADS_PER_CORE * cores),
     }
+}
+
+/// What to tell a user who asked for more threads than are begun.
+pub(crate) fn threads_note(threads: usize) -> Option<Message> {
+    let begun = cores(threads);
+    (threads > begun).then(|| {
+        format!("{threads} threads were asked for, {begun} are used: {THREADS_PER_CORE} for each core of this machine")
+            .into()
+    })
 }

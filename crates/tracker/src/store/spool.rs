@@ -7,12 +7,13 @@
 
 use std::fs::{File, OpenOptions};
 use std::io::{BufReader, ErrorKind, Read, Seek, SeekFrom, Write};
-use std::os::unix::fs::FileExt;
+use std::os::unix::fs::{FileExt, MetadataExt};
 use std::path::{Path, PathBuf};
 
 use super::block::{BLOCK_FRAMES, Block};
 use crate::error::{Error, Fault, Place, Result};
 use crate::message::Setting;
+use crate::name::text;
 
 const MAGIC: &[u8; 8] = b"PDSPOOL1";
 const HEAD: [u8; 4] = *b"HEAD";
@@ -50,19 +51,18 @@ pub struct Spool {
 }
 
 impl Spool {
-    /// A new file at `path` that must not be in use by another run; what was there is gone.
+    /// A new file at `path` that must not be in use by another run. What an earlier run left there is gone; anything
+    /// else stays and is refused, and a link is never followed.
     ///
     /// # Errors
-    /// [`Error::Table`] if it cannot be made or another run holds it.
+    /// [`Error::Table`] if it cannot be made, is no file of a run, or another run holds it.
     pub fn create(path: &Path, header: &str) -> Result<Self> {
-        let name = path.display().to_string();
-        let file = OpenOptions::new()
-            .read(true)
-            .write(true)
-            .create(true)
-            .truncate(false)
-            .open(path)
-            .map_err(|e| write_fault(&name, &e))?;
+        let name = text(path);
+        let made = OpenOptions::new().read(true).write(true).create_new(true).open(path);
+        let file = match made {
+            Err(e) if e.kind() == ErrorKind::AlreadyExists => Self::open_own(path)?,
+            made => made.map_err(|e| write_fault(&name, &e))?,
+        };
         lock(&file, &name)?;
         file.set_len(0).map_err(|e| write_fault(&name, &e))?;
         let mut spool = Self::over(file, name, Some(path.to_owned()));
@@ -70,6 +70,45 @@ impl Spool {
         spool.record(HEAD, header.as_bytes())?;
         spool.sync()?;
         Ok(spool)
+    }
+
+    /// Opens what is at `path` if it is a file that a run left.
+    fn open_own(path: &Path) -> Result<File> {
+        let name = text(path);
+        let unreadable = |e: std::io::Error| {
+            Error::Table(
+                Fault::new(&name, format!("the state of the earlier run cannot be read ({e})"))
+                    .advice("Check its permissions"),
+            )
+        };
+        let there = path.symlink_metadata().map_err(unreadable)?;
+        let mut magic = Vec::new();
+        let opened = if there.is_file() {
+            let file = OpenOptions::new().read(true).write(true).open(path).map_err(unreadable)?;
+            let now = file.metadata().map_err(unreadable)?;
+            (&file).take(MAGIC.len() as u64).read_to_end(&mut magic).map_err(unreadable)?;
+            ((now.dev(), now.ino()) == (there.dev(), there.ino())).then_some(file)
+        } else {
+            None
+        };
+        // A run that was killed at once may have left less than the whole beginning.
+        opened.filter(|_| MAGIC.starts_with(&magic)).ok_or_else(|| {
+            Error::Table(
+                Fault::new(&name, "a run would keep its state here, and what is here no run has left")
+                    .advice("Move it away, or choose another output"),
+            )
+        })
+    }
+
+    /// Whether a run could keep its state at `path`: nothing is there (`false`), or what an earlier run left (`true`).
+    ///
+    /// # Errors
+    /// [`Error::Table`] if something else is there.
+    pub fn is_at(path: &Path) -> Result<bool> {
+        if path.symlink_metadata().is_err() {
+            return Ok(false);
+        }
+        Self::open_own(path).map(|_| true)
     }
 
     /// A file that vanishes with the program.
@@ -101,13 +140,8 @@ impl Spool {
     /// # Errors
     /// [`Error::Table`] if there is no such file, its header is not whole, or another run holds it.
     pub fn resume(path: &Path) -> Result<(Self, String)> {
-        let name = path.display().to_string();
-        let file = OpenOptions::new().read(true).write(true).open(path).map_err(|e| {
-            Error::Table(
-                Fault::new(&name, format!("the state of the earlier run cannot be read ({e})"))
-                    .advice("Run without " + Setting::Resume),
-            )
-        })?;
+        let name = text(path);
+        let file = Self::open_own(path)?;
         lock(&file, &name)?;
         let mut spool = Self::over(file, name, Some(path.to_owned()));
         let header = spool.scan()?;

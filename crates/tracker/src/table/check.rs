@@ -1,12 +1,13 @@
-//! What makes a node table valid.
+//! What makes a node table valid, for whoever reads one and for whoever writes one.
 //!
-//! Owns: [`NodeTable::check`]. Must not: read or write.
+//! Owns: [`NodeTable::check`], [`first_fault`]. Must not: read or write.
 
 use rayon::prelude::*;
 
-use super::{NodeTable, STATUS_WORDS, row_fault};
+use super::{NodeTable, Rows, STATUS_WORDS, row_fault};
 use crate::error::{Error, Fault, Result};
 use crate::observation::Status;
+use crate::rig::Rig;
 
 impl NodeTable {
     /// Checks everything a reader may rely on: as many rows as frames times nodes; frames and times increasing;
@@ -30,36 +31,53 @@ impl NodeTable {
                 format!("columns hold {lengths:?} values, expected {frames} frames x {nodes} nodes"),
             )));
         }
-        let first = threads::install(|| {
-            (0..frames).into_par_iter().filter_map(|t| self.frame_fault(t)).min_by_key(|(row, _)| *row)
-        });
-        match first {
+        match first_fault(rows, &self.meta.rig, None) {
             Some((row, problem)) => Err(row_fault(name, row, problem)),
             None => Ok(()),
         }
     }
+}
 
+/// The number and time of the frame before some rows.
+pub(super) type Before = Option<(i64, f64)>;
+
+/// The first of the rows of whole frames that is wrong, and what is wrong with it.
+pub(super) fn first_fault(rows: &Rows, rig: &Rig, before: Before) -> Option<(usize, String)> {
+    let block = Block { rows, rig, before };
+    threads::install(|| {
+        (0..rows.frames()).into_par_iter().filter_map(|t| block.frame_fault(t)).min_by_key(|(row, _)| *row)
+    })
+}
+
+struct Block<'a> {
+    rows: &'a Rows,
+    rig: &'a Rig,
+    before: Before,
+}
+
+impl Block<'_> {
     /// The first row of the `t`-th frame that is wrong, and what is wrong with it.
     fn frame_fault(&self, t: usize) -> Option<(usize, String)> {
-        let (rows, nodes) = (&self.rows, self.nodes());
+        let (rows, nodes) = (self.rows, self.rig.nodes.len());
         let at = |n: usize| t * nodes + n;
+        let before = if t > 0 { Some((rows.frame[t - 1], rows.time_s[t - 1])) } else { self.before };
         if rows.frame[t] < 0 {
             return Some((at(0), format!("frame {} is below 0", rows.frame[t])));
         }
         if !rows.time_s[t].is_finite() {
             return Some((at(0), format!("time_s of frame {} is {}", rows.frame[t], rows.time_s[t])));
         }
-        if t > 0 && rows.frame[t] <= rows.frame[t - 1] {
-            let problem = format!("frame {} comes after frame {}", rows.frame[t], rows.frame[t - 1]);
-            return Some((at(0), problem));
-        }
-        if t > 0 && rows.time_s[t] <= rows.time_s[t - 1] {
-            let problem = format!("time_s {} comes after {}", rows.time_s[t], rows.time_s[t - 1]);
-            return Some((at(0), problem));
+        if let Some((frame, time_s)) = before {
+            if rows.frame[t] <= frame {
+                return Some((at(0), format!("frame {} comes after frame {frame}", rows.frame[t])));
+            }
+            if rows.time_s[t] <= time_s {
+                return Some((at(0), format!("time_s {} comes after {time_s}", rows.time_s[t])));
+            }
         }
         for n in 0..nodes {
             let k = at(n);
-            let node = &self.meta.rig.nodes[n].name;
+            let node = &self.rig.nodes[n].name;
             let Some(status) = Status::from_number(rows.status[k]) else {
                 return Some((
                     k,
@@ -77,7 +95,7 @@ impl NodeTable {
                 } else if let Some(m) =
                     (0..n).find(|&m| rows.xy_px[2 * at(m)] == x && rows.xy_px[2 * at(m) + 1] == y)
                 {
-                    format!("nodes {} and {node} are at one place ({x}, {y})", self.meta.rig.nodes[m].name)
+                    format!("nodes {} and {node} are at one place ({x}, {y})", self.rig.nodes[m].name)
                 } else {
                     continue;
                 }

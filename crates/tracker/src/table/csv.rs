@@ -2,34 +2,39 @@
 //!
 //! Owns: the text of rows. Numbers are the shortest that read back to the same bits; what is not seen is empty.
 
-use std::fs::File;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-use super::file::{Pending, json_beside, write_fault};
+use super::file::{json_beside, write_fault};
 use super::{COLUMNS, Rows, STATUS_WORDS, TableMeta};
+use crate::csv_text::Cells;
 use crate::error::{Error, Fault, Result};
+use crate::output::NewFile;
 use crate::rig::Rig;
 
 #[derive(Debug)]
 pub(super) struct Writer {
     path: PathBuf,
-    file: File,
-    pending: Pending,
+    new: NewFile,
     /// `,node,body,` of each node.
     names: Vec<String>,
     text: String,
 }
 
 impl Writer {
-    pub(super) fn create(path: &Path, rig: &Rig) -> Result<Self> {
+    pub(super) fn create(path: &Path, rig: &Rig, cells: Cells) -> Result<Self> {
+        let field = |name: &str| {
+            cells.field(name).map_err(|problem| {
+                Error::Rig(Fault::new("rig", problem).advice("Rename it, or write Parquet"))
+            })
+        };
         let mut names = Vec::with_capacity(rig.nodes.len());
         for node in &rig.nodes {
             names.push(format!(",{},{},", field(&node.name)?, field(&node.body)?));
         }
-        let (pending, file) = Pending::create(path)?;
+        let new = NewFile::create(path).map_err(|e| write_fault(path, &e))?;
         let text = format!("{}\n", COLUMNS.join(","));
-        Ok(Self { path: path.to_owned(), file, pending, names, text })
+        Ok(Self { path: path.to_owned(), new, names, text })
     }
 
     pub(super) fn write(&mut self, rows: &Rows) -> Result<()> {
@@ -58,32 +63,20 @@ impl Writer {
                 self.text.push('\n');
             }
         }
-        self.file.write_all(self.text.as_bytes()).map_err(|e| write_fault(&self.path, &e))?;
+        self.new.file().write_all(self.text.as_bytes()).map_err(|e| write_fault(&self.path, &e))?;
         self.text.clear();
         Ok(())
     }
 
-    pub(super) fn finish(mut self, meta: &TableMeta) -> Result<()> {
-        self.file.write_all(self.text.as_bytes()).map_err(|e| write_fault(&self.path, &e))?;
+    pub(super) fn finish(self, meta: &TableMeta) -> Result<()> {
+        self.new.file().write_all(self.text.as_bytes()).map_err(|e| write_fault(&self.path, &e))?;
         // The metadata first: where the CSV is, they are too.
         let json = json_beside(&self.path);
-        let (pending, mut file) = Pending::create(&json)?;
         let mut text = meta.to_json()?;
         text.push('\n');
-        file.write_all(text.as_bytes()).map_err(|e| write_fault(&json, &e))?;
-        pending.publish(&file)?;
-        self.pending.publish(&self.file)
+        NewFile::create(&json)
+            .and_then(|new| new.file().write_all(text.as_bytes()).and_then(|()| new.publish(true)))
+            .map_err(|e| write_fault(&json, &e))?;
+        self.new.publish(true).map_err(|e| write_fault(&self.path, &e))
     }
-}
-
-/// A name as a CSV field.
-fn field(name: &str) -> Result<String> {
-    if name.contains(['\n', '\r']) {
-        return Err(Error::Rig(
-            Fault::new("rig", format!("the name {name:?} has a line break, which a CSV row cannot hold"))
-                .advice("Rename it, or write Parquet"),
-        ));
-    }
-    let plain = !name.contains([',', '"']) && name.trim() == name;
-    Ok(if plain { name.to_owned() } else { format!("\"{}\"", name.replace('"', "\"\"")) })
 }

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 
 use super::file::{json_beside, read_fault};
 use super::{COLUMNS, NodeTable, Rows, STATUS_WORDS, TableMeta};
+use crate::csv_text::{read_cell, split};
 use crate::error::{Error, Fault, Place, Result};
 use crate::message::{Message, TRACK};
 
@@ -81,15 +82,10 @@ pub(super) fn read(path: &Path) -> Result<NodeTable> {
             ));
         }
         let node = &meta.rig.nodes[n];
-        if cell(2)? != node.name || cell(3)? != node.body {
+        let (name, body) = (read_cell(cell(2)?), read_cell(cell(3)?));
+        if name != node.name || body != node.body {
             return Err(lines.fault(
-                format!(
-                    "node {:?} of body {:?}, expected {:?} of {:?}",
-                    cell(2)?,
-                    cell(3)?,
-                    node.name,
-                    node.body
-                ),
+                format!("node {name:?} of body {body:?}, expected {:?} of {:?}", node.name, node.body),
                 "Each frame needs one row per node, in the order of the rig",
             ));
         }
@@ -206,32 +202,5 @@ impl Lines {
                 "Leave the field empty where nothing is seen",
             ))
         }
-    }
-}
-
-/// Splits a line into fields, one after the other in `out`, each up to its entry in `ends`.
-fn split(line: &str, out: &mut String, ends: &mut Vec<usize>) -> std::result::Result<(), String> {
-    out.clear();
-    ends.clear();
-    let mut rest = line;
-    loop {
-        if let Some(quoted) = rest.strip_prefix('"') {
-            rest = quoted;
-            loop {
-                let Some(at) = rest.find('"') else { return Err("a quoted name has no end".into()) };
-                out.push_str(&rest[..at]);
-                rest = &rest[at + 1..];
-                let Some(more) = rest.strip_prefix('"') else { break };
-                out.push('"');
-                rest = more;
-            }
-        }
-        let at = rest.find(',').unwrap_or(rest.len());
-        out.push_str(&rest[..at]);
-        ends.push(out.len());
-        if at == rest.len() {
-            return Ok(());
-        }
-        rest = &rest[at + 1..];
     }
 }

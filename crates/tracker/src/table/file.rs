@@ -2,14 +2,16 @@
 //!
 //! Owns: [`Form`], [`TableWriter`], [`read_table`]. Must not: know how a form looks inside.
 
-use std::fs::File;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-use super::{NodeTable, Rows, TableMeta, csv, csv_read, parquet, parquet_read};
+use super::check::{Before, first_fault};
+use super::{NodeTable, Rows, TableMeta, csv, csv_read, parquet, parquet_read, row_fault};
+use crate::csv_text::Cells;
 use crate::error::{Error, Fault, Result};
 use crate::kind::{self, Kind};
 use crate::message::{Setting, TRACK};
+use crate::name::text;
 use crate::observation::Observation;
 use crate::rig::Rig;
 
@@ -36,7 +38,7 @@ impl Form {
             Some("parquet" | "pq") => Ok(Form::Parquet),
             Some("csv") => Ok(Form::Csv),
             _ => Err(Error::Table(
-                Fault::new(path.display(), "the ending says neither Parquet nor CSV")
+                Fault::new(text(path), "the ending says neither Parquet nor CSV")
                     .advice("Name it .parquet or .csv"),
             )),
         }
@@ -45,50 +47,20 @@ impl Form {
 
 /// The file with a CSV's metadata: `drop.csv` has `drop.csv.json`.
 pub(super) fn json_beside(path: &Path) -> PathBuf {
-    with_suffix(path, ".json")
-}
-
-fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
-    name.push(suffix);
+    name.push(".json");
     PathBuf::from(name)
 }
 
-/// A file under a temporary name beside its target, which it replaces when whole and otherwise is removed.
-#[derive(Debug)]
-pub(super) struct Pending {
-    target: PathBuf,
-    temporary: PathBuf,
-    done: bool,
-}
-
-impl Pending {
-    pub(super) fn create(target: &Path) -> Result<(Self, File)> {
-        let temporary = with_suffix(target, ".writing");
-        let file = File::create(&temporary).map_err(|e| write_fault(target, &e))?;
-        Ok((Self { target: target.to_owned(), temporary, done: false }, file))
-    }
-
-    /// Makes sure that all is on disk and gives it its name.
-    pub(super) fn publish(mut self, file: &File) -> Result<()> {
-        let published = file.sync_all().and_then(|()| std::fs::rename(&self.temporary, &self.target));
-        published.map_err(|e| write_fault(&self.target, &e))?;
-        self.done = true;
-        // The new name itself is on disk once the folder is; a file system that cannot do that has no more.
-        let folder = self.target.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        if let Ok(folder) = File::open(folder) {
-            let _ = folder.sync_all();
-        }
-        Ok(())
-    }
-}
-
-impl Drop for Pending {
-    fn drop(&mut self) {
-        if !self.done {
-            let _ = std::fs::remove_file(&self.temporary);
-        }
-    }
+/// The files that a table at `path` is made of.
+///
+/// # Errors
+/// As [`Form::of`].
+pub fn table_files(path: &Path) -> Result<Vec<PathBuf>> {
+    Ok(match Form::of(path)? {
+        Form::Parquet => vec![path.to_owned()],
+        Form::Csv => vec![path.to_owned(), json_beside(path)],
+    })
 }
 
 #[derive(Debug)]
@@ -97,38 +69,57 @@ enum Writer {
     Csv(csv::Writer),
 }
 
-/// Writes a table as its rows come. Until [`TableWriter::finish`] the target is not touched.
+/// Writes a table as its rows come. Until [`TableWriter::finish`] the target is not touched. Rows that
+/// [`NodeTable::check`] would refuse are not written.
 #[derive(Debug)]
 pub struct TableWriter {
+    name: String,
+    rig: Rig,
+    /// Rows written already, and the last of their frames.
+    written: usize,
+    before: Before,
     rows: Rows,
     group_frames: usize,
     writer: Writer,
 }
 
 impl TableWriter {
-    /// Begins a table of `rig`'s nodes at `path`.
+    /// Begins a table of `rig`'s nodes at `path`; `cells` is how a CSV writes their names.
     ///
     /// # Errors
     /// [`Error::Table`] if the ending is unknown or the folder cannot be written.
-    pub fn create(path: &Path, rig: &Rig) -> Result<Self> {
+    pub fn create(path: &Path, rig: &Rig, cells: Cells) -> Result<Self> {
         let writer = match Form::of(path)? {
             Form::Parquet => Writer::Parquet(Box::new(parquet::Writer::create(path, rig)?)),
-            Form::Csv => Writer::Csv(csv::Writer::create(path, rig)?),
+            Form::Csv => Writer::Csv(csv::Writer::create(path, rig, cells)?),
         };
-        Ok(Self { rows: Rows::default(), group_frames: (GROUP_ROWS / rig.nodes.len().max(1)).max(1), writer })
+        Ok(Self {
+            name: text(path),
+            rig: rig.clone(),
+            written: 0,
+            before: None,
+            rows: Rows::default(),
+            group_frames: (GROUP_ROWS / rig.nodes.len().max(1)).max(1),
+            writer,
+        })
     }
 
     /// Adds one frame; `observations` is in the order of the rig's nodes.
     ///
     /// # Errors
-    /// [`Error::Table`] if the disk is full or cannot be written.
+    /// [`Error::Table`] if a row is not valid, or the disk is full or cannot be written.
     pub fn push(&mut self, frame: u64, time_s: f64, observations: &[Observation]) -> Result<()> {
         self.rows.push(frame, time_s, observations);
         if self.rows.frames() == self.group_frames { self.flush() } else { Ok(()) }
     }
 
     fn flush(&mut self) -> Result<()> {
-        if self.rows.frames() > 0 {
+        if let (Some(&frame), Some(&time_s)) = (self.rows.frame.last(), self.rows.time_s.last()) {
+            if let Some((row, problem)) = first_fault(&self.rows, &self.rig, self.before) {
+                return Err(row_fault(&self.name, self.written + row, problem));
+            }
+            self.written += self.rows.status.len();
+            self.before = Some((frame, time_s));
             match &mut self.writer {
                 Writer::Parquet(w) => w.write(&self.rows)?,
                 Writer::Csv(w) => w.write(&self.rows)?,
@@ -141,7 +132,7 @@ impl TableWriter {
     /// Writes the rest and the metadata, and gives the file its name.
     ///
     /// # Errors
-    /// [`Error::Table`] if the disk is full or cannot be written.
+    /// [`Error::Table`] if a row is not valid, or the disk is full or cannot be written.
     pub fn finish(mut self, meta: &TableMeta) -> Result<()> {
         self.flush()?;
         match self.writer {
@@ -157,7 +148,7 @@ impl TableWriter {
 /// [`Error::Table`] naming the row, line or column at fault, [`Error::Rig`] if the rig in it is wrong.
 pub fn read_table(path: &Path) -> Result<NodeTable> {
     kind::expect(path, &[Kind::NodeTable], Error::Table)?;
-    let name = path.display().to_string();
+    let name = text(path);
     let table = match Form::of(path)? {
         Form::Parquet => parquet_read::read(path)?,
         Form::Csv => csv_read::read(path)?,
@@ -179,8 +170,7 @@ pub fn read_meta(path: &Path) -> Result<TableMeta> {
 
 pub(super) fn read_fault(path: &Path, e: &std::io::Error) -> Error {
     Error::Table(
-        Fault::new(path.display(), format!("it cannot be read ({e})"))
-            .advice("Give a table written by " + TRACK),
+        Fault::new(text(path), format!("it cannot be read ({e})")).advice("Give a table written by " + TRACK),
     )
 }
 
@@ -189,7 +179,8 @@ pub(super) fn write_fault(path: &Path, e: &std::io::Error) -> Error {
         ErrorKind::StorageFull | ErrorKind::QuotaExceeded => {
             "Free some space and run again with " + Setting::Resume
         }
+        ErrorKind::InvalidFilename => "Choose a shorter name".into(),
         _ => "Choose a folder that can be written".into(),
     };
-    Error::Table(Fault::new(path.display(), format!("it cannot be written ({e})")).advice(advice))
+    Error::Table(Fault::new(text(path), format!("it cannot be written ({e})")).advice(advice))
 }

@@ -5,14 +5,16 @@
 
 use std::fs::File;
 use std::io::Read;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
+use super::Fingerprint;
 use crate::error::{Error, Fault, Place, Result};
 use crate::frame::{RateOrigin, SourceInfo, TimeBase};
 use crate::message::TRACK;
+use crate::name::{self, shown, text};
 use crate::rig::Rig;
 use crate::timing::Timing;
 
@@ -48,16 +50,22 @@ pub struct SourceFacts {
     pub size_bytes: Option<u64>,
     /// SHA-256 of the first MiB of the file.
     pub sha256_first_mib: Option<String>,
+    /// SHA-256 of what tells the recording from others of its size, see [`crate::table::Fingerprint`].
+    #[serde(default)]
+    pub sha256_ends: Option<String>,
     /// What the source warned of.
     pub warnings: Vec<String>,
 }
 
 impl SourceFacts {
-    /// Facts of a source that was opened. Reads the first MiB of the file it names, if it names one.
-    pub fn of(info: &SourceInfo) -> Self {
-        let path = Path::new(&info.name);
-        let base = path.file_name().map_or_else(|| info.name.clone(), |n| n.to_string_lossy().into_owned());
-        Self {
+    /// Facts of a source that was opened, which is read from `files`. Reads their first and last MiB.
+    ///
+    /// # Errors
+    /// [`Error::Source`] if one of them cannot be read.
+    pub fn of(info: &SourceInfo, files: &[PathBuf]) -> Result<Self> {
+        let path = name::path(&info.name);
+        let base = shown(&path.file_name().map_or_else(|| info.name.clone(), text));
+        Ok(Self {
             container: info.container.clone(),
             codec: info.codec.clone(),
             width: info.width,
@@ -69,11 +77,12 @@ impl SourceFacts {
             time_base: [info.time_base.numerator, info.time_base.denominator],
             converted_from: info.converted_from.clone(),
             size_bytes: info.size_bytes,
-            sha256_first_mib: first_mib(path),
+            sha256_first_mib: first_mib(&path),
+            sha256_ends: if files.is_empty() { None } else { Some(Fingerprint::of(files)?.sha256) },
             // Messages name the file as the user did; the table is the same from any folder.
             warnings: info.warnings.iter().map(|w| w.replace(&info.name, &base).to_string()).collect(),
             name: base,
-        }
+        })
     }
 
     /// Seconds per tick.

@@ -17,6 +17,7 @@ mod check;
 mod csv;
 mod csv_read;
 mod file;
+mod fingerprint;
 mod meta;
 mod parquet;
 mod parquet_read;
@@ -27,10 +28,12 @@ pub(crate) mod tests;
 use std::path::Path;
 
 pub use self::parquet::{batch, schema};
-pub use file::{Form, TableWriter, read_meta, read_table};
+pub use file::{Form, TableWriter, read_meta, read_table, table_files};
+pub use fingerprint::{Fingerprint, changed};
 pub use meta::{RunEnding, SCHEMA_VERSION, SourceFacts, TableMeta};
 pub use tally::{NodeSummary, Tally};
 
+use crate::csv_text::Cells;
 use crate::observation::{Observation, Status};
 
 /// Columns of the table in their order.
@@ -140,14 +143,15 @@ impl NodeTable {
         self.rows.frames()
     }
 
-    /// Writes it to `path`, as Parquet or CSV by the ending, first under a temporary name.
+    /// Writes it to `path`, as Parquet or CSV by the ending, first under a temporary name; `cells` is how a CSV writes
+    /// names.
     ///
     /// # Errors
     /// [`crate::error::Error::Table`] if it is not valid or cannot be written.
-    pub fn write(&self, path: &Path) -> crate::error::Result<()> {
-        self.check(&path.display().to_string())?;
+    pub fn write(&self, path: &Path, cells: Cells) -> crate::error::Result<()> {
+        self.check(&crate::name::text(path))?;
         let nodes = self.nodes();
-        let mut writer = TableWriter::create(path, &self.meta.rig)?;
+        let mut writer = TableWriter::create(path, &self.meta.rig, cells)?;
         let mut seen = Vec::with_capacity(nodes);
         for t in 0..self.frames() {
             seen.clear();

@@ -21,9 +21,10 @@ use arrow::buffer::{NullBuffer, ScalarBuffer};
 use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
 use arrow::record_batch::RecordBatch;
 
-use super::file::{GROUP_ROWS, Pending, write_fault};
+use super::file::{GROUP_ROWS, write_fault};
 use super::{COLUMNS, Rows, STATUS_WORDS, TableMeta};
 use crate::error::{Error, Fault, Result};
+use crate::output::NewFile;
 use crate::rig::Rig;
 
 /// Before each key of the metadata.
@@ -94,8 +95,7 @@ pub(super) struct Writer {
     path: PathBuf,
     rig: Rig,
     writer: ArrowWriter<File>,
-    file: File,
-    pending: Pending,
+    new: NewFile,
 }
 
 impl std::fmt::Debug for Writer {
@@ -123,14 +123,14 @@ impl Writer {
         for column in &COLUMNS[4..7] {
             properties = properties.set_column_dictionary_enabled(ColumnPath::from(*column), false);
         }
-        let (pending, file) = Pending::create(path)?;
-        let handle = file.try_clone().map_err(|e| write_fault(path, &e))?;
+        let new = NewFile::create(path).map_err(|e| write_fault(path, &e))?;
+        let handle = new.file().try_clone().map_err(|e| write_fault(path, &e))?;
         // The Arrow schema is written at the end, when its metadata are known.
         let options =
             ArrowWriterOptions::new().with_properties(properties.build()).with_skip_arrow_metadata(true);
         let writer =
             ArrowWriter::try_new_with_options(handle, schema(), options).map_err(|e| fault(path, e))?;
-        Ok(Self { path: path.to_owned(), rig: rig.clone(), writer, file, pending })
+        Ok(Self { path: path.to_owned(), rig: rig.clone(), writer, new })
     }
 
     /// Writes `rows` as one row group.
@@ -148,7 +148,7 @@ impl Writer {
             self.writer.append_key_value_metadata(KeyValue::new(key, text));
         }
         self.writer.finish().map_err(|e| fault(&self.path, e))?;
-        self.pending.publish(&self.file)
+        self.new.publish(true).map_err(|e| write_fault(&self.path, &e))
     }
 }
 

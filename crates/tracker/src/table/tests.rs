@@ -3,6 +3,7 @@
 use proptest::prelude::*;
 
 use super::*;
+use crate::csv_text::Cells;
 use crate::frame::RateOrigin;
 use crate::rig::{Body, Joint, Node, Rig};
 
@@ -49,6 +50,7 @@ pub(crate) fn meta(names: &[(String, usize)], bodies: &[String]) -> TableMeta {
             converted_from: None,
             size_bytes: Some(12),
             sha256_first_mib: Some("00".into()),
+            sha256_ends: Some("11".into()),
             warnings: vec!["a \"quoted\" warning, with a comma".into()],
         },
         time: None,
@@ -72,13 +74,13 @@ fn both_forms(table: &NodeTable) {
     let folder = tempfile::tempdir().unwrap();
     for name in ["t.parquet", "t.csv"] {
         let path = folder.path().join(name);
-        table.write(&path).unwrap();
+        table.write(&path, Cells::Plain).unwrap();
         let back = read_table(&path).unwrap();
         assert_eq!(back.meta, table.meta, "{name}");
         assert!(back.rows.same(&table.rows), "{name}:\n{:?}\n{:?}", back.rows, table.rows);
         assert_eq!(read_meta(&path).unwrap(), table.meta);
         let first = std::fs::read(&path).unwrap();
-        table.write(&path).unwrap();
+        table.write(&path, Cells::Plain).unwrap();
         assert_eq!(first, std::fs::read(&path).unwrap(), "the same table gave other bytes as {name}");
     }
     let left: Vec<_> = std::fs::read_dir(&folder).unwrap().map(|e| e.unwrap().file_name()).collect();
@@ -108,7 +110,7 @@ fn several_row_groups_come_back_as_one() {
     }
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("t.parquet");
-    table.write(&path).unwrap();
+    table.write(&path, Cells::Plain).unwrap();
     let back = read_table(&path).unwrap();
     assert!(back.rows.same(&table.rows));
     let file = std::fs::File::open(&path).unwrap();
@@ -121,7 +123,7 @@ fn several_row_groups_come_back_as_one() {
 fn csv_complaint(from: &str, to: &str) -> String {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("t.csv");
-    two_by_three().write(&path).unwrap();
+    two_by_three().write(&path, Cells::Plain).unwrap();
     let text = std::fs::read_to_string(&path).unwrap();
     assert!(text.contains(from), "{text}");
     std::fs::write(&path, text.replacen(from, to, 1)).unwrap();
@@ -160,7 +162,7 @@ fn a_csv_is_refused_with_the_line_and_column_at_fault() {
 fn a_csv_without_its_json_or_of_a_newer_schema_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("t.csv");
-    two_by_three().write(&path).unwrap();
+    two_by_three().write(&path, Cells::Plain).unwrap();
     let json = folder.path().join("t.csv.json");
     let text = std::fs::read_to_string(&json).unwrap();
     for (from, to, expected) in [
@@ -194,12 +196,30 @@ fn a_csv_without_its_json_or_of_a_newer_schema_is_refused() {
 fn a_parquet_file_cut_anywhere_or_changed_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("t.parquet");
-    two_by_three().write(&path).unwrap();
+    two_by_three().write(&path, Cells::Plain).unwrap();
     let whole = std::fs::read(&path).unwrap();
     for cut in [0, 3, 4, 100, whole.len() / 2, whole.len() - 8, whole.len() - 1] {
         std::fs::write(&path, &whole[..cut]).unwrap();
         let said = read_table(&path).unwrap_err().to_string();
         assert!(said.contains("t.parquet") && said.contains("not a whole Parquet file"), "{said}");
+    }
+}
+
+#[test]
+fn names_that_are_formulas_survive_a_safe_csv() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("t.csv");
+    let names: Vec<_> = ["=1+1", "+a", "-b", "@c", "\td", "'=e", "n,\"0"].map(|n| (n.to_owned(), 0)).into();
+    let meta = meta(&names, &["=HYPERLINK(\"x\")".into()]);
+    let mut rows = Rows::default();
+    rows.push(0, 0.0, &[Observation::MISSING; 7]);
+    let table = NodeTable { meta, rows };
+    for (cells, formulas) in [(Cells::Plain, true), (Cells::Safe, false)] {
+        table.write(&path, cells).unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        assert_eq!(text.contains(",=1+1,"), formulas, "{text}");
+        assert_eq!(text.contains("\"=HYPERLINK"), formulas, "{text}");
+        assert_eq!(read_table(&path).unwrap().meta, table.meta);
     }
 }
 
@@ -228,7 +248,7 @@ fn an_invalid_table_is_not_written() {
     for (spoil, expected) in spoilt {
         let mut table = two_by_three();
         spoil(&mut table);
-        let said = table.write(&path).unwrap_err().to_string();
+        let said = table.write(&path, Cells::Plain).unwrap_err().to_string();
         assert!(said.contains(expected), "{said}");
         assert_eq!(std::fs::read_dir(&folder).unwrap().count(), 0, "a file was left behind");
     }
@@ -236,7 +256,7 @@ fn an_invalid_table_is_not_written() {
 
 #[test]
 fn a_folder_that_is_not_there_is_an_error_that_names_the_file() {
-    let said = two_by_three().write(Path::new("/nowhere/t.parquet")).unwrap_err().to_string();
+    let said = two_by_three().write(Path::new("/nowhere/t.parquet"), Cells::Plain).unwrap_err().to_string();
     assert!(said.starts_with("/nowhere/t.parquet: it cannot be written"), "{said}");
 }
 
@@ -265,6 +285,26 @@ prop_compose! {
         area in 0f32..1e6,
     ) -> Observation {
         Observation { x_px: x, y_px: y, sigma_px: sigma, area_px: area, status: Status::from_number(status).unwrap() }
+    }
+}
+
+/// Any number at all, with those that spoil a row often.
+fn number() -> impl Strategy<Value = f64> {
+    prop_oneof![
+        2 => 0.0..100f64,
+        1 => proptest::sample::select(vec![0.0, -0.0, -1.0, f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e-300, 1e300]),
+    ]
+}
+
+prop_compose! {
+    fn any_observation()(status in 0u8..4, x in number(), y in number(), sigma in number(), area in number()) -> Observation {
+        Observation {
+            x_px: x,
+            y_px: y,
+            sigma_px: sigma as f32,
+            area_px: area as f32,
+            status: Status::from_number(status).unwrap(),
+        }
     }
 }
 
@@ -297,6 +337,34 @@ prop_compose! {
 
 proptest! {
     #![proptest_config(ProptestConfig { cases: 32, failure_persistence: None, ..ProptestConfig::default() })]
+    #[test]
+    fn whatever_is_written_is_read_and_the_rest_is_refused(
+        frames in proptest::collection::vec((0u64..3, number(), [any_observation(), any_observation()]), 1..4),
+        orderly in any::<bool>(),
+    ) {
+        let folder = tempfile::tempdir().unwrap();
+        let meta = meta(&[("a".into(), 0), ("b".into(), 0)], &["c".into()]);
+        for name in ["t.parquet", "t.csv"] {
+            let path = folder.path().join(name);
+            let mut rows = Rows::default();
+            let mut writer = TableWriter::create(&path, &meta.rig, Cells::Plain).unwrap();
+            let mut written = Ok(());
+            for (k, (frame, time_s, row)) in frames.iter().enumerate() {
+                // Most times in order, or hardly any table would be whole.
+                let (frame, time_s) = if orderly { (k as u64, k as f64) } else { (*frame, *time_s) };
+                rows.push(frame, time_s, row);
+                written = written.and_then(|()| writer.push(frame, time_s, row));
+            }
+            let written = written.and_then(|()| writer.finish(&meta));
+            let table = NodeTable { meta: meta.clone(), rows };
+            prop_assert_eq!(written.is_ok(), table.check("t").is_ok());
+            match written {
+                Ok(()) => prop_assert!(read_table(&path).unwrap().rows.same(&table.rows)),
+                Err(error) => prop_assert!(!path.exists(), "{error}"),
+            }
+        }
+    }
+
     #[test]
     fn any_table_survives_both_forms(table in table()) {
         // Two random centres are never one; times that differ by less than a rounding step are not a table.

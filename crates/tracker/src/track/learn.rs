@@ -285,7 +285,7 @@ mod tests {
             store.push(FrameStamp { index, ticks: index as i64, decoded: true }, &found).unwrap();
         }
         let (mut sum, mut count) = (0.0, 0.0);
-        track_recording(&store, &rig, &mut |_, row| {
+        track_recording(&store, &rig, &crate::stop::Stop::default(), &mut |_, row| {
             for o in row.iter().filter(|o| o.status.is_seen()) {
                 sum += f64::from(o.sigma_px);
                 count += 1.0;

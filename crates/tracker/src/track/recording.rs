@@ -17,6 +17,7 @@ use crate::rig::Rig;
 use crate::rigid::body::Mechanism;
 use crate::rigid::forecast::Motion;
 use crate::rigid::index::Sky;
+use crate::stop::Stop;
 use crate::store::{DetectionStore, FrameStamp};
 
 /// What came of a recording.
@@ -48,8 +49,14 @@ struct Pending {
 /// Names the markers of a whole recording and hands every frame to `sink` in the order of recording.
 ///
 /// # Errors
-/// Those of the sink, and [`crate::error::Error::Rig`] for a rig that is not valid.
-pub fn track_recording(store: &DetectionStore, rig: &Rig, sink: &mut Sink<'_>) -> Result<TrackSummary> {
+/// Those of the sink, [`crate::error::Error::Rig`] for a rig that is not valid, and
+/// [`crate::error::Error::Interrupted`] once `stop` was asked for.
+pub fn track_recording(
+    store: &DetectionStore,
+    rig: &Rig,
+    stop: &Stop,
+    sink: &mut Sink<'_>,
+) -> Result<TrackSummary> {
     rig.check("rig")?;
     let mechanism = Mechanism::new(rig, 0.3);
     let habits = Habits::unknown(&mechanism, 0.05);
@@ -69,20 +76,20 @@ pub fn track_recording(store: &DetectionStore, rig: &Rig, sink: &mut Sink<'_>) -
         return Ok(out.summary);
     }
     let start = start_frame(store, rig);
-    let (mechanism, habits) = learn(store, rig, start, mechanism, habits);
+    let (mechanism, habits) = learn(store, rig, start, mechanism, habits, stop)?;
     let engine = started(rig, start, mechanism, habits);
     // Backwards from the reference frame, kept; then forwards from it, written as it is decided.
-    let mut before = Pass::new(store, engine.clone());
+    let mut before = Pass::new(store, engine.clone(), stop);
     for i in (0..start).rev() {
-        before.step(i);
+        before.step(i)?;
     }
-    before.finish();
+    before.finish()?;
     while let Some(p) = before.pending.pop_back() {
         out.write(store, &before.engine.bodies.mechanism, p, sink)?;
     }
-    let mut after = Pass::new(store, engine);
+    let mut after = Pass::new(store, engine, stop);
     for i in start..store.len() {
-        after.step(i);
+        after.step(i)?;
         while after.decided() > 0 {
             if let Some(p) = after.pending.pop_front() {
                 out.write(store, &after.engine.bodies.mechanism, p, sink)?;
@@ -90,7 +97,7 @@ pub fn track_recording(store: &DetectionStore, rig: &Rig, sink: &mut Sink<'_>) -
             after.first += 1;
         }
     }
-    after.finish();
+    after.finish()?;
     while let Some(p) = after.pending.pop_front() {
         out.write(store, &after.engine.bodies.mechanism, p, sink)?;
     }
@@ -108,7 +115,8 @@ fn learn(
     start: usize,
     mut mechanism: Mechanism,
     mut habits: Habits,
-) -> (Mechanism, Habits) {
+    stop: &Stop,
+) -> Result<(Mechanism, Habits)> {
     let mut scratch = Vec::new();
     let mut engine = started(rig, start, mechanism.clone(), habits.clone());
     let mut lessons = Lessons::new(&mechanism);
@@ -118,13 +126,14 @@ fn learn(
         if i == start {
             engine = started(rig, start, mechanism.clone(), habits.clone());
         }
+        stop.heed()?;
         store.read(i, &mut scratch);
         let sky = Sky::new(&scratch);
         let seen = engine.step(i as f64, &sky, None);
         lessons.add(&engine.bodies.mechanism, &seen, &sky);
     }
     lessons.apply(&mut mechanism, &mut habits);
-    (mechanism, habits)
+    Ok((mechanism, habits))
 }
 
 /// A tracker that stands in the reference frame.
@@ -187,6 +196,7 @@ impl Output {
 /// One direction of time: steps, and fills gaps from behind once a body is settled again.
 struct Pass<'a> {
     store: &'a DetectionStore,
+    stop: &'a Stop,
     engine: Engine,
     pending: VecDeque<Pending>,
     /// Steps already taken out of `pending`.
@@ -199,10 +209,11 @@ struct Pass<'a> {
 }
 
 impl<'a> Pass<'a> {
-    fn new(store: &'a DetectionStore, engine: Engine) -> Self {
+    fn new(store: &'a DetectionStore, engine: Engine, stop: &'a Stop) -> Self {
         let n = engine.bodies.mechanism.links.len();
         Self {
             store,
+            stop,
             engine,
             pending: VecDeque::new(),
             first: 0,
@@ -212,7 +223,8 @@ impl<'a> Pass<'a> {
         }
     }
 
-    fn step(&mut self, i: usize) {
+    fn step(&mut self, i: usize) -> Result<()> {
+        self.stop.heed()?;
         self.store.read(i, &mut self.scratch);
         let sky = Sky::new(&self.scratch);
         let seen = self.engine.step(i as f64, &sky, None);
@@ -228,9 +240,10 @@ impl<'a> Pass<'a> {
         self.pending.push_back(Pending { stamp: self.store.stamp(i), seen });
         for b in 0..self.gap.len() {
             if self.gap[b].is_some() && self.run[b] == SETTLED {
-                self.fill(b);
+                self.fill(b)?;
             }
         }
+        Ok(())
     }
 
     /// Steps that no open gap holds back.
@@ -241,8 +254,8 @@ impl<'a> Pass<'a> {
     }
 
     /// Follows body `b` from now back through its gap.
-    fn fill(&mut self, b: usize) {
-        let Some(start) = self.gap[b].take() else { return };
+    fn fill(&mut self, b: usize) -> Result<()> {
+        let Some(start) = self.gap[b].take() else { return Ok(()) };
         let from = start.max(self.first) - self.first;
         let end = self.pending.len() - SETTLED;
         let mut engine = self.engine.clone();
@@ -254,6 +267,7 @@ impl<'a> Pass<'a> {
             }
         }
         for k in (from..end).rev() {
+            self.stop.heed()?;
             let p = &mut self.pending[k];
             let i = time(p, self.store);
             self.store.read(i as usize, &mut self.scratch);
@@ -277,15 +291,17 @@ impl<'a> Pass<'a> {
                 p.seen[b] = seen;
             }
         }
+        Ok(())
     }
 
     /// Fills what gaps can be filled at the end of the recording.
-    fn finish(&mut self) {
+    fn finish(&mut self) -> Result<()> {
         for b in 0..self.gap.len() {
             if self.gap[b].is_some() && self.run[b] > 0 && self.pending.len() > SETTLED {
-                self.fill(b);
+                self.fill(b)?;
             }
         }
         self.gap.fill(None);
+        Ok(())
     }
 }

@@ -12,6 +12,7 @@ use super::{Tracker, track_recording};
 use crate::detect::{Detection, Flags};
 use crate::observation::Observation;
 use crate::rig::Rig;
+use crate::stop::Stop;
 use crate::store::{DetectionStore, FrameStamp};
 use crate::table::{NodeTable, Rows, tests::meta};
 use swing::Swing;
@@ -139,7 +140,7 @@ proptest! {
             store.push(*stamp, here).unwrap();
         }
         let (mut rows, mut used) = (Rows::default(), Vec::new());
-        let summary = track_recording(&store, &film.rig, &mut |stamp, row| {
+        let summary = track_recording(&store, &film.rig, &Stop::default(), &mut |stamp, row| {
             used.push(used_once(row, &frames[stamp.index as usize].1));
             rows.push(stamp.index, stamp.ticks as f64 / 1000.0, row);
             Ok(())

@@ -20,7 +20,8 @@ fn tracker(arguments: &[&str], input: Stdio) -> Output {
 fn film(folder: &Path, name: &str, more: &[&str]) -> (PathBuf, String) {
     let (path, rig) = (folder.join(name), folder.join("rig.toml").display().to_string());
     let frames = COUNT.to_string();
-    let mut arguments = vec!["film", "--preset", "clean", "--frames", &frames, "-q", "--rig", &rig, "-o"];
+    let mut arguments =
+        vec!["film", "--preset", "clean", "--frames", &frames, "-q", "--force", "--rig", &rig, "-o"];
     arguments.push(path.to_str().unwrap());
     arguments.extend(more);
     let done = tracker(&arguments, Stdio::null());

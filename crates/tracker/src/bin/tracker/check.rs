@@ -2,12 +2,15 @@
 //!
 //! Owns: its arguments, the summary as text. Must not: decide what is valid.
 
-use std::io::Write;
+use std::fmt::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use tracker::name::{shown, text};
 use tracker::residual::residuals;
 use tracker::table::read_table;
+
+use crate::print;
 
 /// Check a node table and sum it up
 #[derive(Debug, clap::Args)]
@@ -25,15 +28,16 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let table = read_table(&args.nodes)?;
     let summary = table.summary();
     let fits = residuals(&table.meta.rig, &table.rows);
-    let mut out = std::io::stdout();
     if args.json {
         let nodes: Vec<serde_json::Value> =
             summary.iter().zip(&fits).map(|(s, f)| serde_json::json!({"summary": s, "motion": f})).collect();
-        let value = serde_json::json!({"table": args.nodes, "frames": table.frames(), "nodes": nodes});
-        writeln!(out, "{}", serde_json::to_string_pretty(&value)?)?;
+        let value =
+            serde_json::json!({"table": shown(&text(&args.nodes)), "frames": table.frames(), "nodes": nodes});
+        print::json(&value)?;
         return Ok(ExitCode::SUCCESS);
     }
-    writeln!(out, "{}: valid, {} frames, {} nodes", args.nodes.display(), table.frames(), summary.len())?;
+    let mut out = String::new();
+    writeln!(out, "{}: valid, {} frames, {} nodes", text(&args.nodes), table.frames(), summary.len())?;
     writeln!(
         out,
         "node      body            seen  gaps  longest gap  ambiguous  sigma_px  residual_px  px per frame"
@@ -54,5 +58,6 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             number(f.fastest_px, 2),
         )?;
     }
+    print::lines(&out)?;
     Ok(ExitCode::SUCCESS)
 }

@@ -1,16 +1,17 @@
 //! `tracker film`: a scene in, a film and its truth out.
 
-use std::io::IsTerminal;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
-use anyhow::Context;
-use indicatif::{ProgressBar, ProgressStyle};
-use tracker::error::{Error, Fault, Place};
+use tracker::csv_text::Cells;
+use tracker::error::Error;
 use tracker::film::encode::Codec;
-use tracker::film::{Film, MotionTable, PRESETS, Scene, WriteOptions, preset, write};
+use tracker::film::{Film, MotionTable, PRESETS, Scene, WriteOptions, film_files, preset, write};
+use tracker::output;
+use tracker::pipeline::{Observer, Stage};
+
+use crate::print;
+use crate::watch::Watch;
 
 /// Make a film of markers on links, with its truth: to try a marker layout, a light and a frame rate before the rig
 /// is built, or to test a tracker.
@@ -64,6 +65,12 @@ pub struct Args {
     /// Bits per pixel of an .mraw: 8, 10, 12 or 16.
     #[arg(long, requires = "output")]
     bits: Option<u32>,
+    /// In a CSV of the truth put a ' before names that a spreadsheet would take for a formula.
+    #[arg(long)]
+    safe_csv: bool,
+    /// Replace files that are there already.
+    #[arg(long)]
+    force: bool,
     /// No progress bar.
     #[arg(short, long)]
     quiet: bool,
@@ -104,34 +111,25 @@ impl Args {
     }
 }
 
-/// Refuses to write over the scene or the motion.
-fn distinct(output: &Path, inputs: [Option<&PathBuf>; 2]) -> Result<(), Error> {
-    if inputs.into_iter().flatten().any(|i| i == output) {
-        return Err(Error::Film(
-            Fault::new(output.display(), "the film would replace what it is made from")
-                .at(Place::Key("output".into()))
-                .advice("Give another name"),
-        ));
-    }
-    Ok(())
-}
-
 /// Makes the film.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let scene = args.scene()?;
     if args.print_scene {
-        print!("{}", scene.to_toml()?);
+        print::lines(&scene.to_toml()?)?;
     }
     let film = match &args.motion {
         Some(path) => Film::with_motion(&scene, &MotionTable::read(path)?)?,
         None => Film::new(&scene)?,
     };
+    let reads: Vec<PathBuf> = args.scene.iter().chain(&args.motion).cloned().collect();
     if let Some(path) = &args.rig {
-        std::fs::write(path, film.rig(0).to_toml()?)
-            .with_context(|| format!("{}: the rig cannot be written", path.display()))?;
+        // The film is not there yet, so that the rig's name is none of its files'.
+        let mut outputs = vec![path.clone()];
+        outputs.extend(args.output.iter().flat_map(|o| film_files(&film, o)).chain(args.truth.clone()));
+        output::check(&outputs, &reads, args.force).map_err(Error::Film)?;
+        film.rig(0).write(path)?;
     }
     let Some(output) = &args.output else { return Ok(ExitCode::SUCCESS) };
-    distinct(output, [args.scene.as_ref(), args.motion.as_ref()])?;
     let options = WriteOptions {
         codec: args.codec(),
         quality: args.quality,
@@ -139,22 +137,16 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         gray_only: args.gray_only,
         bits: args.bits,
         truth: args.truth.clone(),
+        cells: if args.safe_csv { Cells::Safe } else { Cells::Plain },
+        replace: args.force,
+        reads,
     };
-    let stop = Arc::new(AtomicBool::new(false));
-    let flag = Arc::clone(&stop);
-    ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed))?;
-    let bar = if args.quiet || !std::io::stderr().is_terminal() {
-        ProgressBar::hidden()
-    } else {
-        ProgressBar::new(film.frames()).with_style(
-            ProgressStyle::with_template("{bar:30} {pos}/{len} frames, {per_sec}, {eta} left")
-                .unwrap_or_else(|_| ProgressStyle::default_bar()),
-        )
-    };
+    let mut watch = Watch::new(args.quiet);
+    watch.stage(Stage::Draw, Some(film.frames()));
     write(&film, output, &options, &mut |done| {
-        bar.set_position(done);
-        if stop.load(Ordering::Relaxed) { Err(Error::Interrupted) } else { Ok(()) }
+        watch.progress(done);
+        if watch.interrupted() { Err(Error::Interrupted) } else { Ok(()) }
     })?;
-    bar.finish_and_clear();
+    watch.finish();
     Ok(ExitCode::SUCCESS)
 }

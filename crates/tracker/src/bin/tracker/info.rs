@@ -1,6 +1,6 @@
 //! `tracker info`: what a recording is, without tracking it.
 
-use std::io::Write;
+use std::ffi::OsString;
 use std::process::ExitCode;
 
 use rayon::prelude::*;
@@ -8,10 +8,12 @@ use serde_json::{Value, json};
 use tracker::brightest::brightest;
 use tracker::error::Error;
 use tracker::frame::{Ending, Frame, FrameSource, PixelFormat};
+use tracker::name::{shown, text};
 use tracker::pipeline;
 use tracker::source::{OpenOptions, open};
 use tracker::timing::{Steps, Timing, notes, rate_words, times_words};
 
+use crate::print;
 use crate::reading::DecodeArgs;
 use crate::words::CommandLine;
 
@@ -24,7 +26,7 @@ const BATCH_BYTES: usize = 32 << 20;
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// A recording, a folder of pictures, a pattern such as "img_%05d.png", or - for standard input
-    input: String,
+    input: OsString,
     /// Write JSON
     #[arg(long)]
     json: bool,
@@ -61,15 +63,14 @@ struct Times {
 /// Runs the subcommand.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let options = args.decode.options(args.fps, OpenOptions::default().threads);
-    let mut source = open(&args.input, &options)?;
+    let mut source = open(&text(&args.input), &options)?;
     let seen = look(&mut *source, args.count)?;
     let times = times(&*source, &seen)?;
-    let text = if args.json {
-        format!("{:#}\n", as_json(&*source, &seen, &times))
+    if args.json {
+        print::json(&as_json(&*source, &seen, &times))?;
     } else {
-        as_text(&*source, &seen, &times)
-    };
-    std::io::stdout().lock().write_all(text.as_bytes())?;
+        print::lines(&as_text(&*source, &seen, &times))?;
+    }
     let early = matches!(seen.ending, Some(Ending::Early { .. }));
     Ok(ExitCode::from(u8::from(early)))
 }
@@ -208,7 +209,7 @@ fn as_text(source: &dyn FrameSource, seen: &Seen, times: &Times) -> String {
     for warning in &info.warnings {
         row("warning", words.say(warning));
     }
-    rows.iter().map(|(word, value)| format!("{word:<14} {value}\n")).collect()
+    rows.iter().map(|(word, value)| format!("{word:<14} {}\n", shown(value))).collect()
 }
 
 /// Frames that there are without decoding them.
@@ -227,7 +228,7 @@ fn as_json(source: &dyn FrameSource, seen: &Seen, times: &Times) -> Value {
         }
     });
     json!({
-        "name": info.name,
+        "name": shown(&info.name),
         "container": info.container,
         "codec": info.codec,
         "width_px": info.width,

@@ -8,6 +8,7 @@ mod completions;
 mod film;
 mod info;
 mod overlay;
+mod print;
 mod reading;
 mod refusal;
 mod score;
@@ -26,21 +27,20 @@ fn main() -> ExitCode {
         Ok(cli) => cli,
         Err(error) => {
             let Some(line) = refusal::line(&error) else { error.exit() };
-            eprintln!("tracker: {line}");
+            print::say(line);
             return ExitCode::from(2);
         }
     };
     let front = words::CommandLine::of(cli.subcommand());
-    match cli.run() {
+    match watch::listen().and_then(|()| cli.run()) {
         Ok(status) => status,
         // Whoever reads our output may stop reading it.
         Err(error) if error.downcast_ref().is_some_and(is_closed) => ExitCode::SUCCESS,
         Err(error) => {
             let known: Option<&Error> = error.downcast_ref();
-            let said = known.map_or_else(|| format!("{error:#}"), |known| front.say(&known.message()));
-            eprintln!("tracker: {said}");
+            print::say(known.map_or_else(|| format!("{error:#}"), |known| front.say(&known.message())));
             let interrupted = matches!(known, Some(Error::Interrupted));
-            ExitCode::from(if interrupted { 130 } else { 2 })
+            ExitCode::from(if interrupted { watch::INTERRUPTED } else { 2 })
         }
     }
 }

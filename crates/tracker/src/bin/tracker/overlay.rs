@@ -2,12 +2,16 @@
 //!
 //! Owns: its arguments. Must not: draw.
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use tracker::error::Error;
+use tracker::name::text;
+use tracker::output;
 use tracker::overlay::{self, FilmSettings};
 use tracker::source::OpenOptions;
-use tracker::table::read_table;
+use tracker::table::{read_table, table_files};
 
 use crate::reading::DecodeArgs;
 use crate::watch::Watch;
@@ -16,7 +20,7 @@ use crate::watch::Watch;
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The recording
-    input: String,
+    input: OsString,
     /// Its node table
     nodes: PathBuf,
     /// The film, H.264
@@ -46,8 +50,10 @@ pub struct Args {
 
 /// Runs it.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let nodes = table_files(&args.nodes)?;
+    output::check(std::slice::from_ref(&args.output), &nodes, args.force).map_err(Error::Film)?;
     let table = read_table(&args.nodes)?;
-    let mut watch = Watch::new(args.quiet)?;
+    let mut watch = Watch::new(args.quiet);
     let settings = FilmSettings {
         play_fps: args.play_fps,
         quality: args.quality,
@@ -56,7 +62,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         replace: args.force,
     };
     overlay::film(
-        &args.input,
+        &text(&args.input),
         &args.decode.options(None, OpenOptions::default().threads),
         &table,
         &args.output,

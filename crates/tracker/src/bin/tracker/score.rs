@@ -1,12 +1,14 @@
 //! `tracker score`: a node table against the truth of a film.
 
-use std::io::Write;
+use std::fmt::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use tracker::film::Truth;
 use tracker::score::{LIMIT_PX, Score, Tracked, score};
 use tracker::table::read_table;
+
+use crate::print;
 
 /// Compare a node table with the truth that `tracker film` wrote
 ///
@@ -30,16 +32,17 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let table = read_table(&args.nodes)?;
     let truth = Truth::read(&args.truth)?;
     let s = score(&Tracked::from(&table), &truth, args.limit)?;
-    let mut out = std::io::stdout().lock();
     if args.json {
-        writeln!(out, "{}", serde_json::to_string_pretty(&s)?)?;
+        print::json(&serde_json::to_value(&s)?)?;
     } else {
-        print(&mut out, &s)?;
+        let mut out = String::new();
+        text(&mut out, &s)?;
+        print::lines(&out)?;
     }
     Ok(ExitCode::from(u8::from(s.wrong > 0 || s.switches > 0)))
 }
 
-fn print(out: &mut impl Write, s: &Score) -> std::io::Result<()> {
+fn text(out: &mut String, s: &Score) -> std::fmt::Result {
     writeln!(out, "frames            {} ({} of the truth missing)", s.frames, s.frames_missing)?;
     writeln!(out, "coverage          {:.3} % of {} rows", 100.0 * s.coverage, s.visible_rows)?;
     writeln!(out, "wrong identities  {}", s.wrong)?;

@@ -2,14 +2,18 @@
 //!
 //! Owns: its arguments, what is said of the result. Must not: find anything itself.
 
-use std::io::Write;
+use std::ffi::OsString;
+use std::fmt::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use tracker::error::{Error, Fault};
+use tracker::error::Error;
+use tracker::name::text;
 use tracker::pipeline::RunSettings;
-use tracker::{overlay, setup};
+use tracker::source;
+use tracker::{output, overlay, setup};
 
+use crate::print;
 use crate::reading::FollowArgs;
 use crate::watch::Watch;
 use crate::words::CommandLine;
@@ -18,7 +22,7 @@ use crate::words::CommandLine;
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The recording
-    input: String,
+    input: OsString,
     /// The rig file
     #[arg(short, long, value_name = "RIG.toml")]
     output: PathBuf,
@@ -38,34 +42,30 @@ pub struct Args {
 /// Runs it.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let picture = args.picture.clone().unwrap_or_else(|| args.output.with_extension("png"));
-    for path in [&args.output, &picture] {
-        if path.exists() && !args.force {
-            return Err(Error::Rig(Fault::exists(path)).into());
-        }
-    }
+    let input = text(&args.input);
+    let outputs = [args.output.clone(), picture.clone()];
+    output::check(&outputs, &source::files(&input)?, args.force).map_err(Error::Rig)?;
     let settings = RunSettings {
-        input: args.input,
+        input,
         open: args.follow.open(),
         frames: args.follow.frames.clone(),
         detect: args.follow.detect(),
         threads: args.follow.threads,
         ..RunSettings::default()
     };
-    let mut watch = Watch::new(args.quiet)?;
+    let mut watch = Watch::new(args.quiet);
     let found = setup::find(&settings, &mut watch)?;
     watch.finish();
     let rig = found.rig;
     overlay::save(&found.picture, &picture)?;
-    std::fs::write(&args.output, rig.to_toml()?).map_err(|e| {
-        Error::Rig(Fault::new(args.output.display(), format!("the rig file cannot be written ({e})")))
-    })?;
+    rig.write(&args.output)?;
     for warning in &found.warnings {
-        eprintln!("tracker: note: {}", CommandLine::of("setup").say(warning));
+        print::say(format!("note: {}", CommandLine::of("setup").say(warning)));
     }
     if !args.quiet {
-        let mut out = std::io::stdout();
+        let mut out = String::new();
         let index = rig.reference_frame.unwrap_or(0);
-        writeln!(out, "{}: {} nodes, reference frame {index}", args.output.display(), rig.nodes.len())?;
+        writeln!(out, "{}: {} nodes, reference frame {index}", text(&args.output), rig.nodes.len())?;
         for body in &rig.bodies {
             let nodes: Vec<&str> =
                 rig.nodes.iter().filter(|n| n.body == body.name).map(|n| n.name.as_str()).collect();
@@ -75,7 +75,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             let on = joint.bodies.join(" and ");
             writeln!(out, "  {} of {on} at ({:.1}, {:.1}) px", joint.name, joint.x_px, joint.y_px)?;
         }
-        writeln!(out, "{}: the picture", picture.display())?;
+        writeln!(out, "{}: the picture", text(&picture))?;
+        print::lines(&out)?;
     }
     Ok(ExitCode::SUCCESS)
 }

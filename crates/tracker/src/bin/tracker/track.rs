@@ -2,24 +2,28 @@
 //!
 //! Owns: its arguments, what is said of the result. Must not: do any of the work; `pipeline::run` does.
 
-use std::io::Write;
+use std::ffi::OsString;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use tracker::csv_text::Cells;
 use tracker::detect::{Centroid, DetectSettings};
-use tracker::pipeline::{Existing, RunSettings, RunSummary, run as run_pipeline};
+use tracker::error::Error;
+use tracker::name::{shown, text};
+use tracker::pipeline::{Existing, RunSettings, RunSummary, partial_path, run as run_pipeline};
 use tracker::rig::Rig;
 use tracker::table::RunEnding;
 
+use crate::print;
 use crate::reading::FollowArgs;
-use crate::watch::Watch;
+use crate::watch::{INTERRUPTED, Watch};
 use crate::words::CommandLine;
 
 /// Follow the markers of a recording and write a node table
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The recording; `-` is standard input
-    input: String,
+    input: OsString,
     /// The table, Parquet or CSV by the ending
     #[arg(short, long, value_name = "OUT.{parquet,csv}")]
     output: PathBuf,
@@ -37,6 +41,9 @@ pub struct Args {
     /// Replace the table if it is there already
     #[arg(long)]
     force: bool,
+    /// In a CSV put a ' before names that a spreadsheet would take for a formula; readers of ours take it off again
+    #[arg(long)]
+    safe_csv: bool,
     /// Print a summary as JSON
     #[arg(long)]
     json: bool,
@@ -54,7 +61,7 @@ enum CentroidArg {
 impl Args {
     fn settings(&self) -> tracker::error::Result<RunSettings> {
         Ok(RunSettings {
-            input: self.input.clone(),
+            input: text(&self.input),
             output: Some(self.output.clone()),
             existing: match (self.resume, self.force) {
                 (true, _) => Existing::Resume,
@@ -73,42 +80,49 @@ impl Args {
                 ..self.follow.detect()
             },
             threads: self.follow.threads,
+            cells: if self.safe_csv { Cells::Safe } else { Cells::Plain },
+            reads: self.rig.iter().cloned().collect(),
         })
     }
 }
 
 /// Runs it.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let mut watch = Watch::new(args.quiet)?;
-    let summary = run_pipeline(&args.settings()?, &mut watch)?;
+    let mut watch = Watch::new(args.quiet);
+    let outcome = run_pipeline(&args.settings()?, &mut watch);
     watch.finish();
     let front = CommandLine::of("track");
+    let state = partial_path(&args.output);
+    if matches!(outcome, Err(Error::Interrupted)) && state.exists() {
+        let state = text(&state);
+        print::say(format!("interrupted; {state} holds what was detected. Go on with --resume"));
+        return Ok(ExitCode::from(INTERRUPTED));
+    }
+    let summary = outcome?;
     if !args.quiet {
         for warning in &summary.warnings {
-            eprintln!("tracker: note: {}", front.say(warning));
+            print::say(format!("note: {}", front.say(warning)));
         }
     }
     let lost = summary.lost();
     let status = match &summary.meta.ending {
         RunEnding::Interrupted => {
-            eprintln!(
-                "tracker: interrupted after {} frames; {} holds them. Go on with --resume",
-                summary.frames,
-                args.output.display()
-            );
-            130
+            let go_on = if summary.resumable { ". Go on with --resume" } else { "" };
+            let output = text(&args.output);
+            print::say(format!("interrupted after {} frames; {output} holds them{go_on}", summary.frames));
+            INTERRUPTED
         }
         RunEnding::Early { frames, byte, reason } => {
             let at = byte.map(|b| format!(", byte {b}")).unwrap_or_default();
-            eprintln!(
-                "tracker: {}{at}: the recording ended early, after {frames} frames ({reason}). They are all in {}",
-                args.input,
-                args.output.display()
-            );
+            print::say(format!(
+                "{}{at}: the recording ended early, after {frames} frames ({reason}). They are all in {}",
+                text(&args.input),
+                text(&args.output)
+            ));
             1
         }
         RunEnding::Complete if !lost.is_empty() => {
-            eprintln!("tracker: not seen again up to the end: {}", lost.join(", "));
+            print::say(format!("not seen again up to the end: {}", lost.join(", ")));
             1
         }
         RunEnding::Complete => 0,
@@ -123,7 +137,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 
 fn print_json(args: &Args, summary: &RunSummary, status: u8) -> anyhow::Result<()> {
     let value = serde_json::json!({
-        "output": args.output,
+        "output": shown(&text(&args.output)),
         "status": status,
         "ending": summary.meta.ending,
         "frames": summary.frames,
@@ -133,13 +147,13 @@ fn print_json(args: &Args, summary: &RunSummary, status: u8) -> anyhow::Result<(
         "warnings": summary.warnings.iter().map(|w| CommandLine::of("track").say(w)).collect::<Vec<_>>(),
         "source": summary.meta.source,
     });
-    ignore_closed(writeln!(std::io::stdout(), "{}", serde_json::to_string_pretty(&value)?))
+    print::json(&value)
 }
 
 fn print_text(args: &Args, summary: &RunSummary) -> anyhow::Result<()> {
     let mut out = format!(
         "{}: {} frames, {} nodes\nnode      body            seen  missing  ambiguous  longest gap  sigma_px\n",
-        args.output.display(),
+        text(&args.output),
         summary.frames,
         summary.nodes.len()
     );
@@ -150,13 +164,5 @@ fn print_text(args: &Args, summary: &RunSummary) -> anyhow::Result<()> {
             n.node, n.body, n.seen, n.missing, n.ambiguous, n.longest_gap, sigma
         ));
     }
-    ignore_closed(write!(std::io::stdout(), "{out}"))
-}
-
-/// Whoever reads our output may stop reading it.
-fn ignore_closed(written: std::io::Result<()>) -> anyhow::Result<()> {
-    match written {
-        Err(e) if e.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
-        other => Ok(other?),
-    }
+    print::lines(&out)
 }

@@ -1,36 +1,58 @@
-//! A run as a person at a terminal sees it: a bar with rate and remaining time, and ctrl-c.
+//! A run as a person at a terminal sees it: a bar with rate and remaining time, ctrl-c, and what is printed.
 //!
-//! Owns: [`Watch`]. The first ctrl-c (or a termination signal) stops the run and closes the table, the second leaves.
+//! Owns: [`listen`], [`Watch`]. The first ctrl-c (or a termination signal) stops a run, which closes its table if that is
+//! done at once; the second leaves the table too. A command that has nothing to close ends at the first.
 
 use std::io::IsTerminal;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
 
 use anyhow::Context;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use tracker::pipeline::{Observer, Stage};
 
+/// How often the user asked to stop.
+static ASKED: AtomicUsize = AtomicUsize::new(0);
+/// When the user first did.
+static FIRST: OnceLock<Instant> = OnceLock::new();
+/// Whether somebody looks at it.
+static WATCHED: AtomicBool = AtomicBool::new(false);
+
+/// How long a run that was stopped may take to close its table.
+const PATIENCE: Duration = Duration::from_millis(800);
+
+/// Exit status of what the user stopped.
+pub const INTERRUPTED: u8 = 130;
+
+/// Begins to listen for ctrl-c and termination signals.
+pub fn listen() -> anyhow::Result<()> {
+    ctrlc::set_handler(|| {
+        FIRST.get_or_init(Instant::now);
+        ASKED.fetch_add(1, Ordering::Relaxed);
+        if !WATCHED.load(Ordering::Relaxed) {
+            eprintln!("tracker: interrupted");
+            std::process::exit(INTERRUPTED.into());
+        }
+    })
+    .context("ctrl-c cannot be listened to")
+}
+
 /// Shows progress on a terminal's standard error and hears ctrl-c.
 pub struct Watch {
     bar: ProgressBar,
-    asked: Arc<AtomicUsize>,
 }
 
 impl Watch {
-    /// Begins to listen; shows nothing if `quiet` or if standard error is no terminal.
-    pub fn new(quiet: bool) -> anyhow::Result<Self> {
-        let asked = Arc::new(AtomicUsize::new(0));
-        let count = Arc::clone(&asked);
-        ctrlc::set_handler(move || {
-            count.fetch_add(1, Ordering::Relaxed);
-        })
-        .context("ctrl-c cannot be listened to")?;
+    /// Begins to watch; shows nothing if `quiet` or if standard error is no terminal.
+    pub fn new(quiet: bool) -> Self {
+        WATCHED.store(true, Ordering::Relaxed);
         let target = if quiet || !std::io::stderr().is_terminal() {
             ProgressDrawTarget::hidden()
         } else {
             ProgressDrawTarget::stderr_with_hz(8)
         };
-        Ok(Self { bar: ProgressBar::with_draw_target(None, target), asked })
+        Self { bar: ProgressBar::with_draw_target(None, target) }
     }
 
     /// Takes the bar away.
@@ -42,6 +64,7 @@ impl Watch {
 impl Drop for Watch {
     fn drop(&mut self) {
         self.finish();
+        WATCHED.store(false, Ordering::Relaxed);
     }
 }
 
@@ -68,10 +91,10 @@ impl Observer for Watch {
     }
 
     fn interrupted(&mut self) -> bool {
-        self.asked.load(Ordering::Relaxed) > 0
+        ASKED.load(Ordering::Relaxed) > 0
     }
 
     fn abandoned(&mut self) -> bool {
-        self.asked.load(Ordering::Relaxed) > 1
+        ASKED.load(Ordering::Relaxed) > 1 || FIRST.get().is_some_and(|first| first.elapsed() >= PATIENCE)
     }
 }

@@ -288,6 +288,10 @@ impl Window {
         let reach = blob.axes().map(|v| 2.0 * v.sqrt());
         let radius = reach[0] + 2.0;
         let (inner, outer) = (radius * radius, (radius + 1.5).powi(2));
+        // Where all in all nothing rises above the background there is no centre by intensity: the marker is then somewhere
+        // in the blob's box, with the standard uncertainty of an even distribution over its longer side.
+        let side_px = f64::from((blob.x1 - blob.x0).max(blob.y1 - blob.y0) + 1);
+        let anywhere_px = (side_px / 12f64.sqrt()).hypot(SHAPE_PX);
         let mut result = Centre::default();
         let threshold = levels.threshold(cx, cy);
         let mut ground = std::mem::take(&mut self.ground);
@@ -331,7 +335,10 @@ impl Window {
                     }));
                 }
             }
-            if s <= 0.0 {
+            let moved = (sx / s).hypot(sy / s);
+            if s <= 0.0 || moved > radius {
+                [cx, cy] = blob.mean();
+                result.sigma_px = anywhere_px;
                 break;
             }
             // The background's own error moves nothing while the disc is whole.

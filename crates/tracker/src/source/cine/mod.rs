@@ -22,7 +22,7 @@ const LEAST_HEAD_BYTES: u64 = 44 + 40 + 65536;
 
 /// The bytes before the table of frames, which hold all that the header says.
 fn head(name: &str) -> std::io::Result<Vec<u8>> {
-    let file = File::open(name)?;
+    let file = File::open(crate::name::path(name))?;
     let mut table = [0; 4];
     // A file too short for it is told by the header's reader.
     let end = file.read_exact_at(&mut table, 32).map_or(0, |()| u64::from(u32::from_le_bytes(table)));

@@ -3,7 +3,7 @@
 //! Owns: [`Demuxer`], [`Packet`]. Must not: decode, or decide what a lost packet means.
 
 use std::ffi::{CStr, CString};
-use std::path::Path;
+use std::os::unix::ffi::OsStringExt;
 use std::ptr;
 
 use ffmpeg_next::ffi;
@@ -11,6 +11,7 @@ use ffmpeg_next::ffi;
 use super::boxes::Boxes;
 use super::{formats, message};
 use crate::error::{Error, Fault, Result};
+use crate::name::path;
 
 /// An open container with one video stream selected; all others are discarded unread.
 pub(super) struct Demuxer {
@@ -43,8 +44,8 @@ impl Demuxer {
                     .advice("Check that the file is complete and that `ffmpeg -i` reads it"),
             })
         };
-        let address =
-            CString::new(url).map_err(|_| Error::Source(Fault::new(name, "the name holds a zero byte")))?;
+        let address = CString::new(path(url).into_os_string().into_vec())
+            .map_err(|_| Error::Source(Fault::new(name, "the name holds a zero byte")))?;
         let mut options: *mut ffi::AVDictionary = ptr::null_mut();
         let formats = formats::allowed(protocols.is_none());
         for (option, list) in [(c"protocol_whitelist", protocols), (c"format_whitelist", Some(&*formats))] {
@@ -53,7 +54,7 @@ impl Demuxer {
                 unsafe { ffi::av_dict_set(&mut options, option.as_ptr(), list.as_ptr(), 0) };
             }
         }
-        let boxes = url.strip_prefix("file:").map_or_else(Boxes::default, |p| Boxes::of(Path::new(p)));
+        let boxes = url.strip_prefix("file:").map_or_else(Boxes::default, |p| Boxes::of(&path(p)));
         if boxes.edits_change_time {
             // SAFETY: as above. Only the reader of MP4 and QuickTime knows it.
             unsafe { ffi::av_dict_set(&mut options, c"ignore_editlist".as_ptr(), c"1".as_ptr(), 0) };

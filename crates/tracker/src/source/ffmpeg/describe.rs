@@ -72,7 +72,7 @@ pub(super) fn describe(
         rate_origin,
         claims,
         converted_from: layout.converted_from(),
-        size_bytes: std::fs::metadata(name).ok().filter(|m| m.is_file()).map(|m| m.len()),
+        size_bytes: std::fs::metadata(crate::name::path(name)).ok().filter(|m| m.is_file()).map(|m| m.len()),
         details,
         warnings,
     };

@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Fault, Result};
 use crate::message::Message;
+use crate::name::{path, text};
 
 /// Endings of files that are taken for pictures.
 const ENDINGS: [&str; 7] = ["png", "tif", "tiff", "bmp", "pgm", "jpg", "jpeg"];
@@ -32,12 +33,12 @@ pub fn is_pattern(name: &str) -> bool {
 /// # Errors
 /// [`Error::Source`] if there are none.
 pub fn list(name: &str) -> Result<Numbered> {
-    let path = Path::new(name);
+    let path = path(name);
     let (folder, pattern) = if path.is_dir() {
-        (path.to_owned(), None)
+        (path.clone(), None)
     } else {
         let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        (folder.to_owned(), path.file_name().map(|f| f.to_string_lossy().into_owned()))
+        (folder.to_owned(), path.file_name().map(text))
     };
     let entries = fs::read_dir(&folder).map_err(|e| {
         Error::Source(
@@ -48,7 +49,7 @@ pub fn list(name: &str) -> Result<Numbered> {
     let mut names: Vec<String> = entries
         .flatten()
         .filter(|e| e.path().is_file())
-        .map(|e| e.file_name().to_string_lossy().into_owned())
+        .map(|e| text(e.file_name()))
         .filter(|n| match &pattern {
             Some(p) => fits(p, n) && (!n.starts_with('.') || p.starts_with('.')),
             None => is_picture(n) && !n.starts_with('.'),
@@ -65,7 +66,7 @@ pub fn list(name: &str) -> Result<Numbered> {
     let mut numbered = gaps(&names);
     numbered.warnings.extend(left_out.map(Message::from));
     for file in numbered.files.iter_mut().flatten() {
-        *file = folder.join(&*file);
+        *file = folder.join(crate::name::path(&file.to_string_lossy()));
     }
     Ok(numbered)
 }

@@ -6,7 +6,7 @@ use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
 
-use opencv::core::{CV_8U, CV_16U};
+use opencv::core::{CV_8U, CV_16U, Vector};
 use opencv::imgcodecs;
 use opencv::prelude::{MatTraitConst, MatTraitConstManual};
 use tiff::decoder::Decoder;
@@ -56,8 +56,10 @@ pub fn read(path: &Path) -> Result<Picture, String> {
         return Ok(picture);
     }
     believable(head, &mut file)?;
-    let name = path.to_str().ok_or("its name is not UTF-8")?;
-    gray(imgcodecs::imread(name, imgcodecs::IMREAD_UNCHANGED).map_err(|e| short(&e.message))?)
+    // From memory: a name for OpenCV would have to be UTF-8.
+    let bytes = std::fs::read(path).map_err(|e| format!("it cannot be read ({e})"))?;
+    let bytes = Vector::<u8>::from_slice(&bytes);
+    gray(imgcodecs::imdecode(&bytes, imgcodecs::IMREAD_UNCHANGED).map_err(|e| short(&e.message))?)
 }
 
 /// Decodes a JPEG picture that lies in memory; an error is a clause without a full stop.
@@ -67,7 +69,7 @@ pub fn decode(jpeg: &[u8]) -> Result<Picture, String> {
     {
         return Err("it is no whole JPEG picture".to_owned());
     }
-    let bytes = opencv::core::Vector::<u8>::from_slice(jpeg);
+    let bytes = Vector::<u8>::from_slice(jpeg);
     gray(imgcodecs::imdecode(&bytes, imgcodecs::IMREAD_UNCHANGED).map_err(|e| short(&e.message))?)
 }
 

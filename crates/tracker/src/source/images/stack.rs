@@ -12,6 +12,7 @@ use super::{format, frame, rate};
 use crate::error::{Error, Fault, Result};
 use crate::frame::{Ending, Frame, FrameSource, RateClaims, SourceInfo};
 use crate::message::Message;
+use crate::name::path;
 use crate::source::OpenOptions;
 use crate::source::raw::RawFrames;
 
@@ -80,7 +81,7 @@ impl StackSource {
         let mut warnings = Vec::new();
         warnings.extend(declared.as_ref().and_then(|d| d.order()).map(Message::from));
         warnings.extend(planes::channels_of_ome(&mut pages.decoder, &layout).map(Message::from));
-        let size_bytes = std::fs::metadata(name).ok().map(|m| m.len());
+        let size_bytes = std::fs::metadata(path(name)).ok().map(|m| m.len());
         let (time_base, rate_hz, rate_origin) = rate(options, &mut warnings)?;
         let mut info = SourceInfo {
             name: name.to_owned(),
@@ -121,7 +122,7 @@ impl StackSource {
             info.codec = format!("{} bit pictures behind one page", layout.bits);
             info.converted_from = planes.converted_from();
             (info.depth_bits, info.format) = (planes.depth_bits, format(planes.depth_bits));
-            let file = File::open(name).map_err(|e| unreadable(e.to_string()))?;
+            let file = File::open(path(name)).map_err(|e| unreadable(e.to_string()))?;
             let raw = RawFrames::new(file, name, planes.stored);
             return Ok(Self {
                 info,
@@ -172,7 +173,7 @@ fn decoder(name: &str) -> Result<Decoder<BufReader<File>>> {
     let fault = |problem: String| {
         Error::Source(Fault::new(name, problem).advice("Check that the file was copied whole"))
     };
-    let file = File::open(name).map_err(|e| fault(format!("the file cannot be read ({e})")))?;
+    let file = File::open(path(name)).map_err(|e| fault(format!("the file cannot be read ({e})")))?;
     Decoder::new(BufReader::new(file)).map_err(|e| fault(format!("not a TIFF file that can be read ({e})")))
 }
 

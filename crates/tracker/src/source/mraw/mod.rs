@@ -18,6 +18,7 @@ use crate::frame::{
     Bytes, Ending, Frame, FrameSource, PixelFormat, RateClaims, RateOrigin, SourceInfo, TimeBase,
 };
 use crate::message::Setting;
+use crate::name::{path, text};
 use header::{Header, Packing};
 
 /// Longest header that is read; real ones have some kB.
@@ -36,14 +37,14 @@ pub struct MrawSource {
 
 /// Whether a file is one of a Photron pair, by what it starts with or, for pixels, by its ending.
 pub(crate) fn is_photron(name: &str, first_bytes: &[u8]) -> bool {
-    has_ending(Path::new(name), &["mraw"]) || is_header(name, first_bytes)
+    has_ending(&path(name), &["mraw"]) || is_header(name, first_bytes)
 }
 
 fn is_header(name: &str, first_bytes: &[u8]) -> bool {
     let text = first_bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(first_bytes);
     text.starts_with(b"#Camera Information Header")
         || cihx::is_cihx(first_bytes)
-        || has_ending(Path::new(name), &["cih", "cihx"])
+        || has_ending(&path(name), &["cih", "cihx"])
 }
 
 fn has_ending(path: &Path, endings: &[&str]) -> bool {
@@ -53,15 +54,15 @@ fn has_ending(path: &Path, endings: &[&str]) -> bool {
 /// The file beside `path` with the same stem and the first of `endings` that there is.
 fn partner(path: &Path, endings: &[&str]) -> Result<PathBuf> {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let stem = path.file_stem().map(|s| s.to_string_lossy().to_lowercase());
+    let stem = path.file_stem().map(|s| text(s).to_lowercase());
     let entries: Vec<PathBuf> =
         fs::read_dir(folder).map(|d| d.flatten().map(|e| e.path()).collect()).unwrap_or_default();
     endings
         .iter()
         .find_map(|ending| {
-            entries.iter().find(|p| {
-                has_ending(p, &[ending]) && p.file_stem().map(|s| s.to_string_lossy().to_lowercase()) == stem
-            })
+            entries
+                .iter()
+                .find(|p| has_ending(p, &[ending]) && p.file_stem().map(|s| text(s).to_lowercase()) == stem)
         })
         .cloned()
         .ok_or_else(|| {
@@ -74,6 +75,22 @@ fn partner(path: &Path, endings: &[&str]) -> Result<PathBuf> {
                 .advice("Copy both files of the recording into one folder"),
             )
         })
+}
+
+/// Both files of a recording.
+pub(crate) struct Pair {
+    pub header: PathBuf,
+    pub pixels: PathBuf,
+}
+
+/// Both files of the recording of which `name` is one.
+pub(crate) fn pair(name: &str) -> Result<Pair> {
+    let given = path(name);
+    Ok(if has_ending(&given, &["mraw"]) {
+        Pair { header: partner(&given, &["cihx", "cih"])?, pixels: given }
+    } else {
+        Pair { pixels: partner(&given, &["mraw"])?, header: given }
+    })
 }
 
 fn unreadable(path: &Path, error: &std::io::Error) -> Error {
@@ -89,16 +106,7 @@ impl MrawSource {
     /// # Errors
     /// [`Error::Source`] for a missing partner, a header that does not explain the pixels, or not one whole frame.
     pub fn open(name: &str, options: &OpenOptions) -> Result<Self> {
-        let path = Path::new(name);
-        let mut first_bytes = Vec::new();
-        File::open(path)
-            .and_then(|f| f.take(4096).read_to_end(&mut first_bytes))
-            .map_err(|e| unreadable(path, &e))?;
-        let (header_path, pixels_path) = if has_ending(path, &["mraw"]) {
-            (partner(path, &["cihx", "cih"])?, path.to_owned())
-        } else {
-            (path.to_owned(), partner(path, &["mraw"])?)
-        };
+        let Pair { header: header_path, pixels: pixels_path } = pair(name)?;
         let mut bytes = Vec::new();
         File::open(&header_path)
             .and_then(|f| f.take(HEADER_BYTES).read_to_end(&mut bytes))

@@ -63,7 +63,7 @@ impl NorpixSource {
                 Fault::new(name, format!("the file cannot be read ({e})")).advice("Check its permissions"),
             )
         };
-        let file = File::open(name).map_err(unreadable)?;
+        let file = File::open(crate::name::path(name)).map_err(unreadable)?;
         let size = file.metadata().map_err(unreadable)?.len();
         let mut bytes = Vec::new();
         (&file).take(HEADER_BYTES as u64).read_to_end(&mut bytes).map_err(unreadable)?;

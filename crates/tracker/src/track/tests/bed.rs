@@ -11,6 +11,7 @@ use crate::film::{Film, MotionTable, Scene, Truth, preset};
 use crate::observation::Status;
 use crate::rig::Rig;
 use crate::score::{LIMIT_PX, Score, Tracked, score};
+use crate::stop::Stop;
 use crate::store::{DetectionStore, FrameStamp};
 use crate::table::Rows;
 use crate::track::track_recording;
@@ -129,7 +130,7 @@ impl Bed {
         let mut tracked =
             Tracked { nodes: rig.nodes.iter().map(|n| n.name.clone()).collect(), ..Tracked::default() };
         let mut status = Vec::new();
-        track_recording(&self.store, rig, &mut |stamp, row| {
+        track_recording(&self.store, rig, &Stop::default(), &mut |stamp, row| {
             tracked.frames.push(stamp.index);
             for o in row {
                 tracked.xy_px.push([o.x_px, o.y_px]);
@@ -145,7 +146,7 @@ impl Bed {
     pub fn rows(&self, rig: &Rig) -> Rows {
         let mut rows = Rows::default();
         let rate_hz = self.film.scene().rate_hz;
-        track_recording(&self.store, rig, &mut |stamp, row| {
+        track_recording(&self.store, rig, &Stop::default(), &mut |stamp, row| {
             rows.push(stamp.index, stamp.index as f64 / rate_hz, row);
             Ok(())
         })
@@ -155,7 +156,7 @@ impl Bed {
 
     /// The rig found in it.
     pub fn discover(&self) -> Discovery {
-        discover(&self.store, self.film.scene().image_px).unwrap()
+        discover(&self.store, self.film.scene().image_px, &Stop::default()).unwrap()
     }
 }
 

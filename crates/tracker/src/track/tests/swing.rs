@@ -8,6 +8,7 @@ use rand_distr::{Distribution, Normal, Poisson};
 use crate::detect::{Detection, Flags};
 use crate::observation::{Observation, Status};
 use crate::rig::{Body, Joint, Node, Rig};
+use crate::stop::Stop;
 use crate::store::{DetectionStore, FrameStamp};
 use crate::track::track_recording;
 
@@ -265,7 +266,7 @@ pub fn judge(film: &Filmed, rig: &Rig) -> Marks {
     let mut m = Marks::default();
     let mut next = 0;
     let mut last = vec![false; rig.nodes.len()];
-    track_recording(&film.store, rig, &mut |stamp: &FrameStamp, row: &[Observation]| {
+    track_recording(&film.store, rig, &Stop::default(), &mut |stamp: &FrameStamp, row: &[Observation]| {
         assert_eq!(stamp.index, next, "every frame once and in order");
         next += 1;
         m.frames += 1;
@@ -367,7 +368,7 @@ fn rigs_are_discovered() {
     for (name, scene) in &scenes() {
         for seed in seeds() {
             let film = Swing { seed, ..scene.clone() }.film();
-            let found = match crate::discover::discover(&film.store, [1280, 1024]) {
+            let found = match crate::discover::discover(&film.store, [1280, 1024], &Stop::default()) {
                 Ok(d) => d,
                 Err(e) => {
                     bad.push(format!("{name} {seed}: {e}"));

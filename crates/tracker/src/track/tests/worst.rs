@@ -75,7 +75,9 @@ fn two_equal_links_are_told_apart_by_what_they_hang_on() {
         // Merged blobs are no one's place; at most some percent of the rows.
         assert!(s.coverage > 0.93, "{seed} {}", s.coverage);
         // Which is which must be said.
-        let refused = crate::discover::discover(&bed.store, [720, 720]).unwrap_err().to_string();
+        let refused = crate::discover::discover(&bed.store, [720, 720], &crate::stop::Stop::default())
+            .unwrap_err()
+            .to_string();
         assert!(refused.contains("markers alike"), "{refused}");
     }
 }

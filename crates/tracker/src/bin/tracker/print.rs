@@ -1,0 +1,30 @@
+//! What is printed: names and texts out of files never reach a terminal as they are.
+//!
+//! Must not: print anything unasked.
+
+use std::io::{self, Write};
+
+use tracker::name::{shown, shown_json, shown_lines};
+
+/// Results on standard output, some lines. Whoever reads them may stop reading.
+pub fn lines(text: &str) -> anyhow::Result<()> {
+    ignore_closed(io::stdout().write_all(shown_lines(text).as_bytes()))
+}
+
+/// Results on standard output as JSON.
+pub fn json(value: &serde_json::Value) -> anyhow::Result<()> {
+    let text = shown_json(&serde_json::to_string_pretty(value)?);
+    ignore_closed(writeln!(io::stdout(), "{text}"))
+}
+
+/// A message on standard error.
+pub fn say(message: impl std::fmt::Display) {
+    eprintln!("tracker: {}", shown(&message.to_string()));
+}
+
+fn ignore_closed(written: io::Result<()>) -> anyhow::Result<()> {
+    match written {
+        Err(e) if e.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        other => Ok(other?),
+    }
+}
