@@ -14,6 +14,7 @@ from tempfile import mkdtemp
 import numpy as np
 import pydpend as dp
 from nptdms import ChannelObject, RootObject, TdmsWriter
+from pydpend.model import CONSTANTS
 
 from tests.mutate import TRACKER, Call, Format
 
@@ -164,9 +165,9 @@ def _made() -> Path:
     )
     dp.calibrate(dp.read_holds([folder / "holds.csv"])).write(folder / "encoder.json")
     shutil.copy(FIXTURES.parent / "docs" / "model-a.toml", folder / "model.toml")
+    constants = zip(CONSTANTS, dp.derived("A").constants().tolist(), strict=True)
     (folder / "constants.toml").write_text(
-        "g_m_s2 = 9.81\n[constants]\npsi_kg_m2 = [1e-3, 1e-6]\nlambda_kg_m2 = 4e-4\nsigma_j = 0.1\nkappa_j = 0.05\n"
-        "l1_m = 0.17\nm2_kg = 0.1\n"
+        "g_m_s2 = 9.81\n[constants]\n" + "".join(f"{name} = {value!r}\n" for name, value in constants)
     )
     _run(
         *(
