@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from pydpend.nodes import AMBIGUOUS, MISSING, REACQUIRED, SEEN, Joint, Node, Nodes, Rig
+from pydpend.nodes import AMBIGUOUS, MISSING, REACQUIRED, SEEN, UNDECODED, Joint, Node, Nodes, Rig
 
 RIG = Rig(
     image_px=(640, 480),
@@ -40,6 +40,8 @@ META: dict[str, Any] = {
 def some_nodes(frames: int = 50, seed: int = 3) -> Nodes:
     rng = np.random.default_rng(seed)
     status = rng.choice([SEEN, SEEN, SEEN, REACQUIRED, MISSING, AMBIGUOUS], (frames, 3)).astype(np.uint8)
+    # Frames that could not be decoded.
+    status[frames // 2 : frames // 2 + 2] = UNDECODED
     seen = (status == SEEN) | (status == REACQUIRED)
     return Nodes(
         frame=np.arange(10, 10 + frames, dtype=np.int64),

@@ -13,6 +13,7 @@ import pyarrow.parquet as pq
 import pydpend as dp
 import pytest
 from pydpend.nodes import MISSING, SEEN, Node, Nodes, Rig
+from pydpend.plots.nodes import nodes_figure
 
 from tests.drawn_nodes import RIG, some_nodes
 
@@ -266,3 +267,34 @@ def test_files_that_are_no_node_tables_are_refused(tmp_path: Path) -> None:
         dp.read_nodes(path)
     with pytest.raises(dp.TableError, match="No such file"):
         dp.read_nodes(tmp_path / "none.parquet")
+
+
+def test_damage_is_told_and_undecoded_frames_are_drawn(tmp_path: Path) -> None:
+    nodes = some_nodes()
+    damage = {
+        "undecoded": {"frames": 2, "stretches": [[35, 36]]},
+        "gaps": {
+            "places": [{"after": 40, "frames": 3, "cause": "damage"}],
+            "lost_frames": 3,
+            "lost_places": 1,
+            "dropped_frames": 0,
+        },
+    }
+    told = replace(nodes, meta={**nodes.meta, "ending": {"kind": "damaged"}, "damage": damage})
+    told.write(tmp_path / "t.parquet")
+    back = dp.read_nodes(tmp_path / "t.parquet")
+    assert nodes.damage is None
+    assert not back.complete
+    assert back.damage == (
+        "damaged: frames 35-36 cannot be decoded; 3 frames are lost between frames 40 and 41 (gap in the time stamps)"
+    )
+    assert (back.status[25:27] == dp.nodes.UNDECODED).all()
+    assert not back.seen[25:27].any()
+    words = back.to_dataframe()["status"]
+    assert (words[words == "undecoded"].index // 3).unique().tolist() == [25, 26]
+    legend = nodes_figure(back, np.full((50, 3), np.nan)).legends[0]
+    assert [t.get_text() for t in legend.get_texts()] == list(dp.nodes.STATUS_WORDS)
+    half = back.status.copy()
+    half[25, 0] = dp.nodes.MISSING
+    with pytest.raises(dp.TableError, match="frame 35 is undecoded for one of the nodes n0 and n1 only"):
+        replace(back, status=half).check()

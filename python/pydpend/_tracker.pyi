@@ -30,6 +30,7 @@ __all__ = [
     "arrow_reader",
     "check_outputs",
     "check_table",
+    "damage_words",
     "detect",
     "fingerprint",
     "follow_motion",
@@ -141,6 +142,7 @@ class LiveTracker:
 def read_table(path: str) -> Columns:
     """frame (T,), time in s (T,), centres in px (T, N, 2), sigma in px, area in px and status (T, N), JSON."""
 
+def damage_words(damage: str) -> str | None: ...
 def read_meta(path: str) -> str:
     """The metadata of a node table as JSON."""
 

@@ -21,10 +21,11 @@ from pydpend.output import AnyPath
 if TYPE_CHECKING:
     import pandas as pd
 
-MISSING, SEEN, REACQUIRED, AMBIGUOUS = range(4)
-"""Numbers in `Nodes.status`: not seen; seen; the first frame back; may be it, but another name is possible."""
+MISSING, SEEN, REACQUIRED, AMBIGUOUS, UNDECODED = range(5)
+"""Numbers in `Nodes.status`: not seen; seen; the first frame back; may be it, but another name is possible; the
+frame could not be decoded."""
 
-STATUS_WORDS = ("missing", "seen", "reacquired", "ambiguous")
+STATUS_WORDS = ("missing", "seen", "reacquired", "ambiguous", "undecoded")
 
 
 @dataclass(frozen=True)
@@ -153,9 +154,10 @@ class Nodes:
         xy_px: centres in px, (T, N, 2); x right, y down.
         sigma_px: standard uncertainty of each coordinate in px, (T, N).
         area_px: blob area in px, (T, N).
-        status: `MISSING`, `SEEN`, `REACQUIRED` or `AMBIGUOUS`, (T, N).
+        status: `MISSING`, `SEEN`, `REACQUIRED`, `AMBIGUOUS` or `UNDECODED`, (T, N).
         rig: the rig; its nodes are in the order of the arrays.
-        meta: recording (`source`), `settings`, program (`tool`) and `ending` of the run, as in the table.
+        meta: recording (`source`), `settings`, program (`tool`), `ending` of the run and, if frames
+            are lost, `damage`, as in the table.
     """
 
     frame: NDArray[np.int64]
@@ -188,6 +190,16 @@ class Nodes:
         """Whether the run came to the end of what it was asked for and the recording was whole."""
         ending = self.meta.get("ending", {})
         return bool(ending.get("kind") == "complete")
+
+    @property
+    def damage(self) -> str | None:
+        """What of the recording is lost, in a sentence; None if nothing is.
+
+        Raises:
+            TableError: if ``meta["damage"]`` is not that of a table.
+        """
+        damage = self.meta.get("damage")
+        return None if damage is None else _tracker.damage_words(json.dumps(damage))
 
     def check(self) -> None:
         """Checks the table's invariants: shapes, increasing frames and times, places exactly where seen.

@@ -28,6 +28,7 @@ Progress: TypeAlias = Callable[[str, int, int | None], object] | bool | None
 Polarity: TypeAlias = Literal["auto", "bright", "dark"]
 Centroid: TypeAlias = Literal["weighted", "contour"]
 Decoder: TypeAlias = Literal["auto", "ffmpeg", "opencv"]
+Interlaced: TypeAlias = Literal["refuse", "as-frames"]
 
 DETECTION = np.dtype(
     [
@@ -143,6 +144,7 @@ def track(
     polarity: Polarity = "auto",
     centroid: Centroid = "weighted",
     decoder: Decoder = "auto",
+    interlaced: Interlaced = "refuse",
     allow_protocol: bool = False,
 ) -> Nodes:
     """Follows the markers of a recording.
@@ -163,6 +165,8 @@ def track(
         polarity: whether markers are brighter or darker than what is around them.
         centroid: by intensity, or by OpenCV's contours as in the paper.
         decoder: what reads compressed film.
+        interlaced: how film is read whose pictures hold two fields, filmed one after the other: not at all, or each
+            picture as one (for cameras that filmed whole pictures and only say that they are interlaced).
         allow_protocol: open network addresses and devices too.
 
     Returns:
@@ -186,7 +190,7 @@ def track(
             _rig(rig),
             _frames(frames),
             (threshold, polarity, centroid),
-            (fps, decoder, allow_protocol, _threads(threads)),
+            (fps, decoder, interlaced, allow_protocol, _threads(threads)),
             None if output is None else os.fsdecode(output),
             existing,
             safe_csv,
@@ -230,6 +234,7 @@ def setup(
     threshold: float | None = None,
     polarity: Polarity = "auto",
     decoder: Decoder = "auto",
+    interlaced: Interlaced = "refuse",
     allow_protocol: bool = False,
 ) -> Setup:
     """Finds markers, bodies and joints of a recording.
@@ -239,7 +244,8 @@ def setup(
         output: a rig file to write, to be looked at and edited.
         picture: an image file to write, for example .png: the reference frame with all that was found.
         force: replace `output` and `picture` if they are there already.
-        fps, frames, threads, progress, threshold, polarity, decoder, allow_protocol: as in `track`.
+        fps, frames, threads, progress, threshold, polarity, decoder, interlaced,
+            allow_protocol: as in `track`.
 
     Raises:
         SourceError, DetectError, RigError, ArgumentError: as `track`.
@@ -252,7 +258,7 @@ def setup(
             os.fsdecode(path),
             _frames(frames),
             (threshold, polarity, "weighted"),
-            (fps, decoder, allow_protocol, _threads(threads)),
+            (fps, decoder, interlaced, allow_protocol, _threads(threads)),
             None if output is None else os.fsdecode(output),
             None if picture is None else os.fsdecode(picture),
             force,
@@ -292,6 +298,7 @@ def overlay(
     force: bool = False,
     progress: Progress = None,
     decoder: Decoder = "auto",
+    interlaced: Interlaced = "refuse",
     allow_protocol: bool = False,
 ) -> OverlayFilm:
     """Draws nodes, names, bodies, trails and gaps into their recording.
@@ -305,7 +312,7 @@ def overlay(
         play_fps: pictures a second at which it plays.
         quality: x264's rate factor, 0 (best, largest) to 51.
         force: replace `output` if it is there already.
-        progress, decoder, allow_protocol: as in `track`.
+        progress, decoder, interlaced, allow_protocol: as in `track`.
 
     Returns:
         The film's file and which frames and times its pictures are of.
@@ -327,7 +334,7 @@ def overlay(
             nodes._columns(),
             nodes._meta_json(),
             os.fsdecode(output),
-            (None, decoder, allow_protocol, 0),
+            (None, decoder, interlaced, allow_protocol, 0),
             _count("every", every),
             None if width is None else _count("width", width),
             _count("play_fps", play_fps),
@@ -356,7 +363,8 @@ def info(
     Raises:
         SourceError: if it cannot be opened, or its time stamps stand still.
     """
-    known: dict[str, Any] = json.loads(_tracker.info(os.fsdecode(path), (fps, decoder, allow_protocol, 0)))
+    opened = (fps, decoder, "as-frames", allow_protocol, 0)
+    known: dict[str, Any] = json.loads(_tracker.info(os.fsdecode(path), opened))
     return known
 
 

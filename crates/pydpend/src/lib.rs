@@ -29,8 +29,8 @@ mod _tracker {
     use super::smoothing::{learn_noise, smooth_angles};
     #[pymodule_export]
     use super::tables::{
-        arrow_reader, check_table, kind_of, misplaced, read_meta, read_rig, read_table, rig_toml, write_rig,
-        write_table,
+        arrow_reader, check_table, damage_words, kind_of, misplaced, read_meta, read_rig, read_table,
+        rig_toml, write_rig, write_table,
     };
     #[pymodule_export]
     use super::track::{check_outputs, fingerprint, info, overlay_film, recording_files, setup, track};

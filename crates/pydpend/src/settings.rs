@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 use tracker::csv_text::Cells;
 use tracker::detect::{Centroid, DetectSettings, Polarity, Threshold};
 use tracker::rig::Rig;
-use tracker::source::{Decoder, OpenOptions};
+use tracker::source::{Decoder, Interlaced, OpenOptions};
 
 use crate::errors::{argument, raise};
 
@@ -45,12 +45,13 @@ pub fn detect_settings(py: Python<'_>, given: &DetectArguments) -> PyResult<Dete
     })
 }
 
-/// How a recording is read: rate or `None`, decoder, whether addresses may be opened, threads.
-pub type OpenArguments = (Option<f64>, String, bool, usize);
+/// How a recording is read: rate or `None`, decoder, how interlaced film is read, whether addresses may be opened,
+/// threads.
+pub type OpenArguments = (Option<f64>, String, String, bool, usize);
 
 /// Reading options of keyword arguments.
 pub fn open_options(py: Python<'_>, given: &OpenArguments) -> PyResult<OpenOptions> {
-    let (fps, decoder, allow_protocol, threads) = given;
+    let (fps, decoder, interlaced, allow_protocol, threads) = given;
     Ok(OpenOptions {
         fps: *fps,
         decoder: word(
@@ -58,6 +59,12 @@ pub fn open_options(py: Python<'_>, given: &OpenArguments) -> PyResult<OpenOptio
             "decoder",
             decoder,
             &[("auto", Decoder::Auto), ("ffmpeg", Decoder::Ffmpeg), ("opencv", Decoder::Opencv)],
+        )?,
+        interlaced: word(
+            py,
+            "interlaced",
+            interlaced,
+            &[("refuse", Interlaced::Refuse), ("as-frames", Interlaced::AsFrames)],
         )?,
         allow_protocol: *allow_protocol,
         threads: *threads,

@@ -14,6 +14,7 @@ use numpy::{
 use pyo3::prelude::*;
 use pyo3_arrow::PyRecordBatchReader;
 use tracker::error::{Error, Fault};
+use tracker::gaps::Damage;
 use tracker::kind::{self, Kind};
 use tracker::rig::Rig;
 use tracker::table::{self, NodeTable, Rows, TableMeta};
@@ -103,6 +104,15 @@ pub fn table_of(py: Python<'_>, held: &Held<'_>, meta: &str) -> PyResult<NodeTab
     let meta = TableMeta::from_json(meta, "nodes.meta").map_err(|e| raise(py, e))?;
     let rows = rows_of(py, held, meta.rig.nodes.len())?;
     Ok(NodeTable { meta, rows })
+}
+
+/// What of the recording is lost by a table's `meta["damage"]`, in a sentence; `None` if nothing is.
+#[pyfunction]
+pub fn damage_words(py: Python<'_>, damage: &str) -> PyResult<Option<String>> {
+    let damage: Damage = serde_json::from_str(damage).map_err(|e| {
+        raise(py, Error::Table(Fault::new("meta", format!("its damage is not that of a node table ({e})"))))
+    })?;
+    Ok(damage.words())
 }
 
 /// Writes a node table, Parquet or CSV by the ending of `path`.

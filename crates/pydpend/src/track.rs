@@ -35,7 +35,7 @@ fn settings(
         rig: rig(py, rig_text)?,
         frames: frames.map(|(start, end)| start..end.unwrap_or(u64::MAX)),
         detect: detect_settings(py, detect)?,
-        threads: open.3,
+        threads: open.4,
         open: open_options(py, open)?,
         ..RunSettings::default()
     })

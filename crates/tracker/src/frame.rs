@@ -8,6 +8,7 @@
 use std::fmt;
 
 use crate::error::{Error, Fault, Result};
+use crate::gaps::Gaps;
 use crate::message::Message;
 
 /// How the samples of one row are stored.
@@ -237,6 +238,11 @@ pub trait FrameSource: Send {
     /// Where the recording cannot be read at all.
     fn stamps(&mut self) -> Result<Option<(Vec<i64>, bool)>> {
         Ok(None)
+    }
+
+    /// Frames that are not there between those that were handed out so far.
+    fn gaps(&self) -> Gaps {
+        Gaps::default()
     }
 
     /// Up to `count` decoded frames spread over the recording, for learning thresholds and noise; their

@@ -17,6 +17,7 @@ pub mod discover;
 pub mod error;
 pub mod film;
 pub mod frame;
+pub mod gaps;
 pub mod kind;
 pub mod message;
 pub mod name;

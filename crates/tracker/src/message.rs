@@ -30,6 +30,8 @@ pub enum Setting {
     Frames,
     /// A film that is made has no colour planes; a switch.
     GrayOnly,
+    /// How interlaced film is read.
+    Interlaced,
     /// The largest area of a marker.
     MaxAreaPx,
     /// The smallest area of a marker.
@@ -60,7 +62,7 @@ pub enum Setting {
 
 impl Setting {
     /// All of them.
-    pub const ALL: [Self; 22] = [
+    pub const ALL: [Self; 23] = [
         Self::AllowProtocol,
         Self::Bits,
         Self::Codec,
@@ -70,6 +72,7 @@ impl Setting {
         Self::Fps,
         Self::Frames,
         Self::GrayOnly,
+        Self::Interlaced,
         Self::MaxAreaPx,
         Self::MinAreaPx,
         Self::Output,
@@ -97,6 +100,7 @@ impl Setting {
             Self::Fps => "fps",
             Self::Frames => "frames",
             Self::GrayOnly => "gray_only",
+            Self::Interlaced => "interlaced",
             Self::MaxAreaPx => "max_area_px",
             Self::MinAreaPx => "min_area_px",
             Self::Output => "output",

@@ -15,6 +15,8 @@ pub enum Status {
     Reacquired = 2,
     /// Something is seen that may be it, but another name is possible too; its place is not given.
     Ambiguous = 3,
+    /// The frame could not be decoded, so nothing is known of any node in it.
+    Undecoded = 4,
 }
 
 impl Status {
@@ -25,6 +27,7 @@ impl Status {
             Status::Seen => "seen",
             Status::Reacquired => "reacquired",
             Status::Ambiguous => "ambiguous",
+            Status::Undecoded => "undecoded",
         }
     }
 
@@ -35,7 +38,7 @@ impl Status {
 
     /// The status of a number, `None` if there is none.
     pub fn from_number(number: u8) -> Option<Self> {
-        [Status::Missing, Status::Seen, Status::Reacquired, Status::Ambiguous]
+        [Status::Missing, Status::Seen, Status::Reacquired, Status::Ambiguous, Status::Undecoded]
             .get(usize::from(number))
             .copied()
     }
@@ -65,4 +68,6 @@ impl Observation {
         area_px: f32::NAN,
         status: Status::Missing,
     };
+    /// A node in a frame that could not be decoded.
+    pub const UNDECODED: Self = Self { status: Status::Undecoded, ..Self::MISSING };
 }

@@ -50,6 +50,10 @@ pub fn find(settings: &RunSettings, observer: &mut dyn Observer) -> Result<Setup
         return Err(Error::Interrupted);
     }
     let mut warnings = summary.warnings;
+    warnings.extend(summary.meta.damage.words().map(Into::into));
+    if let RunEnding::Early { reason, .. } = &summary.meta.ending {
+        warnings.push(format!("the recording ended early: {reason}").into());
+    }
     let rig = summary.meta.rig;
     if let Some(table) = &summary.table {
         warnings

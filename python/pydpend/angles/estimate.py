@@ -78,7 +78,8 @@ def angles(
     notes: list[str] = list(raw.meta.pop("notes", ()))
     ending = nodes.meta.get("ending")
     if isinstance(ending, dict) and ending.get("kind") != "complete":
-        notes.append(f"the node table is not of the whole recording ({ending.get('kind')})")
+        why = nodes.damage or ending.get("reason") or ending.get("kind")
+        notes.append(f"the node table is not of the whole recording ({why})")
     phi = _unwrapped(nodes, raw.theta, markers, label, gaps, notes)
     offset, zero_meta, doubts = zero_for(nodes, phi, raw, markers, zero, bodies, mirrored, label)
     notes += doubts

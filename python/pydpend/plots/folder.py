@@ -206,7 +206,7 @@ class Drawing:
 
 DRAWINGS = {
     "nodes": Drawing(
-        "each node over time: seen, missing, reacquired, ambiguous; distance to the shape",
+        "each node over time: seen, missing, reacquired, ambiguous, undecoded; distance to the shape",
         _nodes,
         "residuals.parquet",
     ),

@@ -11,8 +11,8 @@ from pydpend.nodes import STATUS_WORDS, Nodes
 from pydpend.plots.angles import thinned
 from pydpend.plots.style import COLORS, new_figure, plain, style
 
-STATUS_COLORS = ("0.85", COLORS[2], COLORS[0], COLORS[1])
-"""Missing, seen, reacquired, ambiguous."""
+STATUS_COLORS = ("0.85", COLORS[2], COLORS[0], COLORS[1], COLORS[3])
+"""Missing, seen, reacquired, ambiguous, undecoded."""
 
 
 def nodes_figure(nodes: Nodes, residual_px: NDArray[np.float64]) -> Figure:
@@ -32,7 +32,7 @@ def nodes_figure(nodes: Nodes, residual_px: NDArray[np.float64]) -> Figure:
             status = nodes.status[:, i]
             first = np.concatenate(([0], np.flatnonzero(np.diff(status)) + 1))
             last = np.append(first[1:], status.size) - 1
-            for code in range(4):
+            for code in range(len(STATUS_WORDS)):
                 rows = status[first] == code
                 spans = list(
                     zip(nodes.t_s[first[rows]], ends[last[rows]] - nodes.t_s[first[rows]], strict=True)
@@ -57,6 +57,6 @@ def nodes_figure(nodes: Nodes, residual_px: NDArray[np.float64]) -> Figure:
         figure.legend(
             handles=[Patch(color=c, label=w) for c, w in zip(STATUS_COLORS, STATUS_WORDS, strict=True)],
             loc="outside lower center",
-            ncols=4,
+            ncols=len(STATUS_WORDS),
         )
     return figure

@@ -160,6 +160,7 @@ class StatusMap(_Block):
         ("reacquired", "--s0"),
         ("ambiguous", "--s1"),
         ("missing", "--line"),
+        ("undecoded", "--s3"),
     )
 
 

@@ -297,8 +297,10 @@ def read(folder: Path, facts: dict[str, Any], stages: set[str]) -> Part:
             part.warnings += [f"{part.label}: {w}" for w in time.get("notes", [])]
         part.warnings += [f"{part.label}: {w}" for w in nodes.meta.get("warnings", [])]
         ending = nodes.meta.get("ending")
-        if isinstance(ending, dict) and ending.get("early"):
-            part.warnings.append(f"{part.label}: the recording ended early: {ending['early']}")
+        if isinstance(ending, dict) and ending.get("kind") == "early":
+            part.warnings.append(f"{part.label}: the recording ended early: {ending.get('reason')}")
+        if nodes.damage is not None:
+            part.warnings.append(f"{part.label}: {nodes.damage}")
     if f"{name}/markers" in stages and part.nodes is not None:
         columns = read_table(here / "residuals.parquet")
         part.residual_px = np.column_stack([columns[f"node{i}_px"] for i in range(len(part.nodes.rig.nodes))])

@@ -11,6 +11,7 @@ use crossbeam_channel::{Receiver, Sender, bounded};
 
 use crate::error::{Error, Fault, Result};
 use crate::frame::{Ending, Frame, FrameSource};
+use crate::gaps::Gaps;
 
 /// Bytes of frames in a batch: a large frame is handed on as soon as it is there, while caches hold it.
 const BATCH_BYTES: usize = 1 << 20;
@@ -25,11 +26,20 @@ pub struct Batch {
     pub frames: Vec<Frame>,
 }
 
+/// How reading ended.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct End {
+    /// How the recording ended.
+    pub ending: Ending,
+    /// Frames that are not there between those that were asked for.
+    pub gaps: Gaps,
+}
+
 /// Frames of a source, read ahead.
 pub struct Ahead {
     batches: Receiver<Batch>,
     stop: Arc<AtomicBool>,
-    reader: JoinHandle<Result<Ending>>,
+    reader: JoinHandle<Result<End>>,
 }
 
 impl Ahead {
@@ -50,8 +60,8 @@ impl Ahead {
         &self.batches
     }
 
-    /// How the recording ended, once the last batch is out.
-    pub fn ending(self) -> Result<Ending> {
+    /// How reading ended, once the last batch is out.
+    pub fn end(self) -> Result<End> {
         self.reader.join().unwrap_or_else(|_| {
             Err(Error::Source(Fault::new("source", "the decoder failed; please report this")))
         })
@@ -68,7 +78,7 @@ fn read(
     frames: &Range<u64>,
     sender: &Sender<Batch>,
     stop: &AtomicBool,
-) -> Result<Ending> {
+) -> Result<End> {
     let mut batch = Batch { first: 0, frames: Vec::new() };
     let mut size = 1;
     let mut ending = Ending::Complete;
@@ -91,7 +101,7 @@ fn read(
         if batch.frames.len() == size {
             let next = Batch { first: batch.first + size, frames: Vec::new() };
             if sender.send(std::mem::replace(&mut batch, next)).is_err() {
-                return Ok(ending);
+                return Ok(End { ending, gaps: Gaps::default() });
             }
         }
     }
@@ -99,7 +109,7 @@ fn read(
         // The receivers may be gone; then nobody asks for the ending either.
         let _ = sender.send(batch);
     }
-    Ok(ending)
+    Ok(End { ending, gaps: source.gaps().within(frames) })
 }
 
 /// Frames in a batch: so many that handing them on costs nothing beside detecting in them.

@@ -11,10 +11,10 @@ use std::time::Duration;
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
 
 use super::Observer;
-use super::ahead::{Ahead, Batch};
+use super::ahead::{Ahead, Batch, End};
 use crate::detect::{DetectSettings, Detection, Detector, Levels};
 use crate::error::{Error, Fault, Place, Result};
-use crate::frame::{Ending, FrameSource};
+use crate::frame::FrameSource;
 use crate::message::Setting;
 use crate::source::cores;
 use crate::store::{DetectionStore, FrameStamp};
@@ -119,7 +119,7 @@ pub fn detect_all(
     detectors: &mut Detectors,
     store: &mut DetectionStore,
     observer: &mut dyn Observer,
-) -> Result<Option<Ending>> {
+) -> Result<Option<End>> {
     let ahead = Ahead::start(source, frames)?;
     let known = store.len();
     let stop = AtomicBool::new(false);
@@ -152,7 +152,7 @@ pub fn detect_all(
         complete
     });
     match complete {
-        Ok(true) => ahead.ending().map(Some),
+        Ok(true) => ahead.end().map(Some),
         Ok(false) => {
             ahead.leave();
             Ok(None)

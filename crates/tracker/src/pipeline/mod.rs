@@ -28,11 +28,12 @@ use crate::detect::{DetectSettings, Levels};
 use crate::discover::{Discovery, discover};
 use crate::error::{Error, Fault, Result};
 use crate::frame::{Ending, FrameSource, SourceInfo};
+use crate::gaps::Damage;
 use crate::message::{Message, SETUP, Setting};
 use crate::name::{shown, text};
 use crate::output;
 use crate::rig::Rig;
-use crate::source::{self, OpenOptions, threads_note};
+use crate::source::{self, Interlaced, OpenOptions, threads_note};
 use crate::store::{DetectionStore, Spool};
 use crate::table::{
     Fingerprint, NodeSummary, NodeTable, Rows, RunEnding, SCHEMA_VERSION, SourceFacts, TableMeta,
@@ -40,6 +41,7 @@ use crate::table::{
 };
 use crate::timing::{self, Clock, Steps, Timing};
 use crate::track::track_recording;
+use ahead::End;
 use state::State;
 
 /// What to do where the output is there already.
@@ -82,6 +84,11 @@ pub struct RunSettings {
 }
 
 impl RunSettings {
+    /// How interlaced film is read, `null` unless that was said.
+    fn interlaced_json(&self) -> serde_json::Value {
+        json!(Some(self.open.interlaced).filter(|i| *i != Interlaced::Refuse))
+    }
+
     /// The first frame and one past the last; `null` for an open end, as in `--frames 5..`.
     fn frames_json(&self) -> serde_json::Value {
         json!(self.frames.as_ref().map(|r| [Some(r.start), (r.end < u64::MAX).then_some(r.end)]))
@@ -135,7 +142,7 @@ pub fn run(settings: &RunSettings, observer: &mut dyn Observer) -> Result<RunSum
     }
     let (mut run, source) = Run::begin(settings, request, source, observer)?;
     let fresh = run.resumed == 0;
-    let outcome = run.detect(source, observer).and_then(|ending| run.finish(ending, observer));
+    let outcome = run.detect(source, observer).and_then(|end| run.finish(end, observer));
     // Only a run that was stopped or ran out of disk can go on; any other would fail again.
     if let (Err(error), Some(output), true) = (&outcome, &settings.output, fresh)
         && !matches!(error, Error::Table(_) | Error::Interrupted)
@@ -261,8 +268,8 @@ struct Run<'a> {
     levels: Arc<Levels>,
     store: DetectionStore,
     resumed: u64,
-    /// How the recording ended, if an earlier run read all of it.
-    finished: Option<Ending>,
+    /// How reading ended, if an earlier run read all of the recording.
+    finished: Option<End>,
     warnings: Vec<Message>,
 }
 
@@ -284,7 +291,7 @@ impl<'a> Run<'a> {
         {
             let store = DetectionStore::on_spool(earlier.spool)?;
             let (resumed, levels) = (store.len() as u64, Arc::new(earlier.levels));
-            let finished = earlier.ending;
+            let finished = earlier.end;
             let run = Self {
                 settings,
                 files,
@@ -333,13 +340,9 @@ impl<'a> Run<'a> {
     }
 
     /// Reads the recording through. `None` if the user stopped it.
-    fn detect(
-        &mut self,
-        source: Box<dyn FrameSource>,
-        observer: &mut dyn Observer,
-    ) -> Result<Option<Ending>> {
-        if let Some(ending) = self.finished.take() {
-            return Ok(Some(ending));
+    fn detect(&mut self, source: Box<dyn FrameSource>, observer: &mut dyn Observer) -> Result<Option<End>> {
+        if let Some(end) = self.finished.take() {
+            return Ok(Some(end));
         }
         let frames = self.settings.frames.clone().unwrap_or(0..u64::MAX);
         let total = self.facts.declared_frames.map(|n| n.min(frames.end).saturating_sub(frames.start));
@@ -347,37 +350,37 @@ impl<'a> Run<'a> {
         let mut detectors =
             detecting::Detectors::new(self.settings.threads, &self.levels, &self.detect, &self.facts)?;
         let outcome = detecting::detect_all(source, frames, &mut detectors, &mut self.store, observer);
-        let ending = match outcome {
-            Ok(ending) => ending,
+        let end = match outcome {
+            Ok(end) => end,
             Err(error) => {
                 // What was done is kept; if the disk is full, what is on it already.
                 let _ = self.store.close(None);
                 return Err(error);
             }
         };
-        let ending = ending.map(|ending| self.unchanged(ending)).transpose()?;
-        let finished = ending.as_ref().map(state::finished).transpose()?;
+        let end = end.map(|end| self.unchanged(end)).transpose()?;
+        let finished = end.as_ref().map(state::finished).transpose()?;
         self.store.close(finished.as_ref())?;
-        Ok(ending)
+        Ok(end)
     }
 
     /// How the recording ended; not well if it became another one while it was read.
-    fn unchanged(&self, ending: Ending) -> Result<Ending> {
+    fn unchanged(&self, end: End) -> Result<End> {
         if self.files.is_empty() || self.changes == Some(Fingerprint::of(&self.files)?.changes) {
-            return Ok(ending);
+            return Ok(end);
         }
         let reason =
             "it was written or replaced while it was read, so its frames may be of two recordings".into();
-        Ok(Ending::Early { frames: self.store.len() as u64, byte: None, reason })
+        Ok(End { ending: Ending::Early { frames: self.store.len() as u64, byte: None, reason }, ..end })
     }
 
     /// Finds the rig if it is not given, follows the markers, writes the table.
-    fn finish(&mut self, ending: Option<Ending>, observer: &mut dyn Observer) -> Result<RunSummary> {
-        if self.store.is_empty() && ending.is_none() {
+    fn finish(&mut self, end: Option<End>, observer: &mut dyn Observer) -> Result<RunSummary> {
+        if self.store.is_empty() && end.is_none() {
             return Err(Error::Interrupted);
         }
-        let stopped = ending.is_none();
-        let followed = self.follow(ending, observer);
+        let stopped = end.is_none();
+        let followed = self.follow(end, observer);
         if stopped && matches!(followed, Err(Error::Rig(_))) {
             // Too little was seen for a table; the state to go on from is there.
             return Err(Error::Interrupted);
@@ -399,16 +402,16 @@ impl<'a> Run<'a> {
         Ok(found)
     }
 
-    fn follow(&mut self, ending: Option<Ending>, observer: &mut dyn Observer) -> Result<RunSummary> {
+    fn follow(&mut self, end: Option<End>, observer: &mut dyn Observer) -> Result<RunSummary> {
         if self.store.is_empty() {
-            return Err(self.no_frames(ending));
+            return Err(self.no_frames(end.map(|e| e.ending)));
         }
         let (timing, clock) = self.times()?;
         self.warnings.extend(timing::notes(&timing));
         let rig = match &self.settings.rig {
             Some(rig) => rig.clone(),
             None => {
-                let mut found = self.find(ending.is_none(), observer)?;
+                let mut found = self.find(end.is_none(), observer)?;
                 self.warnings.append(&mut found.warnings);
                 found.rig
             }
@@ -422,9 +425,11 @@ impl<'a> Run<'a> {
         let mut rows = self.settings.collect.then(Rows::default);
         let mut tally = Tally::new(&rig);
         // A run that was stopped while it read is only stopped here if the user does not want to wait.
-        let mut stop = ending.is_none();
+        let mut stop = end.is_none();
         let reading_was_stopped = stop;
         let mut done = 0;
+        let mut damage =
+            Damage { gaps: end.as_ref().map(|e| e.gaps.clone()).unwrap_or_default(), ..Damage::default() };
         let attended = opening::Attended::default();
         let leave = |o: &mut dyn Observer| if reading_was_stopped { o.abandoned() } else { o.interrupted() };
         let tracked = attended.run(observer, leave, |attended| {
@@ -437,6 +442,9 @@ impl<'a> Run<'a> {
                     rows.push(stamp.index, time_s, observations);
                 }
                 tally.push(observations);
+                if !stamp.decoded {
+                    damage.undecoded.push(stamp.index);
+                }
                 done += 1;
                 attended.done.store(done, Ordering::Relaxed);
                 attended.stop.heed()
@@ -459,15 +467,18 @@ impl<'a> Run<'a> {
                 ..self.facts.clone()
             },
             time: Some(timing),
-            ending: match ending {
+            ending: match end.map(|e| e.ending) {
                 _ if stop => RunEnding::Interrupted,
                 Some(Ending::Early { frames, byte, reason }) => {
                     RunEnding::Early { frames, byte, reason: self.base_names(&reason) }
                 }
+                _ if damage.is_damaged() => RunEnding::Damaged,
                 _ => RunEnding::Complete,
             },
             rig,
+            damage,
         };
+        self.warnings.extend(meta.damage.gaps.dropped_words().map(Message::from));
         if let Some(writer) = writer {
             writer.finish(&meta)?;
         }
@@ -515,14 +526,18 @@ impl<'a> Run<'a> {
 
     /// What was asked for and what was learned. Neither threads nor folders: they change nothing.
     fn settings_json(&self) -> serde_json::Value {
-        json!({
+        let mut settings = json!({
             "detect": self.detect,
             "levels": *self.levels,
             "fps": self.settings.open.fps,
             "decoder": self.settings.open.decoder,
             "frames": self.settings.frames_json(),
             "rig": if self.settings.rig.is_some() { "given" } else { "found" },
-        })
+        });
+        if self.settings.open.interlaced != Interlaced::Refuse {
+            settings["interlaced"] = self.settings.interlaced_json();
+        }
+        settings
     }
 
     /// A message with the recording's name without its folder.

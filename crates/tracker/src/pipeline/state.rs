@@ -10,9 +10,11 @@ use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
 use super::RunSettings;
+use super::ahead::End;
 use crate::detect::{DetectSettings, Levels};
 use crate::error::{Error, Fault, Place, Result};
 use crate::frame::{Ending, RateOrigin};
+use crate::gaps::Gaps;
 use crate::message::{Message, Setting};
 use crate::name::text;
 use crate::output::LONGEST_NAME;
@@ -46,8 +48,8 @@ pub struct State {
 pub struct Earlier {
     pub spool: Spool,
     pub levels: Levels,
-    /// How the recording ended, if it was read through.
-    pub ending: Option<Ending>,
+    /// How reading ended, if the recording was read through.
+    pub end: Option<End>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -79,6 +81,7 @@ impl State {
             "decoder": settings.open.decoder,
             "fps": settings.open.fps,
             "frames": settings.frames_json(),
+            "interlaced": settings.interlaced_json(),
         });
         Ok(Self { identity, changes: print.map(|p| p.changes) })
     }
@@ -93,6 +96,7 @@ impl State {
             "decoder": meta.settings["decoder"],
             "fps": meta.settings["fps"],
             "frames": meta.settings["frames"],
+            "interlaced": meta.settings["interlaced"],
         });
         self.same(&before, output, "its run is complete and had another")
     }
@@ -131,8 +135,8 @@ impl State {
             )
         })?;
         self.same(&header.identity, &path, "the earlier run had another")?;
-        let ending = spool.finished().map(|f| read_ending(&f.ending, &path)).transpose()?;
-        Ok(Some(Earlier { spool, levels: header.levels, ending }))
+        let end = spool.finished().map(|f| read_end(&f.ending, &path)).transpose()?;
+        Ok(Some(Earlier { spool, levels: header.levels, end }))
     }
 }
 
@@ -161,29 +165,32 @@ fn difference(before: Option<&Value>, now: &Value) -> String {
 #[derive(Serialize, Deserialize)]
 struct EndingText {
     early: Option<(u64, Option<u64>, String)>,
+    #[serde(default)]
+    gaps: Gaps,
 }
 
-/// How a recording ended, as the state file has it.
-pub fn finished(ending: &Ending) -> Result<Finished> {
-    let early = match ending {
+/// How reading ended, as the state file has it.
+pub fn finished(end: &End) -> Result<Finished> {
+    let early = match &end.ending {
         Ending::Complete => None,
         Ending::Early { frames, byte, reason } => Some((*frames, *byte, reason.clone())),
     };
-    let ending = serde_json::to_string(&EndingText { early })
+    let ending = serde_json::to_string(&EndingText { early, gaps: end.gaps.clone() })
         .map_err(|e| Error::Table(Fault::new("state", e.to_string())))?;
     Ok(Finished { ending })
 }
 
-fn read_ending(words: &str, path: &Path) -> Result<Ending> {
-    let ending: EndingText = serde_json::from_str(words).map_err(|e| {
+fn read_end(words: &str, path: &Path) -> Result<End> {
+    let words: EndingText = serde_json::from_str(words).map_err(|e| {
         Error::Table(
             Fault::new(text(path), format!("its last record is of another program ({e})")).advice(anew()),
         )
     })?;
-    Ok(match ending.early {
+    let ending = match words.early {
         None => Ending::Complete,
         Some((frames, byte, reason)) => Ending::Early { frames, byte, reason },
-    })
+    };
+    Ok(End { ending, gaps: words.gaps })
 }
 
 /// Removes the state of a run, if there is one.

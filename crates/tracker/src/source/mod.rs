@@ -21,7 +21,7 @@ use crate::error::{Error, Fault, Result};
 use crate::kind::{self, Kind};
 use crate::message::Setting;
 use crate::name::path;
-pub use options::{Decoder, OpenOptions};
+pub use options::{Decoder, Interlaced, OpenOptions};
 pub(crate) use options::{cores, threads_note};
 
 pub use crate::frame::{Ending, FrameSource, SourceInfo};

@@ -15,6 +15,17 @@ pub enum Decoder {
     Opencv,
 }
 
+/// How interlaced film is read, whose pictures hold two fields filmed one after the other.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Interlaced {
+    /// Not at all: a marker that moves would be in two places.
+    #[default]
+    Refuse,
+    /// Each picture as one, for cameras that filmed whole pictures and only say that they are interlaced.
+    AsFrames,
+}
+
 /// What a user may say about reading a recording. The default says nothing.
 #[derive(Debug, Clone, Default)]
 pub struct OpenOptions {
@@ -22,6 +33,8 @@ pub struct OpenOptions {
     pub fps: Option<f64>,
     /// Decoder.
     pub decoder: Decoder,
+    /// How interlaced film is read.
+    pub interlaced: Interlaced,
     /// Whether network addresses and devices may be opened.
     pub allow_protocol: bool,
     /// Decoding threads; 0 is one for each core.

@@ -75,6 +75,14 @@ impl Block<'_> {
                 return Some((at(0), format!("time_s {} comes after {time_s}", rows.time_s[t])));
             }
         }
+        let undecoded = |n: usize| rows.status[at(n)] == Status::Undecoded as u8;
+        if let Some(n) = (1..nodes).find(|&n| undecoded(n) != undecoded(0)) {
+            let problem = format!(
+                "frame {} is undecoded for one of the nodes {} and {} only: a frame is decoded for all or for none",
+                rows.frame[t], self.rig.nodes[0].name, self.rig.nodes[n].name
+            );
+            return Some((at(n), problem));
+        }
         for n in 0..nodes {
             let k = at(n);
             let node = &self.rig.nodes[n].name;

@@ -13,6 +13,7 @@ use sha2::{Digest, Sha256};
 use super::Fingerprint;
 use crate::error::{Error, Fault, Place, Result};
 use crate::frame::{RateOrigin, SourceInfo, TimeBase};
+use crate::gaps::Damage;
 use crate::message::TRACK;
 use crate::name::{self, shown, text};
 use crate::rig::Rig;
@@ -107,7 +108,9 @@ fn first_mib(path: &Path) -> Option<String> {
 pub enum RunEnding {
     /// All frames asked for are there.
     Complete,
-    /// The recording was damaged or ended before what it declares.
+    /// The recording was read to its end, but frames in it are lost; see [`TableMeta::damage`].
+    Damaged,
+    /// The recording ended before what it declares. Frames before that may be lost too.
     Early {
         /// Frames that could be read.
         frames: u64,
@@ -138,10 +141,15 @@ pub struct TableMeta {
     pub settings: serde_json::Value,
     /// How the run ended.
     pub ending: RunEnding,
+    /// Frames that cannot be decoded and frames that are not there.
+    #[serde(default, skip_serializing_if = "Damage::is_none")]
+    pub damage: Damage,
 }
 
 /// Keys of the Parquet metadata, `pydpend.` before each; a CSV's `.json` has the same without it.
-pub(super) const KEYS: [&str; 7] = ["schema_version", "tool", "rig", "source", "time", "settings", "ending"];
+/// `damage` is there only if there is some.
+pub(super) const KEYS: [&str; 8] =
+    ["schema_version", "tool", "rig", "source", "time", "settings", "ending", "damage"];
 
 impl TableMeta {
     /// The program and version that this is.

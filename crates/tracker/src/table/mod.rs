@@ -8,7 +8,7 @@
 //! | `x_px`, `y_px` | float64, null when not seen | centre; x right, y down |
 //! | `sigma_px` | float32, null when not seen | standard uncertainty of each coordinate |
 //! | `area_px` | float32, null when not seen | blob area |
-//! | `status` | string (dictionary) | `seen`, `reacquired`, `missing`, `ambiguous` |
+//! | `status` | string (dictionary) | `seen`, `reacquired`, `missing`, `ambiguous`, `undecoded` |
 //!
 //! Owns: [`NodeTable`], [`Rows`], what makes them valid, their files ([`read_table`], [`TableWriter`]).
 //! Must not: track, or know where rows come from.
@@ -41,7 +41,7 @@ pub const COLUMNS: [&str; 9] =
     ["frame", "time_s", "node", "body", "x_px", "y_px", "sigma_px", "area_px", "status"];
 
 /// The words of the column `status`, by their number in [`Rows::status`].
-pub const STATUS_WORDS: [&str; 4] = ["missing", "seen", "reacquired", "ambiguous"];
+pub const STATUS_WORDS: [&str; 5] = ["missing", "seen", "reacquired", "ambiguous", "undecoded"];
 
 /// T frames of N nodes, column by column. What is not seen is NaN.
 #[derive(Debug, Clone, Default)]

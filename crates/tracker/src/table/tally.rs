@@ -23,6 +23,8 @@ pub struct NodeSummary {
     pub missing: u64,
     /// Frames in which something may have been it.
     pub ambiguous: u64,
+    /// Frames that could not be decoded; they count for none of the others.
+    pub undecoded: u64,
     /// Frames in the longest stretch without its place from which it came back.
     pub longest_gap: u64,
     /// Frames at the end without its place: all of them if it was never seen.
@@ -59,6 +61,7 @@ impl Tally {
                 reacquired: 0,
                 missing: 0,
                 ambiguous: 0,
+                undecoded: 0,
                 longest_gap: 0,
                 missing_at_end: 0,
                 sigma_px: None,
@@ -81,6 +84,11 @@ impl Tally {
                 }
                 Status::Ambiguous => node.ambiguous += 1,
                 Status::Missing => node.missing += 1,
+                Status::Undecoded => {
+                    // Nothing is known: the frame neither ends a gap nor makes it longer.
+                    node.undecoded += 1;
+                    continue;
+                }
             }
             node.missing_at_end += 1;
         }

@@ -5,6 +5,7 @@ use proptest::prelude::*;
 use super::*;
 use crate::csv_text::Cells;
 use crate::frame::RateOrigin;
+use crate::gaps::Damage;
 use crate::rig::{Body, Joint, Node, Rig};
 
 pub(crate) fn meta(names: &[(String, usize)], bodies: &[String]) -> TableMeta {
@@ -56,6 +57,7 @@ pub(crate) fn meta(names: &[(String, usize)], bodies: &[String]) -> TableMeta {
         time: None,
         settings: serde_json::json!({"detect": {"threshold": 0.1}}),
         ending: RunEnding::Early { frames: 9, byte: Some(77), reason: "cut".into() },
+        damage: Damage::default(),
     }
 }
 
@@ -371,4 +373,52 @@ proptest! {
         prop_assume!(table.check("t").is_ok());
         both_forms(&table);
     }
+}
+
+#[test]
+fn a_frame_is_undecoded_for_all_nodes_and_both_forms_keep_it_and_what_is_lost() {
+    use crate::gaps::{Cause, Gap};
+    let mut table = two_by_three();
+    table.rows.push(12, 0.05, &[Observation::UNDECODED; 3]);
+    table.meta.ending = RunEnding::Damaged;
+    table.meta.damage.undecoded.push(12);
+    table.meta.damage.gaps.push(Gap { after: Some(7), frames: Some(2), cause: Cause::Damage });
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["t.parquet", "t.csv"] {
+        let path = folder.path().join(name);
+        table.write(&path, Cells::default()).unwrap();
+        let back = read_table(&path).unwrap();
+        assert!(back.rows.same(&table.rows) && back.meta == table.meta, "{name}");
+        assert_eq!(back.summary()[1].undecoded, 1);
+        assert_eq!(
+            read_meta(&path).unwrap().damage.words().unwrap(),
+            "damaged: frame 12 cannot be decoded; 2 frames are lost between frames 7 and 8 (gap in the time stamps)"
+        );
+    }
+    let last = table.rows.status.len() - 1;
+    table.rows.status[last] = Status::Missing as u8;
+    let error = table.check("t").unwrap_err().to_string();
+    assert!(error.contains("frame 12 is undecoded for one of the nodes"), "{error}");
+}
+
+#[test]
+fn a_frame_without_pixels_neither_ends_a_gap_nor_makes_it_longer() {
+    let meta = meta(&[("n0".into(), 0)], &["upper".into()]);
+    let mut tally = Tally::new(&meta.rig);
+    let seen = Observation { x_px: 1.0, y_px: 1.0, sigma_px: 0.1, area_px: 9.0, status: Status::Seen };
+    for o in [
+        seen,
+        Observation::MISSING,
+        Observation::UNDECODED,
+        Observation::MISSING,
+        seen,
+        Observation::UNDECODED,
+    ] {
+        tally.push(&[o]);
+    }
+    let node = &tally.summary()[0];
+    assert_eq!(
+        (node.seen, node.missing, node.undecoded, node.longest_gap, node.missing_at_end),
+        (2, 2, 2, 2, 0)
+    );
 }

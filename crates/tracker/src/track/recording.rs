@@ -178,6 +178,9 @@ impl Output {
 
     fn hand_out(&mut self, end: bool, sink: &mut Sink<'_>) -> Result<()> {
         while let Some((stamp, mut row)) = self.partly.pop(end) {
+            if !stamp.decoded {
+                row.fill(Observation::UNDECODED);
+            }
             self.returns.mark(&mut row);
             let s = &mut self.summary;
             s.frames += 1;

@@ -31,13 +31,21 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if args.json {
         let nodes: Vec<serde_json::Value> =
             summary.iter().zip(&fits).map(|(s, f)| serde_json::json!({"summary": s, "motion": f})).collect();
-        let value =
-            serde_json::json!({"table": shown(&text(&args.nodes)), "frames": table.frames(), "nodes": nodes});
+        let value = serde_json::json!({
+            "table": shown(&text(&args.nodes)),
+            "frames": table.frames(),
+            "nodes": nodes,
+            "ending": table.meta.ending,
+            "damage": table.meta.damage,
+        });
         print::json(&value)?;
         return Ok(ExitCode::SUCCESS);
     }
     let mut out = String::new();
     writeln!(out, "{}: valid, {} frames, {} nodes", text(&args.nodes), table.frames(), summary.len())?;
+    for words in table.meta.damage.words().into_iter().chain(table.meta.damage.gaps.dropped_words()) {
+        writeln!(out, "{words}")?;
+    }
     writeln!(
         out,
         "node      body            seen  gaps  longest gap  ambiguous  sigma_px  residual_px  px per frame"

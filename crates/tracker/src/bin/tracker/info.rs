@@ -8,9 +8,10 @@ use serde_json::{Value, json};
 use tracker::brightest::brightest;
 use tracker::error::Error;
 use tracker::frame::{Ending, Frame, FrameSource, PixelFormat};
+use tracker::gaps::Damage;
 use tracker::name::{shown, text};
 use tracker::pipeline;
-use tracker::source::{OpenOptions, open};
+use tracker::source::{Interlaced, OpenOptions, open};
 use tracker::timing::{Steps, Timing, notes, rate_words, times_words};
 
 use crate::print;
@@ -47,7 +48,9 @@ struct Seen {
     /// Time stamps of all frames that were looked at, and whether these are all there are.
     steps: Steps,
     is_whole: bool,
-    counted: Option<(u64, u64)>,
+    /// Frames of the whole recording, where all were read.
+    counted: Option<u64>,
+    damage: Damage,
     /// The greatest sample of all frames.
     brightest: Option<u16>,
     ending: Option<Ending>,
@@ -62,7 +65,8 @@ struct Times {
 
 /// Runs the subcommand.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let options = args.decode.options(args.fps, OpenOptions::default().threads);
+    // What film is can be told of interlaced film too.
+    let options = args.decode.options(args.fps, OpenOptions::default().threads, Interlaced::AsFrames);
     let mut source = open(&text(&args.input), &options)?;
     let seen = look(&mut *source, args.count)?;
     let times = times(&*source, &seen)?;
@@ -72,7 +76,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         print::lines(&as_text(&*source, &seen, &times))?;
     }
     let early = matches!(seen.ending, Some(Ending::Early { .. }));
-    Ok(ExitCode::from(u8::from(early)))
+    Ok(ExitCode::from(u8::from(early || seen.damage.is_damaged())))
 }
 
 /// Decides what the times are by all stamps that were seen.
@@ -96,13 +100,14 @@ fn look(source: &mut dyn FrameSource, count: bool) -> anyhow::Result<Seen> {
         steps: Steps::default(),
         is_whole: false,
         counted: None,
+        damage: Damage::default(),
         brightest: None,
         ending: None,
     };
     let surveyed = if count { None } else { pipeline::survey(source)? };
     let stamped = surveyed.is_some();
     (seen.steps, seen.is_whole) = surveyed.unwrap_or_default();
-    let (mut frames, mut lost) = (0u64, 0u64);
+    let mut frames = 0u64;
     let mut batch: Vec<Frame> = Vec::new();
     let mut bytes = 0;
     while count || seen.first.len() < FIRST {
@@ -111,7 +116,9 @@ fn look(source: &mut dyn FrameSource, count: bool) -> anyhow::Result<Seen> {
             break;
         };
         frames += 1;
-        lost += u64::from(frame.plane.is_none());
+        if frame.plane.is_none() {
+            seen.damage.undecoded.push(frame.index);
+        }
         if !stamped {
             seen.steps.push(frame.ticks);
         }
@@ -126,8 +133,9 @@ fn look(source: &mut dyn FrameSource, count: bool) -> anyhow::Result<Seen> {
         }
     }
     if seen.ending.is_some() {
-        seen.counted = Some((frames, lost));
+        seen.counted = Some(frames);
         seen.is_whole = true;
+        seen.damage.gaps = source.gaps();
         seen.brightest = seen.brightest.max(brightest_of(&mut batch)?);
     }
     Ok(seen)
@@ -147,12 +155,14 @@ fn format_name(format: PixelFormat) -> &'static str {
     }
 }
 
-fn ending_words(ending: &Ending) -> String {
+fn ending_words(ending: &Ending, damage: &Damage) -> String {
+    let damaged = damage.words();
     match ending {
-        Ending::Complete => "complete".to_owned(),
+        Ending::Complete => damaged.unwrap_or_else(|| "complete".to_owned()),
         Ending::Early { frames, byte, reason } => {
             let place = byte.map_or(String::new(), |b| format!(", byte {b}"));
-            format!("early, after frame {}{place}: {reason}", frames.saturating_sub(1))
+            let damaged = damaged.map_or(String::new(), |d| format!("; {d}"));
+            format!("early, after frame {}{place}: {reason}{damaged}", frames.saturating_sub(1))
         }
     }
 }
@@ -173,9 +183,12 @@ fn as_text(source: &dyn FrameSource, seen: &Seen, times: &Times) -> String {
     if let Some(frames) = packets(seen) {
         row("frames", format!("{frames}, by the packets in the file"));
     }
-    if let Some((frames, lost)) = seen.counted {
-        let lost = if lost > 0 { format!(", of these {lost} cannot be decoded") } else { String::new() };
-        row("decoded", format!("{frames} frames{lost}"));
+    if let Some(frames) = seen.counted {
+        let lost = match seen.damage.undecoded.frames {
+            0 => String::new(),
+            lost => format!("; {lost} cannot be decoded"),
+        };
+        row("decoded", format!("{} frames{lost}", frames - seen.damage.undecoded.frames));
     }
     if let Some(brightest) = seen.brightest {
         row("brightest", format!("{brightest} of {}", (1u32 << info.depth_bits) - 1));
@@ -201,7 +214,10 @@ fn as_text(source: &dyn FrameSource, seen: &Seen, times: &Times) -> String {
         row(word, value.clone());
     }
     if let Some(ending) = &seen.ending {
-        row("end", ending_words(ending));
+        row("end", ending_words(ending, &seen.damage));
+    }
+    if let Some(dropped) = seen.damage.gaps.dropped_words() {
+        row("warning", dropped);
     }
     for note in &notes(timing) {
         row("note", words.say(note));
@@ -222,6 +238,7 @@ fn as_json(source: &dyn FrameSource, seen: &Seen, times: &Times) -> Value {
     let details: serde_json::Map<String, Value> =
         info.details.iter().map(|(k, v)| (k.clone(), Value::from(v.clone()))).collect();
     let ending = seen.ending.as_ref().map(|e| match e {
+        Ending::Complete if seen.damage.is_damaged() => json!({"status": "damaged"}),
         Ending::Complete => json!({"status": "complete"}),
         Ending::Early { frames, byte, reason } => {
             json!({"status": "early", "frames": frames, "byte": byte, "reason": reason})
@@ -237,10 +254,11 @@ fn as_json(source: &dyn FrameSource, seen: &Seen, times: &Times) -> Value {
         "depth_bits": info.depth_bits,
         "converted_from": info.converted_from,
         "declared_frames": info.declared_frames,
-        "decoded_frames": seen.counted.map(|(frames, lost)| frames - lost),
-        "undecodable_frames": seen.counted.map(|(_, lost)| lost),
+        "decoded_frames": seen.counted.map(|frames| frames - seen.damage.undecoded.frames),
+        "undecodable_frames": seen.counted.map(|_| seen.damage.undecoded.frames),
+        "damage": seen.counted.map(|_| &seen.damage),
         "brightest": seen.brightest,
-        "frames": packets(seen).or(seen.counted.map(|c| c.0)),
+        "frames": packets(seen).or(seen.counted),
         "rate_hz": times.timing.rate_hz,
         "rate_origin": times.timing.rate_origin,
         "time": times.timing,

@@ -13,7 +13,7 @@ use tracker::overlay::{self, FilmSettings};
 use tracker::source::OpenOptions;
 use tracker::table::{read_table, table_files};
 
-use crate::reading::DecodeArgs;
+use crate::reading::{DecodeArgs, InterlacedArgs};
 use crate::watch::Watch;
 
 /// Draw nodes, names, bodies, trails and gaps into the recording
@@ -40,6 +40,8 @@ pub struct Args {
     width: Option<u32>,
     #[command(flatten)]
     decode: DecodeArgs,
+    #[command(flatten)]
+    interlaced: InterlacedArgs,
     /// Replace the film if it is there already
     #[arg(long)]
     force: bool,
@@ -63,7 +65,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     };
     overlay::film(
         &text(&args.input),
-        &args.decode.options(None, OpenOptions::default().threads),
+        &args.decode.options(None, OpenOptions::default().threads, args.interlaced.setting()),
         &table,
         &args.output,
         &settings,

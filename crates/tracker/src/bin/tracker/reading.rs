@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use tracker::detect::{DetectSettings, Polarity, Threshold};
-use tracker::source::{Decoder, OpenOptions};
+use tracker::source::{Decoder, Interlaced, OpenOptions};
 
 /// How a recording is opened.
 #[derive(Debug, Clone, clap::Args)]
@@ -17,7 +17,7 @@ pub struct DecodeArgs {
 }
 
 impl DecodeArgs {
-    pub fn options(&self, fps: Option<f64>, threads: usize) -> OpenOptions {
+    pub fn options(&self, fps: Option<f64>, threads: usize, interlaced: Interlaced) -> OpenOptions {
         OpenOptions {
             fps,
             decoder: match self.decoder {
@@ -25,8 +25,26 @@ impl DecodeArgs {
                 DecoderArg::Ffmpeg => Decoder::Ffmpeg,
                 DecoderArg::Opencv => Decoder::Opencv,
             },
+            interlaced,
             allow_protocol: self.allow_protocol,
             threads,
+        }
+    }
+}
+
+/// What is done with film whose pictures hold two fields.
+#[derive(Debug, Clone, Copy, clap::Args)]
+pub struct InterlacedArgs {
+    /// How interlaced film is read, whose pictures hold two fields: not at all, or each picture as one
+    #[arg(long, default_value = "refuse", value_enum)]
+    interlaced: InterlacedArg,
+}
+
+impl InterlacedArgs {
+    pub fn setting(self) -> Interlaced {
+        match self.interlaced {
+            InterlacedArg::Refuse => Interlaced::Refuse,
+            InterlacedArg::AsFrames => Interlaced::AsFrames,
         }
     }
 }
@@ -51,11 +69,13 @@ pub struct FollowArgs {
     pub threads: usize,
     #[command(flatten)]
     decode: DecodeArgs,
+    #[command(flatten)]
+    interlaced: InterlacedArgs,
 }
 
 impl FollowArgs {
     pub fn open(&self) -> OpenOptions {
-        self.decode.options(self.fps, self.threads)
+        self.decode.options(self.fps, self.threads, self.interlaced.setting())
     }
 
     pub fn detect(&self) -> DetectSettings {
@@ -83,6 +103,12 @@ enum DecoderArg {
     Auto,
     Ffmpeg,
     Opencv,
+}
+
+#[derive(Debug, Clone, Copy, clap::ValueEnum)]
+enum InterlacedArg {
+    Refuse,
+    AsFrames,
 }
 
 /// `A..B`, `A..` or `..B`.

@@ -105,6 +105,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         }
     }
     let lost = summary.lost();
+    if let Some(words) = summary.meta.damage.words() {
+        print::say(format!("{}: {words}. All other frames are in {}", text(&args.input), text(&args.output)));
+    }
     let status = match &summary.meta.ending {
         RunEnding::Interrupted => {
             let go_on = if summary.resumable { ". Go on with --resume" } else { "" };
@@ -121,10 +124,11 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             ));
             1
         }
-        RunEnding::Complete if !lost.is_empty() => {
+        RunEnding::Complete | RunEnding::Damaged if !lost.is_empty() => {
             print::say(format!("not seen again up to the end: {}", lost.join(", ")));
             1
         }
+        RunEnding::Damaged => 1,
         RunEnding::Complete => 0,
     };
     if args.json {
@@ -140,6 +144,7 @@ fn print_json(args: &Args, summary: &RunSummary, status: u8) -> anyhow::Result<(
         "output": shown(&text(&args.output)),
         "status": status,
         "ending": summary.meta.ending,
+        "damage": summary.meta.damage,
         "frames": summary.frames,
         "resumed_frames": summary.resumed,
         "lost": summary.lost(),

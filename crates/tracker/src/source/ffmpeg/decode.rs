@@ -12,8 +12,14 @@ use crate::error::{Error, Fault, Result};
 use crate::source::cores;
 
 /// Codecs whose decoders keep silent about damage.
-const STRICT: [ffi::AVCodecID; 3] =
-    [ffi::AVCodecID::AV_CODEC_ID_HEVC, ffi::AVCodecID::AV_CODEC_ID_FFV1, ffi::AVCodecID::AV_CODEC_ID_PNG];
+const STRICT: [ffi::AVCodecID; 6] = [
+    ffi::AVCodecID::AV_CODEC_ID_H264,
+    ffi::AVCodecID::AV_CODEC_ID_HEVC,
+    ffi::AVCodecID::AV_CODEC_ID_FFV1,
+    ffi::AVCodecID::AV_CODEC_ID_PNG,
+    ffi::AVCodecID::AV_CODEC_ID_MJPEG,
+    ffi::AVCodecID::AV_CODEC_ID_GIF,
+];
 
 /// An open decoder of one stream.
 pub(super) struct Decoder {

@@ -113,6 +113,11 @@ impl Demuxer {
         unsafe { &**(*self.context).streams.add(self.stream) }
     }
 
+    /// The stream's index in the container.
+    pub(super) fn index(&self) -> usize {
+        self.stream
+    }
+
     /// The stream's parameters.
     pub(super) fn parameters(&self) -> &ffi::AVCodecParameters {
         // SAFETY: every stream has parameters as long as the context lives.
@@ -192,7 +197,8 @@ impl Demuxer {
             (c.duration, c.duration_estimation_method, c.nb_streams)
         };
         let from_header = method == ffi::AVDurationEstimationMethod::AVFMT_DURATION_FROM_STREAM;
-        if whole <= 0 || !from_header || streams != 1 {
+        // GIF declares none: the library adds up what it finds.
+        if whole <= 0 || !from_header || streams != 1 || self.container() == "gif" {
             return None;
         }
         let start = if stream.start_time == ffi::AV_NOPTS_VALUE { 0 } else { stream.start_time };
@@ -269,6 +275,12 @@ impl Packet {
     pub(super) fn set_pts(&mut self, pts: i64) {
         // SAFETY: never null after `new`.
         unsafe { (*self.0).pts = pts };
+    }
+
+    /// Replaces the packet's decoding time.
+    pub(super) fn set_dts(&mut self, dts: i64) {
+        // SAFETY: never null after `new`.
+        unsafe { (*self.0).dts = dts };
     }
 
     /// Whether one of the flags `AV_PKT_FLAG_*` is set.

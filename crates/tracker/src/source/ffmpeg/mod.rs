@@ -10,11 +10,16 @@ mod decode;
 mod demux;
 mod describe;
 mod ending;
+mod feed;
+mod fields;
 pub(crate) mod formats;
 mod layout;
+mod lost;
 mod order;
 mod sample;
+mod slots;
 mod stamps;
+mod structure;
 
 use std::collections::VecDeque;
 use std::ffi::CStr;
@@ -23,16 +28,20 @@ use std::sync::Arc;
 use ffmpeg_next::ffi;
 
 use decode::{Decoder, Picture, Received};
-use demux::{Demuxer, Packet, Read};
+use demux::{Demuxer, Packet};
 use describe::{describe, step};
+use feed::Feed;
+use fields::FieldOrder;
 use layout::{Layout, Orientation};
+use lost::Lost;
 use order::{Order, Sent};
 use stamps::Stamps;
 pub(crate) use stamps::display_times;
 
-use super::{Input, OpenOptions};
+use super::{Input, Interlaced, OpenOptions};
 use crate::error::{Error, Fault, Result};
 use crate::frame::{Bytes, Ending, Frame, FrameSource, SourceInfo};
+use crate::gaps::Gaps;
 
 /// FFmpeg's words for an error code.
 fn message(code: i32) -> String {
@@ -63,13 +72,11 @@ pub struct FfmpegSource {
     can_reopen: bool,
     protocols: Option<&'static str>,
     threads: usize,
-    demuxer: Demuxer,
+    feed: Feed,
     decoder: Decoder,
     layout: Layout,
     orientation: Orientation,
-    /// Packets read ahead while looking whether the stream has display times.
-    ahead: VecDeque<Packet>,
-    packet: Packet,
+    interlaced: Interlaced,
     stamps: Stamps,
     order: Order,
     intra_only: bool,
@@ -78,12 +85,12 @@ pub struct FfmpegSource {
     draining: bool,
     finished: bool,
     failures: usize,
-    /// Packets of the stream seen, with those that an edit list hides.
+    /// Packets of the stream seen or known to be lost, with those that an edit list hides.
     packets: u64,
     last_byte: Option<u64>,
-    /// The demuxer found less of the last packet than there should be.
+    /// The last packet is less than there should be.
     last_is_cut: bool,
-    stop_reason: Option<String>,
+    lost: Lost,
     /// Frames without a plane whose fate depends on whether a good one follows.
     held: VecDeque<Ready>,
     ready: VecDeque<Ready>,
@@ -114,7 +121,7 @@ impl FfmpegSource {
             Input::Pipe(url) => (url, false, Some(if url.starts_with("file:") { "file" } else { "pipe" })),
             Input::Address(url) => (url, false, None),
         };
-        let mut demuxer = Demuxer::open(url, name, protocols)?;
+        let demuxer = Demuxer::open(url, name, protocols)?;
         let decoder = Decoder::open(&demuxer, name, options.threads)?;
         let parameters = demuxer.parameters();
         let layout = Layout::new(parameters.format, name)?;
@@ -122,43 +129,39 @@ impl FfmpegSource {
         let properties =
             unsafe { ffi::avcodec_descriptor_get(parameters.codec_id).as_ref() }.map_or(0, |d| d.props);
         let intra_only = properties & ffi::AV_CODEC_PROP_INTRA_ONLY != 0;
-        let (info, orientation) = describe(&demuxer, &layout, name, options)?;
+        let (mut info, orientation) = describe(&demuxer, &layout, name, options)?;
 
-        // A stream has display times if its first packets have.
-        let mut ahead = VecDeque::new();
-        let mut stop_reason = None;
-        let mut at_end = false;
-        for _ in 0..if intra_only { 1 } else { 6 } {
-            let mut packet = Packet::new(name)?;
-            match demuxer.read(&mut packet) {
-                Read::Packet => ahead.push_back(packet),
-                Read::End => at_end = true,
-                Read::Failed(reason) => {
-                    stop_reason = Some(reason);
-                    at_end = true;
+        let step = step(&demuxer);
+        let feed = Feed::new(demuxer, name, can_reopen, if intra_only { 1 } else { 6 })?;
+        if let Some(order) = feed.field_order(name)? {
+            match options.interlaced {
+                Interlaced::Refuse => return Err(fields::refusal(name, order)),
+                Interlaced::AsFrames => {
+                    info.details.push(("fields".into(), format!("interlaced, {}", order.words())));
+                    info.warnings.push(fields::warning(name, order));
                 }
             }
-            if at_end {
-                break;
-            }
         }
+        // Where each field is a packet, so is it where the container counts.
+        if feed.has_single_fields() {
+            info.declared_frames = info.declared_frames.map(|n| n.div_ceil(2));
+        }
+        // A stream has display times if its first packets have.
         let lacks = |p: &Packet| {
             p.get().pts == ffi::AV_NOPTS_VALUE && !(intra_only && p.get().dts != ffi::AV_NOPTS_VALUE)
         };
-        let unstamped = ahead.iter().any(lacks);
-        let step = step(&demuxer);
+        let unstamped = feed.ahead().any(lacks);
         Ok(Self {
             info,
             url: url.clone(),
             can_reopen,
             protocols,
             threads: options.threads,
-            demuxer,
+            feed,
             decoder,
             layout,
             orientation,
-            ahead,
-            packet: Packet::new(name)?,
+            interlaced: options.interlaced,
             stamps: Stamps::new(unstamped, step),
             order: Order::new(if unstamped && !intra_only { REORDER } else { 0 }),
             intra_only,
@@ -169,7 +172,7 @@ impl FfmpegSource {
             packets: 0,
             last_byte: None,
             last_is_cut: false,
-            stop_reason,
+            lost: Lost::default(),
             held: VecDeque::new(),
             ready: VecDeque::new(),
             replay: VecDeque::new(),
@@ -184,38 +187,42 @@ impl FfmpegSource {
         self.finished
     }
 
-    /// Reads one packet and gives it to the decoder, or starts draining.
-    fn feed(&mut self) {
-        if let Some(packet) = self.ahead.pop_front() {
-            self.packet = packet;
-        } else if self.stop_reason.is_some() {
-            return self.drain();
-        } else {
-            match self.demuxer.read(&mut self.packet) {
-                Read::Packet => {}
-                Read::End => return self.drain(),
-                Read::Failed(reason) => {
-                    self.stop_reason = Some(reason);
-                    return self.drain();
-                }
+    /// Gives the next packet to the decoder, or starts draining.
+    fn feed(&mut self) -> Result<()> {
+        let Some(mut given) = self.feed.next()? else {
+            self.drain();
+            return Ok(());
+        };
+        for slot in std::mem::take(&mut given.lost) {
+            let key = self.stamps.key(&slot, self.packets as i64);
+            self.packets += 1;
+            self.order.sent(Sent { key, byte: None, key_frame: false, suspect: true });
+        }
+        let fields = *given.packet.get();
+        let byte = u64::try_from(fields.pos).ok();
+        // A second field belongs to the picture of the packet before it, whose time that picture has.
+        let mut key = ffi::AV_NOPTS_VALUE;
+        if !given.is_second_field {
+            key = self.stamps.key(&fields, self.packets as i64);
+            self.packets += 1;
+            if given.after_loss && self.stamps.is_stamped() {
+                self.lost.broken(key);
+            }
+            let suspect = self.feed.judge(&given, key, self.intra_only);
+            // What an edit list hides is decoded, because others are predicted from it, but gives no picture.
+            if !given.packet.has(ffi::AV_PKT_FLAG_DISCARD) {
+                let key_frame = given.packet.has(ffi::AV_PKT_FLAG_KEY);
+                self.order.sent(Sent { key, byte, key_frame, suspect });
+                self.last_byte = byte.map(|b| b + u64::try_from(fields.size).unwrap_or(0)).or(self.last_byte);
             }
         }
-        let number = self.packets as i64;
-        self.packets += 1;
-        let fields = *self.packet.get();
-        let byte = u64::try_from(fields.pos).ok();
-        let key = self.stamps.key(&fields, number);
-        self.packet.set_pts(key);
-        // What an edit list hides is decoded, because others are predicted from it, but gives no picture.
-        if !self.packet.has(ffi::AV_PKT_FLAG_DISCARD) {
-            self.order.sent(Sent { key, byte, key_frame: self.packet.has(ffi::AV_PKT_FLAG_KEY) });
-            self.last_byte = byte.map(|b| b + u64::try_from(fields.size).unwrap_or(0)).or(self.last_byte);
+        given.packet.set_pts(key);
+        self.last_is_cut = given.is_cut;
+        // A packet that is known to be cut would give a picture with made-up pixels.
+        if !given.packet.has(ffi::AV_PKT_FLAG_CORRUPT) {
+            self.decoder.send(Some(&given.packet));
         }
-        // A packet that the demuxer knows to be cut would give a picture with made-up pixels.
-        self.last_is_cut = self.packet.has(ffi::AV_PKT_FLAG_CORRUPT);
-        if !self.last_is_cut {
-            self.decoder.send(Some(&self.packet));
-        }
+        Ok(())
     }
 
     fn drain(&mut self) {
@@ -228,10 +235,13 @@ impl FfmpegSource {
         match self.decoder.receive()? {
             Received::Picture(picture) => {
                 self.failures = 0;
+                if let (Interlaced::Refuse, Some(order)) = (self.interlaced, FieldOrder::of(picture.get())) {
+                    return Err(fields::refusal(&self.info.name, order));
+                }
                 self.take(picture);
             }
             Received::Hungry if self.draining => self.finish(),
-            Received::Hungry => self.feed(),
+            Received::Hungry => self.feed()?,
             Received::End => self.finish(),
             Received::Damaged => {
                 self.failures += 1;
@@ -259,11 +269,12 @@ impl FfmpegSource {
             self.tainted = false;
         }
         let byte = arrival.own.and_then(|p| p.byte);
+        let suspect = arrival.own.is_some_and(|p| p.suspect);
         let fits = self.layout.is_of(&picture) && {
             let (w, h) = (picture.get().width.unsigned_abs(), picture.get().height.unsigned_abs());
             self.orientation.size(w, h) == (self.info.width, self.info.height)
         };
-        let plane = if damaged || self.tainted || !fits {
+        let plane = if damaged || suspect || self.tainted || !fits {
             None
         } else {
             self.layout.plane(picture, self.orientation)
@@ -293,6 +304,7 @@ impl FfmpegSource {
     fn make(&mut self, ready: Ready) -> Frame {
         let index = self.next_index;
         self.next_index += 1;
+        self.lost.frame(index, ready.ticks);
         let (plane, stride) = match ready.plane {
             Some((plane, stride)) => (Some(plane), stride),
             None => (None, 0),
@@ -349,12 +361,17 @@ impl FrameSource for FfmpegSource {
     }
 
     fn stamps(&mut self) -> Result<Option<(Vec<i64>, bool)>> {
-        if !self.can_reopen || self.user_clock {
+        // A packet that holds one field is no frame.
+        if !self.can_reopen || self.user_clock || self.feed.has_single_fields() {
             return Ok(None);
         }
         let input = Input::File(self.url.clone());
         let found = display_times(&self.info.name, &input, SURVEYED_FRAMES, SURVEYED_BYTES)?;
         Ok(Some(found).filter(|(times, _)| !times.is_empty()))
+    }
+
+    fn gaps(&self) -> Gaps {
+        self.lost.gaps()
     }
 
     fn sample(&mut self, count: usize) -> Result<Vec<Frame>> {

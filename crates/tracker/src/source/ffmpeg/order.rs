@@ -14,6 +14,8 @@ pub(super) struct Sent {
     pub byte: Option<u64>,
     /// Whether decoding can start with it.
     pub key_frame: bool,
+    /// It is damaged, or predicted from one that is damaged or lost.
+    pub suspect: bool,
 }
 
 /// What a picture's arrival tells.
@@ -78,7 +80,7 @@ mod tests {
     use super::*;
 
     fn packet(key: i64) -> Sent {
-        Sent { key, byte: None, key_frame: key == 0 }
+        Sent { key, byte: None, key_frame: key == 0, suspect: false }
     }
 
     #[test]

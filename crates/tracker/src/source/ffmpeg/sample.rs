@@ -6,11 +6,12 @@ use ffmpeg_next::ffi;
 
 use super::decode::{Decoder, Picture, Received};
 use super::demux::{Demuxer, Packet, Read};
+use super::fields::{self, FieldOrder};
 use super::layout::{Layout, Orientation};
 use super::{FfmpegSource, Shared};
 use crate::error::{Error, Fault, Result};
 use crate::frame::{Frame, SourceInfo};
-use crate::source::cores;
+use crate::source::{Interlaced, cores};
 
 /// Most bytes of a pipe's first frames that are kept to be handed out again.
 const PIPE_BYTES: usize = 64 << 20;
@@ -33,9 +34,10 @@ impl FfmpegSource {
             info: &self.info,
             layout: &self.layout,
             orientation: self.orientation,
+            interlaced: self.interlaced,
             threads: threads.div_ceil(places.len().div_ceil(part)),
         };
-        let found: Vec<Result<Vec<Taken>>> = std::thread::scope(|scope| {
+        let mut found: Vec<Result<Vec<Taken>>> = std::thread::scope(|scope| {
             let mut demuxer = Some(demuxer);
             let samplers: Vec<_> = places
                 .chunks(part)
@@ -48,6 +50,10 @@ impl FfmpegSource {
                 || Error::Source(Fault::new(&self.info.name, "the decoder failed; please report this"));
             samplers.into_iter().map(|s| s.join().unwrap_or_else(|_| Err(failed()))).collect()
         });
+        // A container without an index may seek past its only key frame; then decoding begins at the beginning.
+        if found.iter().all(|f| f.as_ref().is_ok_and(|t| t.iter().all(Taken::is_empty))) {
+            found.push(Sampler::open(&from, None).and_then(|mut s| Ok(vec![s.take_here(true, count)?])));
+        }
         let (mut frames, mut later) = (Vec::new(), Vec::new());
         let mut seen = Vec::new();
         for taken in found {
@@ -137,6 +143,7 @@ struct From<'a> {
     info: &'a SourceInfo,
     layout: &'a Layout,
     orientation: Orientation,
+    interlaced: Interlaced,
     threads: usize,
 }
 
@@ -147,6 +154,12 @@ struct Taken {
     key: Option<Frame>,
     /// Every few of those that follow.
     later: Vec<Frame>,
+}
+
+impl Taken {
+    fn is_empty(&self) -> bool {
+        self.key.is_none() && self.later.is_empty()
+    }
 }
 
 struct Sampler<'a> {
@@ -189,6 +202,11 @@ impl<'a> Sampler<'a> {
         while (key && taken.key.is_none() || taken.later.len() < each) && failures < 64 {
             match self.decoder.receive()? {
                 Received::Picture(picture) => {
+                    if let (Interlaced::Refuse, Some(order)) =
+                        (self.from.interlaced, FieldOrder::of(picture.get()))
+                    {
+                        return Err(fields::refusal(&self.from.info.name, order));
+                    }
                     seen += 1;
                     let first = key && taken.key.is_none();
                     if !first && !seen.is_multiple_of(STRIDE) {

@@ -74,6 +74,11 @@ impl Stamps {
         ticks
     }
 
+    /// Whether packets have display times.
+    pub(super) fn is_stamped(&self) -> bool {
+        matches!(self.origin, Origin::Packets { .. })
+    }
+
     /// Time of the last frame and the longest step between two.
     pub(super) fn last(&self) -> Option<(i64, i64)> {
         self.last

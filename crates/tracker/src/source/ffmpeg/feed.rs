@@ -1,0 +1,283 @@
+//! Packets on their way to the decoder, with what the file around each of them tells: whether it is whole, whether
+//! others before it are lost, whether it is one field of a picture only.
+//!
+//! Owns: [`Feed`], [`Given`]. Must not: decode, or number frames.
+
+use std::collections::VecDeque;
+
+use ffmpeg_next::ffi;
+
+use super::decode::{Decoder, Received};
+use super::demux::{Demuxer, Packet, Read};
+use super::fields::{FieldOrder, Fields};
+use super::slots::Slots;
+use super::structure::{Fit, Structure};
+use crate::error::Result;
+
+/// Frames in a row that cannot be read before the rest of a file is given up.
+const MOST_FAILED: usize = 1000;
+
+/// A packet as it was read.
+struct Arrived {
+    packet: Packet,
+    /// How the file between the packet before it and this one fits together.
+    fit: Fit,
+    /// Stamps of packets between the two that did not come.
+    lost: Vec<i64>,
+    /// Its time follows that of the packet before it without a gap.
+    follows: bool,
+    is_second_field: bool,
+}
+
+/// A packet for the decoder.
+pub(super) struct Given {
+    pub packet: Packet,
+    /// Stamps of packets before it that did not come.
+    pub lost: Vec<ffi::AVPacket>,
+    /// Packets before it are gone.
+    pub after_loss: bool,
+    /// It is itself damaged, as far as the file around it tells.
+    pub is_damaged: bool,
+    /// It is the last one and less than there should be.
+    pub is_cut: bool,
+    /// It belongs to the picture of the packet before it.
+    pub is_second_field: bool,
+}
+
+/// Reads packets, one ahead of the decoder where the file can tell damage.
+pub(super) struct Feed {
+    pub demuxer: Demuxer,
+    name: String,
+    /// Packets read ahead.
+    ahead: VecDeque<Arrived>,
+    structure: Option<Structure>,
+    slots: Option<Slots>,
+    fields: Option<Fields>,
+    has_single_fields: bool,
+    /// Time and duration of the packet read last, ticks.
+    last: Option<(i64, i64)>,
+    /// Frames of a file with numbered ones that were read or failed.
+    numbers: i64,
+    /// Packets that hold nothing.
+    empty: u64,
+    failed: Option<String>,
+    at_end: bool,
+    ends_broken: bool,
+    /// What comes now is predicted from something that is lost or damaged.
+    suspect: bool,
+    /// The key frame that ended that; pictures shown before it may still be predicted from what was lost.
+    below: Option<i64>,
+}
+
+impl Feed {
+    /// Packets of the demuxer's stream; `first` of them are read at once. `is_file` is whether the file can be read
+    /// again.
+    pub(super) fn new(demuxer: Demuxer, name: &str, is_file: bool, first: usize) -> Result<Self> {
+        let container = demuxer.container();
+        let structure = is_file.then(|| Structure::of(&container, name, demuxer.stream().id)).flatten();
+        let slots = (is_file && container == "avi").then(|| Slots::read(name, demuxer.index())).flatten();
+        let fields = Fields::of(&demuxer);
+        let mut feed = Self {
+            demuxer,
+            name: name.to_owned(),
+            ahead: VecDeque::new(),
+            structure,
+            slots,
+            fields,
+            has_single_fields: false,
+            last: None,
+            numbers: 0,
+            empty: 0,
+            failed: None,
+            at_end: false,
+            ends_broken: false,
+            suspect: false,
+            below: None,
+        };
+        for _ in 0..first {
+            feed.read()?;
+        }
+        feed.has_single_fields = feed.ahead.iter().any(|a| a.is_second_field);
+        Ok(feed)
+    }
+
+    /// Packets read ahead.
+    pub(super) fn ahead(&self) -> impl Iterator<Item = &Packet> {
+        self.ahead.iter().map(|a| &a.packet)
+    }
+
+    /// Whether the first packets are single fields.
+    pub(super) fn has_single_fields(&self) -> bool {
+        self.has_single_fields
+    }
+
+    /// Frames that the container declares and that were never in it: the recorder left them out.
+    pub(super) fn empty(&self) -> u64 {
+        self.slots.as_ref().map_or(self.empty, Slots::empty)
+    }
+
+    /// Why nothing more could be read, if that is not the end of the file.
+    pub(super) fn stop_reason(&self) -> Option<&str> {
+        self.failed.as_deref()
+    }
+
+    /// Whether the file is damaged or cut after its last packet.
+    pub(super) fn ends_broken(&self) -> bool {
+        self.ends_broken
+    }
+
+    /// Which field is first, for interlaced film: as the container says, else as the first picture does.
+    pub(super) fn field_order(&self, name: &str) -> Result<Option<FieldOrder>> {
+        let parameters = self.demuxer.parameters();
+        if parameters.field_order != ffi::AVFieldOrder::AV_FIELD_UNKNOWN {
+            return Ok(FieldOrder::said(parameters.field_order));
+        }
+        let mut decoder = Decoder::open(&self.demuxer, name, 1)?;
+        for packet in self.ahead().map(Some).chain([None]) {
+            decoder.send(packet);
+            if let Received::Picture(picture) = decoder.receive()? {
+                return Ok(FieldOrder::of(picture.get()));
+            }
+        }
+        Ok(None)
+    }
+
+    /// The next packet; `None` at the end.
+    pub(super) fn next(&mut self) -> Result<Option<Given>> {
+        if self.ahead.is_empty() {
+            self.read()?;
+        }
+        let Some(arrived) = self.ahead.pop_front() else { return Ok(None) };
+        let mut given = Given {
+            lost: arrived.lost.iter().map(|at| stamped(&arrived.packet, *at)).collect(),
+            after_loss: !arrived.lost.is_empty() || arrived.fit != Fit::Whole && !arrived.follows,
+            is_damaged: arrived.packet.has(ffi::AV_PKT_FLAG_CORRUPT),
+            is_cut: arrived.packet.has(ffi::AV_PKT_FLAG_CORRUPT),
+            is_second_field: arrived.is_second_field,
+            packet: arrived.packet,
+        };
+        if self.structure.is_some() || self.slots.is_some() {
+            if self.ahead.is_empty() {
+                self.read()?;
+            }
+            match self.ahead.front() {
+                Some(after) => given.is_damaged |= after.fit == Fit::Broken,
+                None => {
+                    let rest = self.structure.as_mut().map_or(Fit::Whole, Structure::rest);
+                    self.ends_broken = rest != Fit::Whole && !self.is_declared_end();
+                    given.is_damaged |= self.ends_broken;
+                    given.is_cut |= self.ends_broken;
+                }
+            }
+        }
+        Ok(Some(given))
+    }
+
+    /// Whether a packet's picture is not to be believed: it is damaged, or predicted from what is lost or damaged.
+    /// `key` is what the packet's picture is known by.
+    pub(super) fn judge(&mut self, given: &Given, key: i64, intra_only: bool) -> bool {
+        if intra_only {
+            return given.is_damaged;
+        }
+        if given.packet.has(ffi::AV_PKT_FLAG_KEY) {
+            if self.suspect {
+                self.below = Some(key);
+            }
+            self.suspect = false;
+        } else {
+            self.suspect |= given.after_loss;
+        }
+        self.suspect |= given.is_damaged;
+        self.suspect || self.below.is_some_and(|below| key < below)
+    }
+
+    /// Whether the packet read last reaches the end that the container declares.
+    fn is_declared_end(&self) -> bool {
+        let (Some(end), Some((time, duration))) = (self.demuxer.declared_end(), self.last) else {
+            return false;
+        };
+        duration > 0 && time.saturating_add(duration) >= end.saturating_sub(duration / 2)
+    }
+
+    /// Reads one packet into the queue, if there is one.
+    fn read(&mut self) -> Result<()> {
+        let mut lost = Vec::new();
+        let mut packet = Packet::new(&self.name)?;
+        while !self.at_end {
+            match self.demuxer.read(&mut packet) {
+                // An empty one is a slot that the recorder left empty; a decoder would take it for the end.
+                Read::Packet if packet.get().size <= 0 => {
+                    self.numbers += 1;
+                    self.empty += 1;
+                }
+                Read::Packet => {
+                    self.failed = None;
+                    self.numbers += 1;
+                    self.arrive(packet, lost);
+                    return Ok(());
+                }
+                Read::End => self.at_end = true,
+                Read::Failed(reason) => {
+                    self.failed = Some(reason);
+                    // Frames found by number: one that cannot be read says nothing of the next.
+                    let number = self.numbers;
+                    let numbered = self.demuxer.container() == "cine" && lost.len() < MOST_FAILED;
+                    self.numbers += 1;
+                    if numbered
+                        && self.numbers < self.demuxer.duration().unwrap_or(0)
+                        && self.demuxer.seek(self.numbers)
+                    {
+                        lost.push(number);
+                    } else {
+                        self.at_end = true;
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn arrive(&mut self, mut packet: Packet, mut lost: Vec<i64>) {
+        let fields = *packet.get();
+        let mut fit = Fit::Whole;
+        if let Ok(at) = u64::try_from(fields.pos) {
+            if let Some(structure) = &mut self.structure {
+                fit = structure.reach(at);
+            }
+            if let Some(slots) = &mut self.slots {
+                let found = slots.find(at, usize::try_from(fields.size).unwrap_or(0));
+                if let Ok(slot) = i64::try_from(found.slot) {
+                    lost.extend(found.lost.iter().filter_map(|s| i64::try_from(*s).ok()));
+                    packet.set_dts(slot);
+                    if fields.pts != ffi::AV_NOPTS_VALUE {
+                        packet.set_pts(slot);
+                    }
+                }
+                if found.is_broken {
+                    fit = Fit::Broken;
+                }
+            }
+        }
+        let fields = *packet.get();
+        let time = [fields.dts, fields.pts].into_iter().find(|t| *t != ffi::AV_NOPTS_VALUE);
+        let follows = match (self.last, time) {
+            (Some((last, duration)), Some(time)) if duration > 0 => {
+                time.saturating_sub(last.saturating_add(duration)).abs() <= (duration / 2).max(1)
+            }
+            _ => false,
+        };
+        self.last = time.map(|t| (t, fields.duration));
+        let is_second_field = self.fields.as_mut().is_some_and(|f| f.is_second(&packet));
+        self.ahead.push_back(Arrived { packet, fit, lost, follows, is_second_field });
+    }
+}
+
+/// The stamps that a packet beside `packet` would have at `at`.
+fn stamped(packet: &Packet, at: i64) -> ffi::AVPacket {
+    let mut fields = *packet.get();
+    fields.dts = at;
+    if fields.pts != ffi::AV_NOPTS_VALUE {
+        fields.pts = at;
+    }
+    fields
+}

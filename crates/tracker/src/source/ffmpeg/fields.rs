@@ -1,0 +1,180 @@
+//! Interlaced film: which packets hold one field of a picture only, and what is said of such film.
+//!
+//! Owns: [`Fields`], [`refusal`], [`warning`]. Must not: take a picture apart.
+
+use std::ptr;
+
+use ffmpeg_next::ffi;
+
+use super::demux::{Demuxer, Packet};
+use crate::error::{Error, Fault};
+use crate::message::{Message, Setting};
+
+/// Tells single fields from whole pictures, by the codec's own headers.
+pub(super) struct Fields {
+    parser: *mut ffi::AVCodecParserContext,
+    context: *mut ffi::AVCodecContext,
+    /// The packet before is a first field: this one.
+    first: Option<ffi::AVPictureStructure>,
+}
+
+// SAFETY: parser and context are owned by this value alone and bound to no thread.
+unsafe impl Send for Fields {}
+
+impl Fields {
+    /// For codecs whose packets may hold a field; `None` for all others and for progressive film.
+    pub(super) fn of(demuxer: &Demuxer) -> Option<Self> {
+        let parameters = demuxer.parameters();
+        // Other decoders' parsers put both fields into one packet.
+        let apart = parameters.codec_id == ffi::AVCodecID::AV_CODEC_ID_H264;
+        if !apart || parameters.field_order == ffi::AVFieldOrder::AV_FIELD_PROGRESSIVE {
+            return None;
+        }
+        // SAFETY: allocations, checked for null; a context without a codec only carries parameters to the parser.
+        let (parser, context) = unsafe {
+            (ffi::av_parser_init(parameters.codec_id as i32), ffi::avcodec_alloc_context3(ptr::null()))
+        };
+        let fields = Self { parser, context, first: None };
+        if parser.is_null() || context.is_null() {
+            return None;
+        }
+        // SAFETY: both are valid; parameters live during the call; the flag is a plain field.
+        let code = unsafe {
+            (*parser).flags |= ffi::PARSER_FLAG_COMPLETE_FRAMES;
+            ffi::avcodec_parameters_to_context(context, parameters)
+        };
+        (code >= 0).then_some(fields)
+    }
+
+    /// Whether a packet is the second field of the picture that the packet before it began.
+    pub(super) fn is_second(&mut self, packet: &Packet) -> bool {
+        use ffi::AVPictureStructure::{AV_PICTURE_STRUCTURE_BOTTOM_FIELD, AV_PICTURE_STRUCTURE_TOP_FIELD};
+        let fields = packet.get();
+        let (mut out, mut size) = (ptr::null_mut(), 0);
+        // SAFETY: parser, context and packet are valid; a packet's data is followed by the padding that parsers
+        // need; what the parser puts out points into the packet and is not used.
+        let structure = unsafe {
+            ffi::av_parser_parse2(
+                self.parser,
+                self.context,
+                &mut out,
+                &mut size,
+                fields.data,
+                fields.size,
+                fields.pts,
+                fields.dts,
+                fields.pos,
+            );
+            (*self.parser).picture_structure
+        };
+        let is_field =
+            matches!(structure, AV_PICTURE_STRUCTURE_TOP_FIELD | AV_PICTURE_STRUCTURE_BOTTOM_FIELD);
+        let second = is_field && self.first.is_some_and(|first| first != structure);
+        self.first = (is_field && !second).then_some(structure);
+        second
+    }
+}
+
+impl Drop for Fields {
+    fn drop(&mut self) {
+        // SAFETY: each was allocated once or is null, which both calls allow, and is freed once.
+        unsafe {
+            ffi::av_parser_close(self.parser);
+            ffi::avcodec_free_context(&mut self.context);
+        }
+    }
+}
+
+/// Which field of a picture was filmed first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum FieldOrder {
+    /// The one with the top line.
+    Top,
+    /// The other.
+    Bottom,
+}
+
+impl FieldOrder {
+    /// As the container says; `None` if it says that film is progressive, or nothing.
+    pub(super) fn said(order: ffi::AVFieldOrder) -> Option<Self> {
+        use ffi::AVFieldOrder::{AV_FIELD_BB, AV_FIELD_BT, AV_FIELD_TB, AV_FIELD_TT};
+        match order {
+            // What files say with these agrees with what their pictures say (tried: H.264, ProRes, DV, FFV1).
+            AV_FIELD_TT | AV_FIELD_TB => Some(Self::Top),
+            AV_FIELD_BB | AV_FIELD_BT => Some(Self::Bottom),
+            _ => None,
+        }
+    }
+
+    /// As a decoded picture says.
+    pub(super) fn of(picture: &ffi::AVFrame) -> Option<Self> {
+        (picture.interlaced_frame != 0).then_some(if picture.top_field_first != 0 {
+            Self::Top
+        } else {
+            Self::Bottom
+        })
+    }
+
+    /// In words.
+    pub(super) fn words(self) -> &'static str {
+        match self {
+            Self::Top => "top field first",
+            Self::Bottom => "bottom field first",
+        }
+    }
+}
+
+/// The setting's word for reading pictures whole.
+const AS_FRAMES: &str = "as-frames";
+
+/// A shell's word for a name.
+fn quoted(name: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "._-/".contains(c);
+    if !name.is_empty() && !name.starts_with('-') && name.chars().all(plain) {
+        name.to_owned()
+    } else {
+        format!("'{}'", name.replace('\'', "'\\''"))
+    }
+}
+
+/// The command that makes a picture of each field.
+fn command(name: &str) -> String {
+    let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem);
+    format!(
+        "ffmpeg -i {} -vf bwdif=mode=send_field:deint=all -c:v ffv1 {}",
+        quoted(name),
+        quoted(&format!("{stem}-fields.mkv"))
+    )
+}
+
+/// Why interlaced film is not read unasked.
+pub(super) fn refusal(name: &str, order: FieldOrder) -> Error {
+    Error::Source(
+        Fault::new(
+            name,
+            format!(
+                "the film is interlaced ({}): each picture holds two fields, filmed one after the other, and a marker that \
+                 moves is in two places",
+                order.words()
+            ),
+        )
+        .advice(
+            Message::from(format!(
+                "Make a picture of each field, at twice the rate: {}. If the camera filmed whole pictures and only the \
+                 file says interlaced, read it as it is with ",
+                command(name)
+            )) + Setting::Interlaced.set_to(AS_FRAMES),
+        ),
+    )
+}
+
+/// What is to be known of interlaced film that is read as it is.
+pub(super) fn warning(name: &str, order: FieldOrder) -> Message {
+    format!(
+        "interlaced, {}: its pictures are read whole, as if both fields were filmed at once. If they were not, a marker \
+         that moves is in two places; then make a picture of each field: {}",
+        order.words(),
+        command(name)
+    )
+    .into()
+}

@@ -1,0 +1,71 @@
+//! A container's own structure, followed beside the reader: a demuxer goes on after damage in silence, and what it
+//! passed over is told by elements that do not fit together.
+//!
+//! Owns: [`Structure`]. Must not: decode, or decide what is lost.
+
+mod boxes;
+mod bytes;
+mod gif;
+mod matroska;
+mod transport;
+
+use std::fs::File;
+
+use bytes::Bytes;
+
+/// How the elements between two packets fit together, the better first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Fit {
+    /// As they should.
+    Whole,
+    /// Each is whole, but something between them is gone.
+    Jump,
+    /// They do not: what lies between is damaged, and the packet before it may be.
+    Broken,
+}
+
+/// One container's walk through its elements. Each walk is resumed after a break as well as it can be.
+trait Walk: Send {
+    /// Goes on to the packet of the stream whose first byte is at `to`. How all elements up to there fit together.
+    fn reach(&mut self, file: &mut Bytes, to: u64) -> Fit;
+
+    /// Goes on to the end of the file. How all elements up to there fit together.
+    fn rest(&mut self, file: &mut Bytes) -> Fit;
+}
+
+/// Follows the elements of a file from packet to packet.
+pub(super) struct Structure {
+    file: Bytes,
+    walk: Box<dyn Walk>,
+}
+
+impl Structure {
+    /// The structure of a file, by its container's short names; `None` where none is known or the file cannot be
+    /// read again. `stream_id` is the stream's number in the container.
+    pub(super) fn of(container: &str, path: &str, stream_id: i32) -> Option<Self> {
+        let has = |name: &str| container.split(',').any(|c| c == name);
+        let mut file = Bytes::new(File::open(path).ok()?)?;
+        let walk: Box<dyn Walk> = if has("matroska") {
+            Box::new(matroska::Matroska::default())
+        } else if has("mpegts") {
+            Box::new(transport::Transport::new(&mut file, stream_id)?)
+        } else if has("mp4") {
+            Box::new(boxes::Boxes::new(&mut file))
+        } else if has("gif") {
+            Box::new(gif::Gif::default())
+        } else {
+            return None;
+        };
+        Some(Self { file, walk })
+    }
+
+    /// How all elements from the last packet to the one whose first byte is at `to` fit together.
+    pub(super) fn reach(&mut self, to: u64) -> Fit {
+        self.walk.reach(&mut self.file, to)
+    }
+
+    /// How all elements from the last packet to the end of the file fit together.
+    pub(super) fn rest(&mut self) -> Fit {
+        self.walk.rest(&mut self.file)
+    }
+}

@@ -1,0 +1,71 @@
+//! MP4 and QuickTime: boxes that fill the file, and in a fragmented film fragments that are numbered (ISO/IEC 14496-12).
+
+use super::bytes::Bytes;
+use super::{Fit, Walk};
+
+/// Boxes of a fragmented film's fragment: index, its header.
+const FRAGMENT: [u8; 4] = *b"moof";
+
+/// Where the boxes stop to fit together, found before the first packet: there are few.
+#[derive(Debug, Default)]
+pub(super) struct Boxes {
+    /// Places where the chain of boxes or of fragments is broken, rising, and how.
+    breaks: Vec<(u64, Fit)>,
+    next: usize,
+}
+
+impl Boxes {
+    pub(super) fn new(file: &mut Bytes) -> Self {
+        let mut boxes = Self::default();
+        let (mut at, mut number) = (0, None);
+        while at < file.length() {
+            let Some((end, kind)) = header(file, at) else {
+                boxes.breaks.push((at, Fit::Broken));
+                break;
+            };
+            if kind == FRAGMENT {
+                let this = fragment_number(file, at);
+                if this.is_none() || number.is_some_and(|n: u32| this != Some(n.wrapping_add(1))) {
+                    boxes.breaks.push((at, Fit::Jump));
+                }
+                number = this;
+            }
+            at = end;
+        }
+        boxes
+    }
+}
+
+/// One past a box and its four letters; `None` if there is none or it ends past the file.
+fn header(file: &mut Bytes, at: u64) -> Option<(u64, [u8; 4])> {
+    let kind: [u8; 4] = file.array(at + 4)?;
+    let size = match file.u32(at)? {
+        0 => file.length() - at,
+        1 => u64::from_be_bytes(file.array(at + 8)?),
+        n => u64::from(n),
+    };
+    let end = at.checked_add(size)?;
+    let is_name = kind.iter().all(|b| b.is_ascii_graphic() || *b == b' ' || *b == 0xA9);
+    (size >= 8 && end <= file.length() && is_name).then_some((end, kind))
+}
+
+/// The number in a fragment's own header, which is the first box in it.
+fn fragment_number(file: &mut Bytes, at: u64) -> Option<u32> {
+    let (_, kind) = header(file, at + 8)?;
+    (kind == *b"mfhd").then(|| file.u32(at + 20)).flatten()
+}
+
+impl Walk for Boxes {
+    fn reach(&mut self, _: &mut Bytes, to: u64) -> Fit {
+        let mut worst = Fit::Whole;
+        while let Some((_, fit)) = self.breaks.get(self.next).filter(|(at, _)| *at <= to) {
+            worst = worst.max(*fit);
+            self.next += 1;
+        }
+        worst
+    }
+
+    fn rest(&mut self, file: &mut Bytes) -> Fit {
+        self.reach(file, u64::MAX)
+    }
+}
