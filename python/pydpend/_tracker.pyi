@@ -122,6 +122,7 @@ def detect(
     settings: DetectArguments,
     area_px: tuple[float | None, float | None],
     depth_bits: int | None,
+    aspect: str | None,
 ) -> Found:
     """Centres (D, 2) in px; sigma in px, area in px, peak, elongation (D, 4); flags (D,)."""
 

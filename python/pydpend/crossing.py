@@ -32,7 +32,7 @@ Columns: TypeAlias = tuple[
 Found: TypeAlias = tuple[NDArray[np.float64], NDArray[np.float32], NDArray[np.uint8]]
 Row: TypeAlias = tuple[NDArray[np.float64], NDArray[np.float32], NDArray[np.float32], NDArray[np.uint8]]
 DetectArguments: TypeAlias = tuple[float | None, str, str]
-OpenArguments: TypeAlias = tuple[float | None, str, str, bool, int]
+OpenArguments: TypeAlias = tuple[float | None, str, str, bool, int, str | None]
 Frames: TypeAlias = tuple[int, int | None] | None
 Callback: TypeAlias = Callable[[str, int, int | None], object] | None
 """Called with stage, frames done and frames in all, if known."""

@@ -83,9 +83,10 @@ def rate_hz(nodes: Nodes, name: str) -> float:
 
 
 def _upright(nodes: Nodes, px_per_m: float | None) -> tuple[NDArray[np.float64], str]:
-    """(T, N, 3): x right, y up, z 0, and the unit."""
+    """(T, N, 3): x right, y up, z 0, and the unit; pixels are square ones."""
     out = np.zeros((*nodes.status.shape, 3))
-    out[..., 0] = nodes.xy_px[..., 0]
+    width, height = nodes.rig.pixel_aspect
+    out[..., 0] = nodes.xy_px[..., 0] * (width / height)
     out[..., 1] = nodes.rig.image_px[1] - 1 - nodes.xy_px[..., 1]
     out[..., 2] = np.where(nodes.seen, 0.0, np.nan)
     return (out, "px") if px_per_m is None else (out * (1000 / px_per_m), "mm")
@@ -180,6 +181,7 @@ def _mat(nodes: Nodes, path: Path, px_per_m: float | None, name: str) -> None:
         "node": text,
         "body": bodies,
         "image_px": np.array(nodes.rig.image_px, dtype=float),
+        "pixel_aspect": np.array(nodes.rig.pixel_aspect, dtype=float),
         "rig_json": nodes.rig.to_json(),
     }
     savemat(path, content, do_compression=True)

@@ -53,7 +53,8 @@ class Rig:
     """Nodes, bodies and joints, and the frame in which they stand so.
 
     `nodes` are by body, along it; `bodies` from the pivot outwards; `joints` with the pivot first.
-    `region` and `lens` are as in the rig file, or None.
+    `region` and `lens` are as in the rig file, or None. Places are in recorded pixels; `pixel_aspect` is the width and
+    height of one of these (16, 15 for pixels 1.0667 times as wide as high), and bodies are rigid in square pixels.
     """
 
     image_px: tuple[int, int]
@@ -63,6 +64,7 @@ class Rig:
     reference_frame: int | None = None
     region: dict[str, Any] | None = None
     lens: dict[str, Any] | None = None
+    pixel_aspect: tuple[int, int] = (1, 1)
 
     @staticmethod
     def read(path: AnyPath) -> Rig:
@@ -81,6 +83,9 @@ class Rig:
     def to_json(self) -> str:
         """As the JSON of a table's metadata."""
         value: dict[str, Any] = {"schema": 1, "image_px": list(self.image_px)}
+        width, height = self.pixel_aspect
+        if width != height:
+            value["pixel_aspect"] = f"{width}:{height}"
         for key in ("reference_frame", "region", "lens"):
             if getattr(self, key) is not None:
                 value[key] = getattr(self, key)
@@ -131,6 +136,7 @@ class Rig:
 
 def _rig(value: dict[str, Any]) -> Rig:
     width, height = value["image_px"]
+    wide, _, high = value.get("pixel_aspect", "1:1").partition(":")
     return Rig(
         image_px=(int(width), int(height)),
         nodes=tuple(Node(**n) for n in value.get("node", ())),
@@ -141,6 +147,7 @@ def _rig(value: dict[str, Any]) -> Rig:
         reference_frame=value.get("reference_frame"),
         region=value.get("region"),
         lens=value.get("lens"),
+        pixel_aspect=(int(wide), int(high)),
     )
 
 
@@ -151,8 +158,9 @@ class Nodes:
     Attributes:
         frame: index in the recording, from 0, (T,).
         t_s: time in s, from the recording's time base, increasing, (T,).
-        xy_px: centres in px, (T, N, 2); x right, y down.
-        sigma_px: standard uncertainty of each coordinate in px, (T, N).
+        xy_px: centres in recorded pixels, (T, N, 2); x right, y down.
+        sigma_px: standard uncertainty of each coordinate in square pixels as high as the recorded ones, the greater of
+            the two, (T, N); in recorded pixels that of x is as much smaller as these are wider than high.
         area_px: blob area in px, (T, N).
         status: `MISSING`, `SEEN`, `REACQUIRED`, `AMBIGUOUS` or `UNDECODED`, (T, N).
         rig: the rig; its nodes are in the order of the arrays.

@@ -29,6 +29,8 @@ Polarity: TypeAlias = Literal["auto", "bright", "dark"]
 Centroid: TypeAlias = Literal["weighted", "contour"]
 Decoder: TypeAlias = Literal["auto", "ffmpeg", "opencv"]
 Interlaced: TypeAlias = Literal["refuse", "as-frames"]
+PixelAspect: TypeAlias = tuple[int, int] | str
+"""Width to height of a pixel: ``(16, 15)`` or ``"16:15"``."""
 
 DETECTION = np.dtype(
     [
@@ -73,6 +75,19 @@ def _threads(threads: int | None) -> int:
             fault("threads", f"{threads} is out of range", "Give 1 or more, or None for one a core")
         )
     return int(threads)
+
+
+def _aspect(aspect: PixelAspect | None) -> str | None:
+    """As the compiled half takes it; it knows what makes sense."""
+    if aspect is None or isinstance(aspect, str):
+        return aspect
+    try:
+        width, height = aspect
+    except (TypeError, ValueError):
+        raise ArgumentError(
+            fault("pixel_aspect", f"{aspect!r} is no width and height", "Give (16, 15) or '16:15'")
+        ) from None
+    return f"{width}:{height}"
 
 
 def _count(name: str, value: int) -> int:
@@ -146,6 +161,7 @@ def track(
     decoder: Decoder = "auto",
     interlaced: Interlaced = "refuse",
     allow_protocol: bool = False,
+    pixel_aspect: PixelAspect | None = None,
 ) -> Nodes:
     """Follows the markers of a recording.
 
@@ -168,6 +184,7 @@ def track(
         interlaced: how film is read whose pictures hold two fields, filmed one after the other: not at all, or each
             picture as one (for cameras that filmed whole pictures and only say that they are interlaced).
         allow_protocol: open network addresses and devices too.
+        pixel_aspect: width to height of a pixel, (16, 15) or "16:15", instead of what the recording says.
 
     Returns:
         The nodes. If the recording was damaged, `Nodes.complete` is False and `Nodes.meta` says how it ended; what
@@ -190,7 +207,7 @@ def track(
             _rig(rig),
             _frames(frames),
             (threshold, polarity, centroid),
-            (fps, decoder, interlaced, allow_protocol, _threads(threads)),
+            (fps, decoder, interlaced, allow_protocol, _threads(threads), _aspect(pixel_aspect)),
             None if output is None else os.fsdecode(output),
             existing,
             safe_csv,
@@ -236,6 +253,7 @@ def setup(
     decoder: Decoder = "auto",
     interlaced: Interlaced = "refuse",
     allow_protocol: bool = False,
+    pixel_aspect: PixelAspect | None = None,
 ) -> Setup:
     """Finds markers, bodies and joints of a recording.
 
@@ -245,7 +263,7 @@ def setup(
         picture: an image file to write, for example .png: the reference frame with all that was found.
         force: replace `output` and `picture` if they are there already.
         fps, frames, threads, progress, threshold, polarity, decoder, interlaced,
-            allow_protocol: as in `track`.
+            allow_protocol, pixel_aspect: as in `track`.
 
     Raises:
         SourceError, DetectError, RigError, ArgumentError: as `track`.
@@ -258,7 +276,7 @@ def setup(
             os.fsdecode(path),
             _frames(frames),
             (threshold, polarity, "weighted"),
-            (fps, decoder, interlaced, allow_protocol, _threads(threads)),
+            (fps, decoder, interlaced, allow_protocol, _threads(threads), _aspect(pixel_aspect)),
             None if output is None else os.fsdecode(output),
             None if picture is None else os.fsdecode(picture),
             force,
@@ -334,7 +352,7 @@ def overlay(
             nodes._columns(),
             nodes._meta_json(),
             os.fsdecode(output),
-            (None, decoder, interlaced, allow_protocol, 0),
+            (None, decoder, interlaced, allow_protocol, 0, None),
             _count("every", every),
             None if width is None else _count("width", width),
             _count("play_fps", play_fps),
@@ -349,12 +367,18 @@ def overlay(
 
 
 def info(
-    path: Path, *, fps: float | None = None, decoder: Decoder = "auto", allow_protocol: bool = False
+    path: Path,
+    *,
+    fps: float | None = None,
+    decoder: Decoder = "auto",
+    allow_protocol: bool = False,
+    pixel_aspect: PixelAspect | None = None,
 ) -> dict[str, Any]:
     """What is known of a recording before it is read through.
 
     Returns:
-        `name`, `container`, `codec`, `width`, `height` (px), `depth_bits`, `declared_frames`, `rate_hz`,
+        `name`, `container`, `codec`, `width`, `height` (px), `pixel_aspect` (width to height of a pixel, "16:15"),
+        `pixel_aspect_origin` ("recording", or "user" where it was given), `depth_bits`, `declared_frames`, `rate_hz`,
         `rate_origin`, `time_base` (numerator and denominator of s per tick), `size_bytes`, `sha256_first_mib`,
         `converted_from`, `warnings` and `details`; `frames` that are there by their packets, without decoding any, and
         what its times are (`time`: `kind`, `rate_hz`, `sigma_s`, `gaps`, `notes`, ...); None where unknown. Of a long
@@ -363,7 +387,7 @@ def info(
     Raises:
         SourceError: if it cannot be opened, or its time stamps stand still.
     """
-    opened = (fps, decoder, "as-frames", allow_protocol, 0)
+    opened = (fps, decoder, "as-frames", allow_protocol, 0, _aspect(pixel_aspect))
     known: dict[str, Any] = json.loads(_tracker.info(os.fsdecode(path), opened))
     return known
 
@@ -387,6 +411,7 @@ def detect(
     min_area_px: float | None = None,
     max_area_px: float | None = None,
     depth_bits: int | None = None,
+    pixel_aspect: PixelAspect | None = None,
 ) -> NDArray[np.void]:
     """Detects the markers of one image.
 
@@ -396,6 +421,7 @@ def detect(
         polarity, centroid: as in `track`.
         min_area_px, max_area_px: limits of a marker's area; None is learned.
         depth_bits: significant bits of a sample, for example 12 in a uint16; None is all.
+        pixel_aspect: width to height of a pixel, (16, 15) or "16:15": discs are as much narrower; None is square.
 
     Returns:
         One entry per detection, of dtype `DETECTION`, ordered by y, then x.
@@ -405,7 +431,9 @@ def detect(
         DetectError: if no threshold can be learned.
     """
     area = (min_area_px, max_area_px)
-    return _detections(_tracker.detect(image, (threshold, polarity, centroid), area, depth_bits))
+    return _detections(
+        _tracker.detect(image, (threshold, polarity, centroid), area, depth_bits, _aspect(pixel_aspect))
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -415,7 +443,7 @@ class NodeRow:
     Attributes:
         frame: number of the image.
         xy_px: centres in px, (N, 2); x right, y down.
-        sigma_px: standard uncertainty of each coordinate in px, (N,).
+        sigma_px: standard uncertainty of each coordinate in square px, (N,), as `Nodes.sigma_px`.
         area_px: blob area in px, (N,).
         status: as `Nodes.status`, (N,).
     """

@@ -13,7 +13,7 @@ use tracker::track::Tracker;
 
 use crate::errors::{argument, raise};
 use crate::images::frame_of;
-use crate::settings::{DetectArguments, detect_settings, rig};
+use crate::settings::{DetectArguments, detect_settings, pixel_aspect, rig};
 
 /// x, y in px, sigma in px, area in px, peak, elongation, flags: one entry per detection.
 type Found<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f32>>, Bound<'py, PyArray1<u8>>);
@@ -35,9 +35,11 @@ pub fn detect<'py>(
     settings: DetectArguments,
     area_px: (Option<f64>, Option<f64>),
     depth_bits: Option<u32>,
+    aspect: Option<&str>,
 ) -> PyResult<Found<'py>> {
     let mut settings = detect_settings(py, &settings)?;
     (settings.min_area_px, settings.max_area_px) = area_px;
+    settings.pixel_aspect = pixel_aspect(py, aspect)?.unwrap_or_default();
     let frame = frame_of(image, "image", 0, 0, depth_bits)?;
     let detections = py.detach(|| {
         let frames = [frame];
@@ -93,6 +95,7 @@ impl LiveTracker {
         };
         settings.region = rig.region.clone();
         settings.lens = rig.lens.clone();
+        settings.pixel_aspect = rig.pixel_aspect;
         let tracker = Tracker::new(&rig).map_err(|e| raise(py, e))?;
         Ok(Self { rig, settings, depth_bits, detector: None, tracker, detections: Vec::new() })
     }

@@ -5,6 +5,7 @@
 use pyo3::prelude::*;
 use tracker::csv_text::Cells;
 use tracker::detect::{Centroid, DetectSettings, Polarity, Threshold};
+use tracker::pixel_aspect::PixelAspect;
 use tracker::rig::Rig;
 use tracker::source::{Decoder, Interlaced, OpenOptions};
 
@@ -46,14 +47,21 @@ pub fn detect_settings(py: Python<'_>, given: &DetectArguments) -> PyResult<Dete
 }
 
 /// How a recording is read: rate or `None`, decoder, how interlaced film is read, whether addresses may be opened,
-/// threads.
-pub type OpenArguments = (Option<f64>, String, String, bool, usize);
+/// threads, pixel aspect or `None`.
+pub type OpenArguments = (Option<f64>, String, String, bool, usize, Option<String>);
+
+/// Of `W:H`.
+pub fn pixel_aspect(py: Python<'_>, given: Option<&str>) -> PyResult<Option<PixelAspect>> {
+    let wrong = |problem| argument(py, "pixel_aspect", problem, "Give for example 16:15");
+    given.map(str::parse).transpose().map_err(wrong)
+}
 
 /// Reading options of keyword arguments.
 pub fn open_options(py: Python<'_>, given: &OpenArguments) -> PyResult<OpenOptions> {
-    let (fps, decoder, interlaced, allow_protocol, threads) = given;
+    let (fps, decoder, interlaced, allow_protocol, threads, aspect) = given;
     Ok(OpenOptions {
         fps: *fps,
+        pixel_aspect: pixel_aspect(py, aspect.as_deref())?,
         decoder: word(
             py,
             "decoder",

@@ -116,10 +116,15 @@ pub fn setup<'py>(
         if let Some(path) = &output {
             found.rig.write(path)?;
         }
-        Ok((rig_json(&found.rig)?, found.warnings, overlay::rgb(&found.picture)?, found.rig.image_px))
+        Ok((
+            rig_json(&found.rig)?,
+            found.warnings,
+            overlay::rgb(&found.picture)?,
+            overlay::size(&found.picture),
+        ))
     });
-    let (rig, warnings, samples, [w, h]) = watch.done(py, outcome)?;
-    let picture = samples.into_pyarray(py).reshape([h as usize, w as usize, 3])?;
+    let (rig, warnings, samples, [h, w]) = watch.done(py, outcome)?;
+    let picture = samples.into_pyarray(py).reshape([h, w, 3])?;
     Ok((rig, messages(py, &warnings)?, picture))
 }
 
@@ -177,6 +182,8 @@ pub fn info(py: Python<'_>, input: PathBuf, open: OpenArguments) -> PyResult<Str
         });
         value["time"] = json!(timing);
         value["frames"] = json!(is_whole.then(|| steps.len()));
+        value["pixel_aspect"] = json!(info.pixel_aspect);
+        value["pixel_aspect_origin"] = json!(info.pixel_aspect_origin);
         value["details"] = json!(info.details.iter().cloned().collect::<std::collections::BTreeMap<_, _>>());
         Ok(value.to_string())
     });

@@ -10,6 +10,7 @@ use std::fmt;
 use crate::error::{Error, Fault, Result};
 use crate::gaps::Gaps;
 use crate::message::Message;
+use crate::pixel_aspect::{AspectOrigin, PixelAspect};
 
 /// How the samples of one row are stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -175,6 +176,10 @@ pub struct SourceInfo {
     pub width: u32,
     /// Height in pixels.
     pub height: u32,
+    /// Width to height of a pixel as handed to detection.
+    pub pixel_aspect: PixelAspect,
+    /// Where that comes from.
+    pub pixel_aspect_origin: AspectOrigin,
     /// Format of the frames handed out.
     pub format: PixelFormat,
     /// Significant bits of a sample.

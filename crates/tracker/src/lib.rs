@@ -25,6 +25,7 @@ pub mod observation;
 pub mod output;
 pub mod overlay;
 pub mod pipeline;
+pub mod pixel_aspect;
 pub mod residual;
 pub mod rig;
 pub mod rigid;

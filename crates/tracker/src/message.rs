@@ -40,6 +40,8 @@ pub enum Setting {
     Output,
     /// Where the annotated picture goes.
     Picture,
+    /// Width to height of a pixel.
+    PixelAspect,
     /// Frames a second at which a drawn film plays.
     PlayFps,
     /// Whether markers are brighter or darker than what is around them.
@@ -62,7 +64,7 @@ pub enum Setting {
 
 impl Setting {
     /// All of them.
-    pub const ALL: [Self; 23] = [
+    pub const ALL: [Self; 24] = [
         Self::AllowProtocol,
         Self::Bits,
         Self::Codec,
@@ -77,6 +79,7 @@ impl Setting {
         Self::MinAreaPx,
         Self::Output,
         Self::Picture,
+        Self::PixelAspect,
         Self::PlayFps,
         Self::Polarity,
         Self::Quality,
@@ -105,6 +108,7 @@ impl Setting {
             Self::MinAreaPx => "min_area_px",
             Self::Output => "output",
             Self::Picture => "picture",
+            Self::PixelAspect => "pixel_aspect",
             Self::PlayFps => "play_fps",
             Self::Polarity => "polarity",
             Self::Quality => "quality",

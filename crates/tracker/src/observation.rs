@@ -2,6 +2,10 @@
 //!
 //! Owns: [`Observation`], [`Status`]. Must not: know how it was made.
 
+use nalgebra::Vector2;
+
+use crate::pixel_aspect::PixelAspect;
+
 /// What is known of a node in a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[repr(u8)]
@@ -51,7 +55,7 @@ pub struct Observation {
     pub x_px: f64,
     /// Centre, px; y down.
     pub y_px: f64,
-    /// Standard uncertainty of each coordinate, px.
+    /// Standard uncertainty of each coordinate in square pixels as high as the recorded ones, px.
     pub sigma_px: f32,
     /// Blob area, px.
     pub area_px: f32,
@@ -70,4 +74,13 @@ impl Observation {
     };
     /// A node in a frame that could not be decoded.
     pub const UNDECODED: Self = Self { status: Status::Undecoded, ..Self::MISSING };
+
+    /// What is known in square pixels, in recorded ones.
+    pub(crate) fn to_recorded(mut self, aspect: PixelAspect) -> Self {
+        if !aspect.is_square() {
+            [self.x_px, self.y_px] = aspect.to_recorded(Vector2::new(self.x_px, self.y_px)).into();
+            self.area_px = (f64::from(self.area_px) / aspect.ratio()) as f32;
+        }
+        self
+    }
 }

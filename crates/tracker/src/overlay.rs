@@ -9,7 +9,7 @@ mod picture;
 
 pub use film::{FilmSettings, Filmed, film};
 use picture::colour;
-pub use picture::{rgb, save};
+pub use picture::{rgb, save, size};
 
 use std::collections::VecDeque;
 
@@ -49,27 +49,31 @@ pub struct Overlay {
     rig: Rig,
     mechanism: Mechanism,
     motions: Vec<Motion>,
+    /// In square pixels, as all places here are.
     trails: Vec<VecDeque<Vector2<f64>>>,
     /// Width and height of the pictures, px.
     size: [i32; 2],
-    /// Pixels of the picture for one of the recording.
+    /// Pixels of the picture for a square one of the recording.
     zoom: f64,
     /// Size of marks in the picture: 1 in one of 1280 px.
     mark: f64,
-    /// The same in pixels of the recording.
+    /// The same in square pixels of the recording.
     scale: f64,
 }
 
 impl Overlay {
-    /// For a checked rig; pictures of the recording's size.
+    /// For a checked rig; pictures of the recording's size, made wider or higher where its pixels are not square.
     pub fn new(rig: &Rig) -> Self {
-        Self::of_width(rig, rig.image_px[0])
+        let width = rig.image_px[0];
+        let wide = (f64::from(width) * rig.pixel_aspect.ratio()).round() as u32;
+        Self::of_width(rig, width.max(wide))
     }
 
     /// For a checked rig; pictures of so many pixels' width, and in proportion.
     pub fn of_width(rig: &Rig, width: u32) -> Self {
         let mechanism = Mechanism::new(rig, 0.3);
         let [w, h] = rig.image_px.map(f64::from);
+        let w = w * rig.pixel_aspect.ratio();
         let zoom = f64::from(width) / w;
         // Marks as large in a picture of 4000 px as in one of 1280 px.
         let mark = (w.max(h) * zoom / 1280.0).clamp(0.4, 4.0);
@@ -95,7 +99,7 @@ impl Overlay {
             let mut pairs: Vec<Pair> = Vec::new();
             for (&node, &local) in link.nodes.iter().zip(&link.template) {
                 if row[node].x_px.is_finite() {
-                    let place = Vector2::new(row[node].x_px, row[node].y_px);
+                    let place = self.place(&row[node]);
                     pairs.push(Pair { local, place, sigma_px: f64::from(row[node].sigma_px).max(0.01) });
                 }
             }
@@ -128,7 +132,7 @@ impl Overlay {
     pub fn follow(&mut self, frame: u64, row: &[Observation]) -> Vec<Option<Isometry2<f64>>> {
         for (trail, o) in self.trails.iter_mut().zip(row) {
             if o.x_px.is_finite() {
-                trail.push_back(Vector2::new(o.x_px, o.y_px));
+                trail.push_back(self.rig.pixel_aspect.to_square(Vector2::new(o.x_px, o.y_px)));
             }
             if trail.len() > TRAIL || (!o.x_px.is_finite() && !trail.is_empty()) {
                 trail.pop_front();
@@ -190,7 +194,7 @@ impl Overlay {
         }
         for (k, o) in row.iter().enumerate() {
             if o.x_px.is_finite() {
-                let p = Vector2::new(o.x_px, o.y_px);
+                let p = self.place(o);
                 let thick = if o.status == Status::Reacquired { 3.0 } else { 1.5 };
                 self.ring(&mut picture, p, 9.0 * s, colour_of(bodies[k]), thick)?;
                 self.write(
@@ -259,10 +263,16 @@ impl Overlay {
         Ok(())
     }
 
+    /// Where a node is, in square pixels.
+    fn place(&self, o: &Observation) -> Vector2<f64> {
+        self.rig.pixel_aspect.to_square(Vector2::new(o.x_px, o.y_px))
+    }
+
     /// A place of the recording in OpenCV's fixed-point pixels of the picture; `None` far outside it.
     fn fine(&self, p: Vector2<f64>) -> Option<Point> {
         let k = f64::from(1 << SHIFT);
-        let [x, y] = [p.x, p.y].map(|v| (v + 0.5) * self.zoom - 0.5);
+        let half = 0.5 * self.rig.pixel_aspect.ratio();
+        let [x, y] = [(p.x, half), (p.y, 0.5)].map(|(v, half)| (v + half) * self.zoom - 0.5);
         (x.abs() < 1e5 && y.abs() < 1e5).then(|| Point::new((x * k).round() as i32, (y * k).round() as i32))
     }
 }
@@ -291,8 +301,9 @@ pub fn still(frame: &Frame, rig: &Rig, detections: &[Detection]) -> Result<Mat> 
     let mut overlay = Overlay::new(rig);
     let mut picture = overlay.draw(frame, None, &row)?;
     for d in detections {
-        let p = Vector2::new(d.x_px, d.y_px);
-        if rig.nodes.iter().all(|n| (Vector2::new(n.x_px, n.y_px) - p).norm() > 3.0) {
+        let square = |x: f64, y: f64| rig.pixel_aspect.to_square(Vector2::new(x, y));
+        let p = square(d.x_px, d.y_px);
+        if rig.nodes.iter().all(|n| (square(n.x_px, n.y_px) - p).norm() > 3.0) {
             overlay.ring(&mut picture, p, 6.0 * overlay.scale, [128.0; 3], 1.0)?;
         }
     }
@@ -305,6 +316,7 @@ mod tests {
 
     use super::*;
     use crate::frame::PixelFormat;
+    use crate::pixel_aspect::PixelAspect;
     use crate::rig::{Body, Node};
 
     fn rig() -> Rig {
@@ -312,6 +324,7 @@ mod tests {
         Rig {
             schema: 1,
             image_px: [128, 96],
+            pixel_aspect: PixelAspect::SQUARE,
             reference_frame: None,
             region: None,
             lens: None,

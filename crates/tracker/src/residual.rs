@@ -31,7 +31,7 @@ pub fn residuals(rig: &Rig, rows: &Rows) -> Vec<NodeMotion> {
     for t in 0..rows.frames() {
         let at = |k: usize| {
             let p = Vector2::new(rows.xy_px[2 * (t * n + k)], rows.xy_px[2 * (t * n + k) + 1]);
-            p.x.is_finite().then_some(p)
+            p.x.is_finite().then(|| rig.pixel_aspect.to_square(p))
         };
         for k in 0..n {
             let Some(p) = at(k) else { continue };

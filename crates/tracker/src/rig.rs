@@ -11,6 +11,7 @@ use crate::kind::{self, Kind};
 use crate::message::SETUP;
 use crate::name::text;
 use crate::output;
+use crate::pixel_aspect::PixelAspect;
 
 /// Version of the rig file's form; a file with a higher one is refused.
 pub const RIG_SCHEMA: u32 = 1;
@@ -79,6 +80,10 @@ pub struct Rig {
     pub schema: u32,
     /// Width and height of the recording, px; a recording of another size is refused.
     pub image_px: [u32; 2],
+    /// Width to height of a pixel; a recording of other pixels is refused. All places here are in recorded pixels, and
+    /// bodies are rigid in square ones.
+    #[serde(default, skip_serializing_if = "PixelAspect::is_square")]
+    pub pixel_aspect: PixelAspect,
     /// Index of the frame in which every node is at its place; `None` if the places come from elsewhere.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reference_frame: Option<u64>,

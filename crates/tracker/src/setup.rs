@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use opencv::core::Mat;
 
-use crate::detect::{Detection, Detector, Flags};
+use crate::detect::{DetectSettings, Detection, Detector, Flags};
 use crate::discover::advice::advise;
 use crate::error::{Error, Fault, Place, Result};
 use crate::frame::Frame;
@@ -82,6 +82,7 @@ fn frame_at(
     let RunSettings { input, open, detect, threads, .. } = settings;
     let source = pipeline::open(input, open, observer)?;
     let (mut source, samples) = pipeline::sample(source, 24, observer)?;
+    let detect = &DetectSettings { pixel_aspect: source.info().pixel_aspect, ..detect.clone() };
     let levels = pipeline::learn(samples, detect, *threads, observer)?;
     let mut detections = Vec::new();
     while let Some(frame) = source.next_frame()? {

@@ -12,6 +12,7 @@ use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use crate::detect::Detection;
 use crate::error::{Error, Fault, Place, Result};
+use crate::pixel_aspect::PixelAspect;
 use block::{BLOCK_FRAMES, Block};
 pub use spool::{Finished, Spool};
 pub use stamp::FrameStamp;
@@ -38,6 +39,8 @@ pub struct DetectionStore {
     /// The block being filled.
     tail: Block,
     cache: Mutex<Vec<(usize, Arc<Block>)>>,
+    /// Width to height of a pixel of what is pushed; what is read is in square pixels.
+    pixel_aspect: PixelAspect,
     /// The first thing that went wrong while reading back.
     fault: OnceLock<Error>,
 }
@@ -65,6 +68,7 @@ impl DetectionStore {
             in_memory: true,
             tail: Block::default(),
             cache: Mutex::new(Vec::new()),
+            pixel_aspect: PixelAspect::SQUARE,
             fault: OnceLock::new(),
         }
     }
@@ -84,7 +88,18 @@ impl DetectionStore {
         Ok(store)
     }
 
-    /// Adds the next frame.
+    /// The same for a recording of such pixels.
+    #[must_use]
+    pub fn of_pixels(self, pixel_aspect: PixelAspect) -> Self {
+        Self { pixel_aspect, ..self }
+    }
+
+    /// Width to height of a pixel of the recording.
+    pub fn pixel_aspect(&self) -> PixelAspect {
+        self.pixel_aspect
+    }
+
+    /// Adds the next frame, its detections in recorded pixels.
     ///
     /// # Errors
     /// [`Error::Table`] if the disk behind the store is full or cannot be written.
@@ -158,11 +173,15 @@ impl DetectionStore {
         self.with_block(i, |block, k| block.stamp(k)).unwrap_or_else(|e| self.lost(i, e))
     }
 
-    /// Copies the detections of the `i`-th frame stored into `out`, cleared first; see [`DetectionStore::check`].
+    /// Copies the detections of the `i`-th frame stored into `out`, cleared first, in square pixels: there alone bodies
+    /// are rigid. See [`DetectionStore::check`].
     pub fn read(&self, i: usize, out: &mut Vec<Detection>) {
         out.clear();
         if let Err(e) = self.with_block(i, |block, k| out.extend_from_slice(block.detections(k))) {
             self.lost(i, e);
+        }
+        if !self.pixel_aspect.is_square() {
+            out.iter_mut().for_each(|d| *d = d.to_square(self.pixel_aspect));
         }
     }
 

@@ -34,6 +34,8 @@ class Options:
     """Rig file for films; found in the film if not given."""
     fps: float | None = None
     """Frames per second of recorded time, where a film does not know."""
+    pixel_aspect: str | None = None
+    """Width to height of a film's pixels, e.g. ``16:15``, instead of what the film says."""
     encoder: str | None = None
     """Encoder file of the first recording: time_s and voltage_v (or an angle) as CSV, TDMS or NumPy."""
     column: str | None = None

@@ -171,7 +171,7 @@ def _plan_recording(
             f"Tracking {r.label}",
             (),
             r.name,
-            [r.digest, known.option(options.rig), options.fps],
+            [r.digest, known.option(options.rig), options.fps, options.pixel_aspect],
             lambda into, tell, resume: stages.track(r, options, into, tell, resume),
             ("nodes.parquet",),
         )

@@ -78,6 +78,7 @@ def track(r: Recording, options: Options, into: Path, tell: Tell, resume: bool) 
         r.path,
         options.rig,
         fps=options.fps,
+        pixel_aspect=options.pixel_aspect,
         threads=options.threads,
         output=into / "nodes.parquet",
         resume=resume,
@@ -143,7 +144,14 @@ def _hanging(r: Recording, options: Options, here: Path, into: Path) -> Any:
     # The same rig, so that the markers have the same names.
     rig = into / "zero_rig.toml"
     _nodes(here, r).rig.write(rig)
-    return track_film(path, rig, fps=options.fps, output=into / "zero.parquet", progress=False)
+    return track_film(
+        path,
+        rig,
+        fps=options.fps,
+        pixel_aspect=options.pixel_aspect,
+        output=into / "zero.parquet",
+        progress=False,
+    )
 
 
 def angles(r: Recording, options: Options, here: Path, into: Path) -> str:

@@ -18,7 +18,7 @@ from pydpend.angles.unwrap import unwrap
 from pydpend.errors import CHECK, AnglesError, Setting, fault, one_of
 
 if TYPE_CHECKING:
-    from pydpend.nodes import Nodes
+    from pydpend.nodes import Nodes, Rig
 
 Method = Literal["rigid", "linkage", "pairwise"]
 ESTIMATORS: tuple[Method, ...] = get_args(Method)
@@ -74,7 +74,7 @@ def angles(
     markers = body_markers(nodes, bodies, mirrored)
     _check_length(estimator, len(markers), link_length_m, link_length_sigma_m)
     label = name if name is not None else _label(nodes)
-    raw = _estimate(markers, estimator, mirrored, link_length_m, link_length_sigma_m)
+    raw = _estimate(markers, nodes.rig, estimator, mirrored, link_length_m, link_length_sigma_m)
     notes: list[str] = list(raw.meta.pop("notes", ()))
     ending = nodes.meta.get("ending")
     if isinstance(ending, dict) and ending.get("kind") != "complete":
@@ -118,7 +118,8 @@ def _with_time(t_s: Floats, phi: Floats, sigma: Floats, time_sigma_s: float) -> 
 def find_linkage(nodes: Nodes, *, bodies: Sequence[str] | None = None, mirrored: bool = False) -> Linkage:
     """Pivot, elbow, the places of the markers in their links and the link's length in px, with uncertainties.
 
-    Places are in the world's directions (y up); ``to_image`` turns them back. Raises
+    Places are in the world's directions (y up) and in square pixels, as high as the recorded ones; ``to_image`` turns
+    them back. Raises
     :class:`~pydpend.errors.AnglesError` if the links turn too little to find the joints.
     """
     poses = [fit_pose(m) for m in body_markers(nodes, bodies, mirrored)]
@@ -152,6 +153,7 @@ def _label(nodes: Nodes) -> str:
 
 def _estimate(
     markers: list[BodyMarkers],
+    rig: Rig,
     estimator: Method,
     mirrored: bool,
     length_m: float | None,
@@ -190,12 +192,12 @@ def _estimate(
         if length_m is not None:
             linked = fit_linkage(poses[0], lower)
             shape = linked.linkage.shape
-            meta["linkage"] = _linkage_meta(linked.linkage, mirrored, length_m, length_sigma_m)
+            meta["linkage"] = _linkage_meta(linked.linkage, rig, mirrored, length_m, length_sigma_m)
         else:
             shape = _shape_or_none(poses)
         return Raw(theta, sigma, [p.template_px for p in poses], shape, meta)
     linked = fit_linkage(poses[0], lower)
-    meta["linkage"] = _linkage_meta(linked.linkage, mirrored, length_m, length_sigma_m)
+    meta["linkage"] = _linkage_meta(linked.linkage, rig, mirrored, length_m, length_sigma_m)
     sigma, meta["notes"] = checked_sigma(linked, poses)
     shape = linked.linkage.shape
     templates = [shape.upper_px] if lower is None else [shape.upper_px, shape.lower_px]
@@ -226,16 +228,17 @@ def _body_meta(pose: Pose) -> dict[str, Any]:
 
 
 def _linkage_meta(
-    linkage: Linkage, mirrored: bool, length_m: float | None, length_sigma_m: float
+    linkage: Linkage, rig: Rig, mirrored: bool, length_m: float | None, length_sigma_m: float
 ) -> dict[str, Any]:
+    """Places in recorded pixels, lengths and the scale in square ones."""
     meta: dict[str, Any] = {
-        "pivot_px": to_image(linkage.shape.pivot_px, mirrored).tolist(),
-        "pivot_sigma_px": linkage.pivot_sigma_px.tolist(),
+        "pivot_px": to_image(linkage.shape.pivot_px, rig, mirrored).tolist(),
+        "pivot_sigma_px": np.abs(to_image(linkage.pivot_sigma_px, rig)).tolist(),
         "sigma_scale": linkage.sigma_scale,
     }
     if linkage.shape.links == 2:
         elbow = linkage.shape.pivot_px + linkage.shape.elbow_px
-        meta["elbow_in_reference_frame_px"] = to_image(elbow, mirrored).tolist()
+        meta["elbow_in_reference_frame_px"] = to_image(elbow, rig, mirrored).tolist()
         meta["link_length_px"] = linkage.length_px
         meta["link_length_sigma_px"] = linkage.length_sigma_px
         if length_m is not None:

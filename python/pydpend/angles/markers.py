@@ -1,6 +1,7 @@
 """From a node table to what the estimators need: each body's markers in the world's directions.
 
-Owns: the **one place where image y (down) becomes world y (up)**, and which rows count as seen.
+Owns: the **one place where image y (down) becomes world y (up)** and recorded pixels become square ones, as high as
+these, and which rows count as seen.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from pydpend.angles.table import Floats
 from pydpend.errors import CHECK, AnglesError, Setting, fault
 
 if TYPE_CHECKING:
-    from pydpend.nodes import Nodes
+    from pydpend.nodes import Nodes, Rig
 
 SEEN_STATUS = (1, 2)
 """Row states whose centre is trusted: ``seen`` and ``reacquired``. ``ambiguous`` is not."""
@@ -26,7 +27,7 @@ SEEN_STATUS = (1, 2)
 class BodyMarkers:
     """The K markers of one body over T frames.
 
-    ``xy_px`` (T, K, 2): world directions, x right and y **up**, px, 0 where not seen. ``weight`` (T, K): 1 /
+    ``xy_px`` (T, K, 2): world directions, x right and y **up**, square px, 0 where not seen. ``weight`` (T, K): 1 /
     sigma^2 in px^-2, 0 where not seen. ``reference_px`` (K, 2): the rig's own places of the markers.
     """
 
@@ -52,18 +53,24 @@ class BodyMarkers:
         return BodyMarkers(self.name, self.nodes, self.xy_px[rows], self.weight[rows], self.reference_px)
 
 
-def to_world(xy_px: Floats, mirrored: bool = False) -> Floats:
-    """Image places (..., 2), y down, to world directions, y up; ``mirrored`` turns x round as well.
+def to_world(xy_px: Floats, rig: Rig, mirrored: bool = False) -> Floats:
+    """Image places (..., 2), y down, to square pixels in world directions, y up.
 
-    With ``mirrored`` a film taken from behind, or flipped by the camera, gives the angles seen from the
-    front.
+    With ``mirrored``, which turns x round as well, a film taken from behind, or flipped by the camera, gives the angles
+    seen from the front.
     """
-    return np.asarray(xy_px * np.array([-1.0 if mirrored else 1.0, -1.0]))
+    return np.asarray(xy_px * _scale(rig, mirrored))
 
 
-def to_image(xy_px: Floats, mirrored: bool = False) -> Floats:
-    """The way back; the flip is its own inverse."""
-    return to_world(xy_px, mirrored)
+def to_image(xy_px: Floats, rig: Rig, mirrored: bool = False) -> Floats:
+    """The way back."""
+    return np.asarray(xy_px / _scale(rig, mirrored))
+
+
+def _scale(rig: Rig, mirrored: bool) -> Floats:
+    """World px for a recorded one along x and along y."""
+    width, height = rig.pixel_aspect
+    return np.array([(-1.0 if mirrored else 1.0) * (width / height), -1.0])
 
 
 def body_markers(
@@ -114,7 +121,7 @@ def body_markers(
                     "Look at " + CHECK + " of the table",
                 )
             )
-        xy = to_world(np.where(seen[..., None], nodes.xy_px[:, index], 0.0), mirrored)
+        xy = to_world(np.where(seen[..., None], nodes.xy_px[:, index], 0.0), rig, mirrored)
         sigma = np.where(seen, nodes.sigma_px[:, index], 1.0).astype(np.float64)
         reference = np.array([[rig.nodes[i].x_px, rig.nodes[i].y_px] for i in index], dtype=np.float64)
         out.append(
@@ -123,7 +130,7 @@ def body_markers(
                 tuple(rig.nodes[i].name for i in index),
                 xy,
                 np.where(seen, sigma**-2.0, 0.0),
-                to_world(reference, mirrored),
+                to_world(reference, rig, mirrored),
             )
         )
     return out

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pydpend.angles.linkage import Shape
-from pydpend.angles.markers import BodyMarkers, to_image
+from pydpend.angles.markers import BodyMarkers, to_world
 from pydpend.angles.swing import within_half_turn
 from pydpend.angles.table import Floats
 from pydpend.errors import AnglesError, Setting, fault
@@ -86,7 +86,8 @@ def _vectors(
     """For each link the places (K, 2) that say where it points, seen from its upper joint, in the reference frame."""
     if shape is not None:
         return [shape.upper_px] if shape.links == 1 else [shape.elbow_px[None], shape.lower_px]
-    joints = {j.bodies: np.array([j.x_px, j.y_px]) * to_image(np.ones(2), mirrored) for j in nodes.rig.joints}
+    rig = nodes.rig
+    joints = {j.bodies: to_world(np.array([j.x_px, j.y_px]), rig, mirrored) for j in rig.joints}
     pivot = next((p for b, p in joints.items() if tuple(b) == (markers[0].name,)), None)
     elbow = next((p for b, p in joints.items() if len(b) == 2), None)
     if len(markers) == 1:

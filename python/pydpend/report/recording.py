@@ -288,6 +288,7 @@ def read(folder: Path, facts: dict[str, Any], stages: set[str]) -> Part:
         rows += [
             ("frames", str(nodes.frame.size)),
             *_times(nodes.t_s, nodes.meta.get("time")),
+            *_pixels(nodes),
             ("markers, bodies", f"{len(nodes.rig.nodes)}, {len(nodes.rig.bodies)}"),
             ("markers seen, of all frames", f"{100 * seen.mean():.1f} %"),
             ("median uncertainty of a centre", f"{digits(float(np.nanmedian(nodes.sigma_px)))} px"),
@@ -363,6 +364,17 @@ def _times(t_s: NDArray[np.float64], time: Any = None) -> list[tuple[str, str]]:
         uneven = fastest - slowest > 1e-3 * fastest
         rate = rate if not uneven else f"variable, {slowest:.3g} to {fastest:.3g} per s"
     return [("duration", f"{t_s[-1] - t_s[0]:.3f} s"), ("rate", rate)]
+
+
+def _pixels(nodes: Nodes) -> list[tuple[str, str]]:
+    """How wide a pixel is, where it is not square."""
+    width, height = nodes.rig.pixel_aspect
+    if width == height:
+        return []
+    source = nodes.meta.get("source")
+    given = isinstance(source, dict) and source.get("pixel_aspect_origin") == "user"
+    origin = "as given" if given else "as the recording says"
+    return [("pixels", f"{width / height:.4f} wide ({width}:{height}), {origin}")]
 
 
 def _columns(path: Path) -> dict[str, NDArray[np.float64]]:

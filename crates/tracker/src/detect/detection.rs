@@ -2,6 +2,10 @@
 //!
 //! Owns: [`Detection`], [`Flags`]. Must not: know how a centre is found.
 
+use nalgebra::Vector2;
+
+use crate::pixel_aspect::PixelAspect;
+
 /// Facts about a detection that make its centre less trustworthy, as bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Flags(pub u8);
@@ -29,14 +33,25 @@ pub struct Detection {
     pub x_px: f64,
     /// Centre, px; y down.
     pub y_px: f64,
-    /// Standard uncertainty of each coordinate, px.
+    /// Standard uncertainty of each coordinate in square pixels as high as the recorded ones, px: the greater of the two.
     pub sigma_px: f32,
     /// Area beyond the threshold, px.
     pub area_px: f32,
     /// Largest difference from the background, raw units of the recording, above 0 for either polarity.
     pub peak: f32,
-    /// Longer over shorter principal axis, at least 1.
+    /// Longer over shorter principal axis in the world, at least 1.
     pub elongation: f32,
     /// What makes it less trustworthy.
     pub flags: Flags,
+}
+
+impl Detection {
+    /// What is known in recorded pixels, in square ones.
+    pub(crate) fn to_square(mut self, aspect: PixelAspect) -> Self {
+        if !aspect.is_square() {
+            [self.x_px, self.y_px] = aspect.to_square(Vector2::new(self.x_px, self.y_px)).into();
+            self.area_px = (f64::from(self.area_px) * aspect.ratio()) as f32;
+        }
+        self
+    }
 }

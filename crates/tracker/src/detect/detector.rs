@@ -28,6 +28,8 @@ use crate::frame::Frame;
 #[derive(Debug)]
 pub struct Detector {
     levels: Arc<Levels>,
+    /// Width and height of a pixel in units of the square of its area.
+    sides: [f64; 2],
     centroid: Centroid,
     spans: Spans,
     plan: Plan,
@@ -52,16 +54,18 @@ impl Detector {
         let spans = Spans::new(settings.region.as_ref(), width, height)?;
         let plan = Plan::new(&levels, &spans, height);
         let lens = settings.lens.as_ref().map(Undistort::new).transpose()?;
-        let table = levels.marker.map(|m| EdgeTable::new(m.radius_px, m.blur_px));
+        let sides = levels.pixel_aspect.sides();
+        let table = levels.marker.map(|m| EdgeTable::new(m.radius_px, m.blur_px, sides));
         Ok(Self {
             levels,
+            sides,
             centroid: settings.centroid,
             spans,
             plan,
             lens,
             labeller: Labeller::default(),
             blobs: Vec::new(),
-            window: Window::default(),
+            window: Window::new(sides),
             tallest: 0,
             table,
             mask: Vec::new(),
@@ -133,9 +137,10 @@ impl Detector {
         let mut near = [[0.0; 3]; 2];
         let Some(table) = &self.table else { return near };
         let blob = &self.blobs[i];
-        let reach = table.reach_px.ceil() as u32 * 2 + 4;
-        let (left, right) = (blob.x0.saturating_sub(reach), blob.x1 + reach);
-        let (above, below) = (blob.y0.saturating_sub(reach), blob.y1 + reach);
+        let reach = table.reach_px.ceil() * 2.0 + 4.0;
+        let [across, down] = self.sides.map(|side| (reach / side).ceil() as u32);
+        let (left, right) = (blob.x0.saturating_sub(across), blob.x1 + across);
+        let (above, below) = (blob.y0.saturating_sub(down), blob.y1 + down);
         // Blobs are in order of their first row.
         let before = self.blobs[..i].iter().rev().take_while(|b| b.y0 + self.tallest > above);
         let after = self.blobs[i + 1..].iter().take_while(|b| b.y0 <= below);
@@ -144,7 +149,8 @@ impl Detector {
             let meets = b.x0 <= right && b.x1 >= left && b.y0 <= below && b.y1 >= above;
             if meets && b.area >= 4 && n < 2 {
                 let [x, y] = b.mean();
-                near[n] = [x, y, (b.area as f64 / std::f64::consts::PI).sqrt() * b.elongation().sqrt()];
+                near[n] =
+                    [x, y, (b.area as f64 / std::f64::consts::PI).sqrt() * b.elongation(self.sides).sqrt()];
                 n += 1;
             }
         }
@@ -170,7 +176,8 @@ impl Detector {
         let slack = (4.0 * marker.radius_spread).max(0.12);
         let good = found.iter().all(|f| {
             f.chi2 < shape::misfit_limit(&self.levels) && (f.radius_px / marker.radius_px - 1.0).abs() < slack
-        }) && (a[0] - b[0]).hypot(a[1] - b[1]) > 0.8 * marker.radius_px;
+        }) && ((a[0] - b[0]) * self.sides[0]).hypot((a[1] - b[1]) * self.sides[1])
+            > 0.8 * marker.radius_px;
         if !good {
             return false;
         }
@@ -179,7 +186,7 @@ impl Detector {
             out.push(Detection {
                 x_px: f.x_px,
                 y_px: f.y_px,
-                sigma_px: centre.sigma_px as f32,
+                sigma_px: (centre.sigma_px * self.sides[0]) as f32,
                 area_px: (std::f64::consts::PI * f.radius_px * f.radius_px) as f32,
                 peak: centre.peak as f32,
                 elongation: 1.0,
@@ -192,7 +199,7 @@ impl Detector {
     fn centre(&mut self, pixels: &Pixels<'_>, blob: &Blob, avoid: [[f64; 3]; 2]) -> Centre {
         // A disc smeared over more than its radius is no disc any more.
         if let Some(table) = &self.table
-            && blob.elongation() < 1.6
+            && blob.elongation(self.sides) < 1.6
         {
             let fit = disc_fit(table, &self.levels);
             if let Some(f) = self.window.fit(pixels, blob, &fit, avoid)
@@ -280,13 +287,15 @@ fn centre_of(f: &Fitted) -> Centre {
 }
 
 fn detection(blob: &Blob, centre: &Centre, levels: &Levels) -> Detection {
+    let sides = levels.pixel_aspect.sides();
     Detection {
         x_px: centre.x_px,
         y_px: centre.y_px,
-        sigma_px: centre.sigma_px as f32,
+        // From units of the square of a pixel's area to its height.
+        sigma_px: (centre.sigma_px * sides[0]) as f32,
         area_px: blob.area as f32,
         peak: centre.peak as f32,
-        elongation: blob.elongation() as f32,
+        elongation: blob.elongation(sides) as f32,
         flags: shape::judge(blob, centre, levels),
     }
 }

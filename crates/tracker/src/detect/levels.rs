@@ -8,6 +8,7 @@ use super::learn::background::Background;
 use super::marker::Marker;
 use super::noise::Noise;
 use super::side::Side;
+use crate::pixel_aspect::PixelAspect;
 
 /// What was learned of a recording. Written into the table's metadata.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -16,6 +17,9 @@ pub struct Levels {
     pub side: Side,
     /// Width and height of the frames, px.
     pub image_px: [u32; 2],
+    /// Width to height of a pixel.
+    #[serde(default, skip_serializing_if = "PixelAspect::is_square")]
+    pub pixel_aspect: PixelAspect,
     /// Significant bits of a sample.
     pub depth_bits: u32,
     /// Background, raw units.

@@ -3,6 +3,7 @@
 //! Owns: [`DetectSettings`], [`Threshold`], [`Polarity`], [`Centroid`]. Must not: learn what a setting leaves open
 //! (`learn` does).
 
+use crate::pixel_aspect::PixelAspect;
 use crate::rig::{Lens, Region};
 
 /// Where the threshold comes from.
@@ -57,4 +58,7 @@ pub struct DetectSettings {
     pub region: Option<Region>,
     /// Lens correction of centres; `None` is none.
     pub lens: Option<Lens>,
+    /// Width to height of a pixel: a disc is as much narrower in the image.
+    #[serde(default, skip_serializing_if = "PixelAspect::is_square")]
+    pub pixel_aspect: PixelAspect,
 }

@@ -16,7 +16,8 @@ const MERGING_RADII: f64 = 2.5;
 /// Warnings, a sentence each. `rate_hz` is the rate of the recording, if known; `rows` its nodes.
 pub fn advise(rig: &Rig, rows: &Rows, rate_hz: Option<f64>) -> Vec<String> {
     let n = rig.nodes.len();
-    let home: Vec<Vector2<f64>> = rig.nodes.iter().map(|a| Vector2::new(a.x_px, a.y_px)).collect();
+    let home: Vec<Vector2<f64>> =
+        rig.nodes.iter().map(|a| rig.pixel_aspect.to_square(Vector2::new(a.x_px, a.y_px))).collect();
     let mut out = Vec::new();
     out.extend(rate(rig, &home, rows, rate_hz));
     for (b, body) in rig.bodies.iter().enumerate() {
@@ -35,8 +36,10 @@ pub fn advise(rig: &Rig, rows: &Rows, rate_hz: Option<f64>) -> Vec<String> {
     out
 }
 
-fn place(rows: &Rows, n: usize, t: usize, k: usize) -> Option<Vector2<f64>> {
-    let p = Vector2::new(rows.xy_px[2 * (t * n + k)], rows.xy_px[2 * (t * n + k) + 1]);
+/// Of node `k` in frame `t` in square pixels.
+fn place(rig: &Rig, rows: &Rows, t: usize, k: usize) -> Option<Vector2<f64>> {
+    let at = 2 * (t * rig.nodes.len() + k);
+    let p = rig.pixel_aspect.to_square(Vector2::new(rows.xy_px[at], rows.xy_px[at + 1]));
     p.x.is_finite().then_some(p)
 }
 
@@ -53,7 +56,7 @@ fn rate(rig: &Rig, home: &[Vector2<f64>], rows: &Rows, rate_hz: Option<f64>) -> 
     for k in 0..n {
         let spacing = if nearest(k, true).is_finite() { nearest(k, true) } else { nearest(k, false) };
         for t in 1..rows.frames() {
-            if let (Some(a), Some(b)) = (place(rows, n, t - 1, k), place(rows, n, t, k))
+            if let (Some(a), Some(b)) = (place(rig, rows, t - 1, k), place(rig, rows, t, k))
                 && rows.frame[t] == rows.frame[t - 1] + 1
             {
                 let step = (b - a).norm();
@@ -89,12 +92,12 @@ fn merging(rig: &Rig, rows: &Rows) -> Vec<String> {
     let mut areas: Vec<f32> = rows.area_px.iter().copied().filter(|a| a.is_finite()).collect();
     areas.sort_by(f32::total_cmp);
     let Some(&area) = areas.get(areas.len() / 2) else { return Vec::new() };
-    let radius = (f64::from(area) / std::f64::consts::PI).sqrt();
+    let radius = (f64::from(area) * rig.pixel_aspect.ratio() / std::f64::consts::PI).sqrt();
     let mut out = Vec::new();
     for i in 0..n {
         for j in i + 1..n {
             let near = (0..rows.frames())
-                .filter_map(|t| Some((place(rows, n, t, i)? - place(rows, n, t, j)?).norm()))
+                .filter_map(|t| Some((place(rig, rows, t, i)? - place(rig, rows, t, j)?).norm()))
                 .fold(f64::INFINITY, f64::min);
             if near < MERGING_RADII * radius {
                 let same = bodies[i] == bodies[j];
@@ -119,7 +122,7 @@ fn not_at_rest(rig: &Rig, rows: &Rows) -> Option<String> {
         return None;
     }
     let (k, step) = (0..n)
-        .filter_map(|k| Some((k, (place(rows, n, t, k)? - place(rows, n, before, k)?).norm())))
+        .filter_map(|k| Some((k, (place(rig, rows, t, k)? - place(rig, rows, before, k)?).norm())))
         .max_by(|a, b| a.1.total_cmp(&b.1))?;
     (step > 0.5).then(|| {
         format!(

@@ -6,6 +6,7 @@ use nalgebra::{Isometry2, Vector2};
 
 use super::circle::Circle;
 use crate::error::Result;
+use crate::pixel_aspect::PixelAspect;
 use crate::rig::{Body, Joint, Node, RIG_SCHEMA, Rig};
 use crate::rigid::body::Link;
 use crate::rigid::forecast::hung_at;
@@ -110,7 +111,7 @@ fn joint(a: &Found, b: Option<&Found>) -> Option<Turning> {
 }
 
 /// The rig of the bodies: joints found, bodies ordered and named, nodes ordered along them, placed as in frame
-/// `reference` of the sample.
+/// `reference` of the sample and in recorded pixels, while those of the bodies are square.
 ///
 /// # Errors
 /// [`crate::error::Error::Interrupted`] once `stop` was asked for.
@@ -119,6 +120,7 @@ pub fn arrange(
     reference: usize,
     reference_frame: Option<u64>,
     image_px: [u32; 2],
+    pixel_aspect: PixelAspect,
     stop: &Stop,
 ) -> Result<Rig> {
     let n = found.len();
@@ -192,6 +194,7 @@ pub fn arrange(
     let mut rig = Rig {
         schema: RIG_SCHEMA,
         image_px,
+        pixel_aspect,
         reference_frame,
         region: None,
         lens: None,
@@ -214,6 +217,7 @@ pub fn arrange(
             link.template.iter().map(|&t| (axis.dot(&t), place(&pose(b), t))).collect();
         along.sort_by(|a, b| a.0.total_cmp(&b.0));
         for (_, p) in along {
+            let p = pixel_aspect.to_recorded(p);
             rig.nodes.push(Node {
                 name: format!("n{}", rig.nodes.len()),
                 body: names[k].clone(),
@@ -240,6 +244,7 @@ pub fn arrange(
                 (name, vec![names[on].clone(), names[k].clone()], p)
             }
         };
+        let p = pixel_aspect.to_recorded(p);
         rig.joints.push(Joint { name, bodies, x_px: p.x, y_px: p.y });
     }
     Ok(rig)

@@ -16,6 +16,7 @@ use rayon::prelude::*;
 
 use crate::error::{Error, Fault, Result};
 use crate::message::{Message, SETUP, Setting};
+use crate::pixel_aspect::PixelAspect;
 use crate::rig::Rig;
 use crate::rigid::body::Link;
 use crate::rigid::pose::place;
@@ -35,7 +36,7 @@ pub struct Discovery {
     pub warnings: Vec<Message>,
 }
 
-/// Finds the rig of a recording of `image_px` (width, height) pixels.
+/// Finds the rig of a recording of `image_px` (width, height) pixels; its places are in these.
 ///
 /// # Errors
 /// [`Error::Rig`] if there are no markers or none moves; [`Error::Interrupted`] once `stop` was asked for.
@@ -69,7 +70,8 @@ pub fn discover(store: &DetectionStore, image_px: [u32; 2], stop: &Stop) -> Resu
         ));
     }
     if let Some((a, b)) = bodies::alike(&links, stop)? {
-        let (a, b) = (place_words(&found[a]), place_words(&found[b]));
+        let (a, b) =
+            (place_words(&found[a], store.pixel_aspect()), place_words(&found[b], store.pixel_aspect()));
         return Err(Error::Rig(
             Fault::new(
                 "recording",
@@ -80,13 +82,14 @@ pub fn discover(store: &DetectionStore, image_px: [u32; 2], stop: &Stop) -> Resu
             ),
         ));
     }
-    let (reference, whole) = reference(&sample, &found, image_px, stop)?;
+    let aspect = store.pixel_aspect();
+    let (reference, whole) = reference(&sample, &found, image_px, aspect, stop)?;
     if !whole {
         warnings
             .push("no frame shows every marker: their places are put together from several frames".into());
     }
     let index = store.stamp(sample.frames[reference]).index;
-    let mut rig = arrange::arrange(&found, reference, Some(index), image_px, stop)?;
+    let mut rig = arrange::arrange(&found, reference, Some(index), image_px, aspect, stop)?;
     let lost = rig.leave_out_unreachable();
     if !lost.is_empty() {
         warnings.push(
@@ -114,7 +117,8 @@ pub fn discover(store: &DetectionStore, image_px: [u32; 2], stop: &Stop) -> Resu
             .into(),
         );
     }
-    Ok(Discovery { rig, standing: standing.iter().map(|p| [p.x, p.y]).collect(), warnings })
+    let standing = standing.iter().map(|p| aspect.to_recorded(*p).into()).collect();
+    Ok(Discovery { rig, standing, warnings })
 }
 
 /// Bodies with their poses. Those that do not move are no bodies: their points are counted among the standing.
@@ -158,9 +162,18 @@ fn moving_bodies(sample: &mut Sample, stop: &Stop) -> Result<Vec<Found>> {
 }
 
 /// The frame of the sample in which most nodes are seen, the first of those, and whether it shows all.
-fn reference(sample: &Sample, found: &[Found], image_px: [u32; 2], stop: &Stop) -> Result<(usize, bool)> {
+fn reference(
+    sample: &Sample,
+    found: &[Found],
+    image_px: [u32; 2],
+    aspect: PixelAspect,
+    stop: &Stop,
+) -> Result<(usize, bool)> {
     let [w, h] = image_px.map(f64::from);
-    let inside = |p: Vector2<f64>| p.x > 0.0 && p.y > 0.0 && p.x < w - 1.0 && p.y < h - 1.0;
+    let inside = |square: Vector2<f64>| {
+        let p = aspect.to_recorded(square);
+        p.x > 0.0 && p.y > 0.0 && p.x < w - 1.0 && p.y < h - 1.0
+    };
     let all: usize = found.iter().map(|f| f.link.nodes.len()).sum();
     let (mut best, mut index) = ((false, 0), 0);
     for (k, frame) in sample.moving.iter().enumerate() {
@@ -188,7 +201,7 @@ fn reference(sample: &Sample, found: &[Found], image_px: [u32; 2], stop: &Stop) 
 }
 
 /// Where a body was found, for a message.
-fn place_words(found: &Found) -> String {
-    let at = found.link.home + found.link.template[0];
+fn place_words(found: &Found, aspect: PixelAspect) -> String {
+    let at = aspect.to_recorded(found.link.home + found.link.template[0]);
     format!("one with a marker at ({:.0}, {:.0}) px", at.x, at.y)
 }

@@ -42,6 +42,7 @@ pub use write_options::WriteOptions;
 
 use crate::error::Result;
 use crate::frame::{Frame, PixelFormat, TimeBase};
+use crate::pixel_aspect::PixelAspect;
 use crate::rig::{Body, Joint, Node, RIG_SCHEMA, Rig};
 use motion::{Mechanism, bar};
 use scene::{Glint, within};
@@ -257,6 +258,7 @@ impl Film {
         Rig {
             schema: RIG_SCHEMA,
             image_px: scene.image_px,
+            pixel_aspect: PixelAspect::SQUARE,
             reference_frame: Some(index),
             region: None,
             lens: None,

@@ -28,7 +28,8 @@ pub struct FilmSettings {
     pub quality: u32,
     /// Each such frame of the table is drawn, from its first.
     pub every: usize,
-    /// Width of the film in px, the height in proportion; `None` is the recording's. Odd sizes lose a row or column.
+    /// Width of the film in px, the height in proportion; `None` is the recording's in square pixels. Odd sizes lose a row
+    /// or column.
     pub width: Option<u32>,
     /// Whether a file that is there already is replaced.
     pub replace: bool,
@@ -97,7 +98,19 @@ pub fn film(
                 .advice("Give the recording that the table was made from"),
         ));
     }
-    let mut overlay = Overlay::of_width(rig, settings.width.unwrap_or(rig.image_px[0]));
+    if let Some(given) = open.pixel_aspect.filter(|given| !given.agrees(rig.pixel_aspect)) {
+        return Err(Error::Table(
+            Fault::new(
+                input,
+                format!("pixels of {given} were asked for, the table is of {}", rig.pixel_aspect),
+            )
+            .advice("Leave out " + Setting::PixelAspect + ", or track the recording with it"),
+        ));
+    }
+    let mut overlay = match settings.width {
+        Some(width) => Overlay::of_width(rig, width),
+        None => Overlay::new(rig),
+    };
     let mut writer = VideoWriter::create(
         output,
         &VideoSettings {

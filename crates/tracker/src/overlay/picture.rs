@@ -1,6 +1,6 @@
 //! Frames as OpenCV's pictures, and pictures as bytes and files.
 //!
-//! Owns: [`colour`], [`rgb`], [`save`]. Must not: draw.
+//! Owns: [`colour`], [`rgb`], [`size`], [`save`]. Must not: draw.
 
 use std::path::Path;
 
@@ -86,6 +86,11 @@ pub fn rgb(picture: &Mat) -> Result<Vec<u8>> {
     let mut out = Mat::default();
     imgproc::cvt_color_def(picture, &mut out, imgproc::COLOR_BGR2RGB).map_err(failed)?;
     Ok(out.data_bytes().map_err(failed)?.to_vec())
+}
+
+/// Rows and columns.
+pub fn size(picture: &Mat) -> [usize; 2] {
+    [picture.rows(), picture.cols()].map(|n| n.unsigned_abs() as usize)
 }
 
 /// Writes a picture; its kind is known by the ending of `path`.

@@ -26,7 +26,7 @@ pub use times::{survey, times};
 use crate::csv_text::Cells;
 use crate::detect::{DetectSettings, Levels};
 use crate::discover::{Discovery, discover};
-use crate::error::{Error, Fault, Result};
+use crate::error::{Error, Fault, Place, Result};
 use crate::frame::{Ending, FrameSource, SourceInfo};
 use crate::gaps::Damage;
 use crate::message::{Message, SETUP, Setting};
@@ -200,6 +200,7 @@ impl Request {
     fn new(settings: &RunSettings, info: &SourceInfo, files: Vec<PathBuf>) -> Result<Self> {
         let facts = SourceFacts::of(info, &files)?;
         let mut detect = settings.detect.clone();
+        detect.pixel_aspect = facts.pixel_aspect;
         if let Some(rig) = &settings.rig {
             fits(rig, &facts)?;
             detect.region = detect.region.or_else(|| rig.region.clone());
@@ -238,7 +239,8 @@ fn already_done(settings: &RunSettings, request: &Request) -> Result<Option<RunS
         ));
     }
     let rig = (table.meta.settings["rig"] == "given").then_some(&table.meta.rig);
-    if rig != settings.rig.as_ref() {
+    let asked = settings.rig.as_ref().map(|r| Rig { pixel_aspect: request.facts.pixel_aspect, ..r.clone() });
+    if rig != asked.as_ref() {
         return Err(Error::Table(
             Fault::new(text(output), "its run is complete and had another rig")
                 .advice("Give " + Setting::Rig + " as it was then, or begin anew with " + Setting::Force),
@@ -285,11 +287,15 @@ impl<'a> Run<'a> {
         let changes = state.changes.clone();
         let mut warnings = source.info().warnings.clone();
         warnings.extend(threads_note(settings.threads));
+        let aspect = facts.pixel_aspect;
+        if !aspect.is_square() {
+            warnings.push(format!("{}, {}", aspect.words(), facts.pixel_aspect_origin.words()).into());
+        }
         if settings.existing == Existing::Resume
             && let Some(output) = &settings.output
             && let Some(earlier) = state.resume(output)?
         {
-            let store = DetectionStore::on_spool(earlier.spool)?;
+            let store = DetectionStore::on_spool(earlier.spool)?.of_pixels(aspect);
             let (resumed, levels) = (store.len() as u64, Arc::new(earlier.levels));
             let finished = earlier.end;
             let run = Self {
@@ -321,7 +327,8 @@ impl<'a> Run<'a> {
             }
             Some(output) => DetectionStore::on_spool(state.create(output, &levels)?)?,
             None => DetectionStore::new(),
-        };
+        }
+        .of_pixels(aspect);
         let (resumed, finished, levels) = (0, None, Arc::new(levels));
         let run = Self {
             settings,
@@ -409,7 +416,8 @@ impl<'a> Run<'a> {
         let (timing, clock) = self.times()?;
         self.warnings.extend(timing::notes(&timing));
         let rig = match &self.settings.rig {
-            Some(rig) => rig.clone(),
+            // The same but for rounding, or it would have been refused.
+            Some(rig) => Rig { pixel_aspect: self.facts.pixel_aspect, ..rig.clone() },
             None => {
                 let mut found = self.find(end.is_none(), observer)?;
                 self.warnings.append(&mut found.warnings);
@@ -548,7 +556,7 @@ impl<'a> Run<'a> {
     }
 }
 
-/// Whether a rig belongs to a recording of this size.
+/// Whether a rig belongs to a recording of this size and of these pixels.
 fn fits(rig: &Rig, facts: &SourceFacts) -> Result<()> {
     let image_px = [facts.width, facts.height];
     if rig.image_px != image_px {
@@ -562,6 +570,25 @@ fn fits(rig: &Rig, facts: &SourceFacts) -> Result<()> {
                 ),
             )
             .advice("Make one for this recording with " + SETUP),
+        ));
+    }
+    if !rig.pixel_aspect.agrees(facts.pixel_aspect) {
+        let origin = facts.pixel_aspect_origin.words();
+        return Err(Error::Rig(
+            Fault::new(
+                "rig",
+                format!(
+                    "it is for pixels of {} (width:height), the recording's are {}, {origin}",
+                    rig.pixel_aspect, facts.pixel_aspect
+                ),
+            )
+            .at(Place::Key("pixel_aspect".into()))
+            .advice(
+                "Make one for this recording with "
+                    + SETUP
+                    + ", or say what is true with "
+                    + Setting::PixelAspect,
+            ),
         ));
     }
     Ok(())

@@ -70,10 +70,11 @@ pub struct Mechanism {
 }
 
 impl Mechanism {
-    /// The mechanism of a checked rig. `slack_px` is how well the rig's places are known.
+    /// The mechanism of a checked rig, in square pixels. `slack_px` is how well the rig's places are known.
     pub fn new(rig: &Rig, slack_px: f64) -> Self {
         let bodies = rig.node_bodies();
-        let at = |i: usize| Vector2::new(rig.nodes[i].x_px, rig.nodes[i].y_px);
+        let square = |x: f64, y: f64| rig.pixel_aspect.to_square(Vector2::new(x, y));
+        let at = |i: usize| square(rig.nodes[i].x_px, rig.nodes[i].y_px);
         let links: Vec<Link> = (0..rig.bodies.len())
             .map(|b| {
                 let nodes: Vec<usize> = (0..rig.nodes.len()).filter(|&i| bodies[i] == b).collect();
@@ -87,7 +88,7 @@ impl Mechanism {
             .collect();
         let mut hinges = Vec::new();
         for (j, joint) in rig.joints.iter().enumerate() {
-            let here = Vector2::new(joint.x_px, joint.y_px);
+            let here = square(joint.x_px, joint.y_px);
             let sides: Vec<usize> = joint.bodies.iter().filter_map(|b| rig.body_index(b)).collect();
             for (k, &body) in sides.iter().enumerate() {
                 let holder = if sides.len() == 1 {
@@ -105,7 +106,7 @@ impl Mechanism {
             hinges,
             order: Vec::new(),
             nodes: rig.nodes.len(),
-            image_px: f64::from(rig.image_px[0]) * f64::from(rig.image_px[1]),
+            image_px: f64::from(rig.image_px[0]) * f64::from(rig.image_px[1]) * rig.pixel_aspect.ratio(),
         };
         mechanism.order = mechanism.outwards();
         mechanism

@@ -161,7 +161,7 @@ pub fn open(name: &str, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
         return Ok(Box::new(source));
     }
     match input {
-        Input::File(_) => Ok(Box::new(opencv::OpencvSource::open(name, &input, source.info(), options)?)),
+        Input::File(_) => Ok(Box::new(opencv::OpencvSource::open(name, &input, &source, options)?)),
         _ => Err(Error::Source(
             Fault::new(name, "OpenCV's decoder reads files only")
                 .advice("Leave out " + Setting::Decoder.set_to("opencv")),

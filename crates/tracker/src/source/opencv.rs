@@ -2,14 +2,15 @@
 //!
 //! Owns: [`OpencvSource`]. OpenCV makes blue, green and red of every picture and we make brightness of these,
 //! so it costs more and gives 8 bits only. Its times of frames are wrong at the end of streams with reordered
-//! frames (version 4.6 gives 0), so times are the container's.
+//! frames (version 4.6 gives 0), so times are the container's. It turns films of 90 and 270 degrees the wrong way
+//! (version 4.6 again) and mirrors none, so pictures are turned here.
 
 use opencv::core::Mat;
 use opencv::imgproc;
 use opencv::prelude::{MatTraitConst, MatTraitConstManual, VideoCaptureTrait, VideoCaptureTraitConst};
 use opencv::videoio::{self, VideoCapture};
 
-use super::ffmpeg::display_times;
+use super::ffmpeg::{FfmpegSource, Orientation, display_times};
 use super::{Input, OpenOptions};
 use crate::error::{Error, Fault, Result};
 use crate::frame::{Ending, Frame, FrameSource, PixelFormat, SourceInfo};
@@ -18,6 +19,7 @@ use crate::message::Setting;
 /// A recording read through OpenCV.
 pub struct OpencvSource {
     info: SourceInfo,
+    orientation: Orientation,
     capture: VideoCapture,
     color: Mat,
     next: u64,
@@ -27,11 +29,17 @@ pub struct OpencvSource {
 }
 
 impl OpencvSource {
-    /// Opens a file; `known` is what FFmpeg says of it.
+    /// Opens a file; `first` is what FFmpeg knows of it.
     ///
     /// # Errors
     /// [`Error::Source`] if OpenCV cannot open it or would throw bits away.
-    pub(crate) fn open(name: &str, input: &Input, known: &SourceInfo, options: &OpenOptions) -> Result<Self> {
+    pub(crate) fn open(
+        name: &str,
+        input: &Input,
+        first: &FfmpegSource,
+        options: &OpenOptions,
+    ) -> Result<Self> {
+        let known = first.info();
         if known.depth_bits > 8 {
             return Err(Error::Source(
                 Fault::new(
@@ -41,13 +49,13 @@ impl OpencvSource {
                 .advice("Leave out " + Setting::Decoder.set_to("opencv")),
             ));
         }
-        let capture = open(name)?;
+        let orientation = first.orientation();
+        let capture = open(name, orientation)?;
         let info = SourceInfo {
             codec: format!("{} (OpenCV)", known.codec),
             converted_from: Some("BGR".into()),
             format: PixelFormat::Gray8,
             depth_bits: 8,
-            warnings: Vec::new(),
             ..known.clone()
         };
         let times = if options.fps.is_some() {
@@ -55,11 +63,19 @@ impl OpencvSource {
         } else {
             display_times(name, input, usize::MAX, u64::MAX)?.0
         };
-        Ok(Self { info, capture, color: Mat::default(), next: 0, times, ending: Ending::Complete })
+        Ok(Self {
+            info,
+            orientation,
+            capture,
+            color: Mat::default(),
+            next: 0,
+            times,
+            ending: Ending::Complete,
+        })
     }
 }
 
-fn open(name: &str) -> Result<VideoCapture> {
+fn open(name: &str, orientation: Orientation) -> Result<VideoCapture> {
     let failed = |why: String| {
         Error::Source(
             Fault::new(name, format!("OpenCV does not open it{why}"))
@@ -67,16 +83,25 @@ fn open(name: &str) -> Result<VideoCapture> {
         )
     };
     // With its protocol, a name is never taken for an address.
-    let capture = VideoCapture::from_file(format!("file:{name}").as_str(), videoio::CAP_FFMPEG)
+    let mut capture = VideoCapture::from_file(format!("file:{name}").as_str(), videoio::CAP_FFMPEG)
         .map_err(|e| failed(format!(" ({})", e.message)))?;
-    match capture.is_opened() {
-        Ok(true) => Ok(capture),
-        _ => Err(failed(String::new())),
+    if !capture.is_opened().unwrap_or(false) {
+        return Err(failed(String::new()));
     }
+    let told = capture.set(videoio::CAP_PROP_ORIENTATION_AUTO, 0.0).unwrap_or(false);
+    if !told && orientation != Orientation::default() {
+        return Err(failed(" as it is: this version turns pictures by itself".into()));
+    }
+    Ok(capture)
 }
 
-/// The next picture as gray bytes, if its size is the recording's; the outer `None` is the end.
-fn read(capture: &mut VideoCapture, color: &mut Mat, info: &SourceInfo) -> Result<Option<Option<Vec<u8>>>> {
+/// The next picture, turned, as gray bytes, if its size is the recording's; the outer `None` is the end.
+fn read(
+    capture: &mut VideoCapture,
+    color: &mut Mat,
+    info: &SourceInfo,
+    orientation: Orientation,
+) -> Result<Option<Option<Vec<u8>>>> {
     let fault = |e: opencv::Error| Error::Source(Fault::new(&info.name, format!("OpenCV: {}", e.message)));
     if !capture.read(color).map_err(fault)? {
         return Ok(None);
@@ -87,9 +112,13 @@ fn read(capture: &mut VideoCapture, color: &mut Mat, info: &SourceInfo) -> Resul
     } else {
         imgproc::cvt_color_def(color, &mut gray, imgproc::COLOR_BGR2GRAY).map_err(fault)?;
     }
-    let fits = (i64::from(gray.cols()), i64::from(gray.rows())) == (info.width.into(), info.height.into());
-    let plane = if fits { Some(gray.data_bytes().map_err(fault)?.to_vec()) } else { None };
-    Ok(Some(plane))
+    let (width, height) = orientation.size(info.width, info.height);
+    let fits = (i64::from(gray.cols()), i64::from(gray.rows())) == (width.into(), height.into());
+    if !fits {
+        return Ok(Some(None));
+    }
+    let samples = gray.data_bytes().map_err(fault)?.to_vec();
+    Ok(Some(Some(orientation.apply(samples, width as usize, height as usize, 1).0)))
 }
 
 fn frame(info: &SourceInfo, index: u64, ticks: i64, plane: Option<Vec<u8>>) -> Frame {
@@ -111,7 +140,7 @@ impl FrameSource for OpencvSource {
     }
 
     fn next_frame(&mut self) -> Result<Option<Frame>> {
-        let Some(plane) = read(&mut self.capture, &mut self.color, &self.info)? else {
+        let Some(plane) = read(&mut self.capture, &mut self.color, &self.info, self.orientation)? else {
             if self.next == 0 {
                 return Err(Error::Source(
                     Fault::new(&self.info.name, "OpenCV decodes no frame of it")
@@ -144,7 +173,7 @@ impl FrameSource for OpencvSource {
 
     fn sample(&mut self, count: usize) -> Result<Vec<Frame>> {
         // OpenCV seeks by frame number, which is not exact; for statistics any frames will do.
-        let mut capture = open(&self.info.name)?;
+        let mut capture = open(&self.info.name, self.orientation)?;
         let frames = capture.get(videoio::CAP_PROP_FRAME_COUNT).unwrap_or(0.0).max(0.0);
         let mut color = Mat::default();
         let mut samples = Vec::new();
@@ -153,7 +182,7 @@ impl FrameSource for OpencvSource {
             if at > 0.0 {
                 let _ = capture.set(videoio::CAP_PROP_POS_FRAMES, at);
             }
-            let Some(plane) = read(&mut capture, &mut color, &self.info)? else { continue };
+            let Some(plane) = read(&mut capture, &mut color, &self.info, self.orientation)? else { continue };
             samples.extend(Some(frame(&self.info, k as u64, 0, plane)).filter(|f| f.plane.is_some()));
         }
         Ok(samples)

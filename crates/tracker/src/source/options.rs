@@ -1,6 +1,7 @@
 //! What a user may say about reading a recording.
 
 use crate::message::Message;
+use crate::pixel_aspect::{AspectOrigin, PixelAspect};
 
 /// Which decoder reads compressed film.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
@@ -31,6 +32,8 @@ pub enum Interlaced {
 pub struct OpenOptions {
     /// Frames per second of recorded time; replaces all time stamps of the recording.
     pub fps: Option<f64>,
+    /// Width to height of a pixel as seen after turning; replaces what the recording says.
+    pub pixel_aspect: Option<PixelAspect>,
     /// Decoder.
     pub decoder: Decoder,
     /// How interlaced film is read.
@@ -39,6 +42,16 @@ pub struct OpenOptions {
     pub allow_protocol: bool,
     /// Decoding threads; 0 is one for each core.
     pub threads: usize,
+}
+
+impl OpenOptions {
+    /// What pixels are, with what the recording says of them, and where that comes from.
+    pub(crate) fn aspect(&self, recorded: PixelAspect) -> (PixelAspect, AspectOrigin) {
+        match self.pixel_aspect {
+            Some(given) => (given, AspectOrigin::User),
+            None => (recorded, AspectOrigin::Recording),
+        }
+    }
 }
 
 /// Threads for each core at most. Threads that wait for the disk are worth having beside those that compute; with more

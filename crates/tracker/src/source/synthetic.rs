@@ -6,6 +6,7 @@ use super::{Ending, FrameSource, SourceInfo};
 use crate::error::Result;
 use crate::film::{Film, Scene};
 use crate::frame::{Frame, PixelFormat, RateClaims, RateOrigin};
+use crate::pixel_aspect::{AspectOrigin, PixelAspect};
 
 /// Frames of a [`Film`], made when they are asked for.
 #[derive(Debug)]
@@ -37,6 +38,8 @@ impl SyntheticSource {
             },
             width: scene.image_px[0],
             height: scene.image_px[1],
+            pixel_aspect: PixelAspect::SQUARE,
+            pixel_aspect_origin: AspectOrigin::Recording,
             format: film.format(),
             depth_bits: scene.camera.depth_bits,
             declared_frames: Some(scene.frames),

@@ -16,6 +16,7 @@ use crate::frame::{RateOrigin, SourceInfo, TimeBase};
 use crate::gaps::Damage;
 use crate::message::TRACK;
 use crate::name::{self, shown, text};
+use crate::pixel_aspect::{AspectOrigin, PixelAspect};
 use crate::rig::Rig;
 use crate::timing::Timing;
 
@@ -35,6 +36,12 @@ pub struct SourceFacts {
     pub width: u32,
     /// Height in px.
     pub height: u32,
+    /// Width to height of a pixel; not written where it is 1.
+    #[serde(default, skip_serializing_if = "PixelAspect::is_square")]
+    pub pixel_aspect: PixelAspect,
+    /// Where that comes from; written where the user said it.
+    #[serde(default, skip_serializing_if = "AspectOrigin::is_recording")]
+    pub pixel_aspect_origin: AspectOrigin,
     /// Significant bits of a sample.
     pub depth_bits: u32,
     /// Frames that the header declares.
@@ -71,6 +78,8 @@ impl SourceFacts {
             codec: info.codec.clone(),
             width: info.width,
             height: info.height,
+            pixel_aspect: info.pixel_aspect,
+            pixel_aspect_origin: info.pixel_aspect_origin,
             depth_bits: info.depth_bits,
             declared_frames: info.declared_frames,
             rate_hz: info.rate_hz,

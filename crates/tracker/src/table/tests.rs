@@ -6,12 +6,14 @@ use super::*;
 use crate::csv_text::Cells;
 use crate::frame::RateOrigin;
 use crate::gaps::Damage;
+use crate::pixel_aspect::PixelAspect;
 use crate::rig::{Body, Joint, Node, Rig};
 
 pub(crate) fn meta(names: &[(String, usize)], bodies: &[String]) -> TableMeta {
     let rig = Rig {
         schema: 1,
         image_px: [640, 480],
+        pixel_aspect: PixelAspect::SQUARE,
         reference_frame: Some(0),
         region: None,
         lens: None,
@@ -43,6 +45,8 @@ pub(crate) fn meta(names: &[(String, usize)], bodies: &[String]) -> TableMeta {
             codec: "packed 12 bit".into(),
             width: 640,
             height: 480,
+            pixel_aspect: PixelAspect::SQUARE,
+            pixel_aspect_origin: crate::pixel_aspect::AspectOrigin::Recording,
             depth_bits: 12,
             declared_frames: Some(9),
             rate_hz: Some(1000.0),

@@ -240,6 +240,7 @@ mod tests {
     use rand_distr::{Distribution, Normal};
 
     use crate::detect::Detection;
+    use crate::pixel_aspect::PixelAspect;
     use crate::rig::{Body, Joint, Node, RIG_SCHEMA, Rig};
     use crate::store::{DetectionStore, FrameStamp};
     use crate::track::track_recording;
@@ -258,6 +259,7 @@ mod tests {
         let rig = Rig {
             schema: RIG_SCHEMA,
             image_px: [600, 600],
+            pixel_aspect: PixelAspect::SQUARE,
             reference_frame: Some(0),
             region: None,
             lens: None,

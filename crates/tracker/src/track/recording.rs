@@ -11,8 +11,9 @@ use super::partly::Partly;
 use super::rows::{Returns, observations, partly};
 use super::seen::BodySeen;
 use crate::detect::Detection;
-use crate::error::Result;
+use crate::error::{Error, Fault, Result};
 use crate::observation::{Observation, Status};
+use crate::pixel_aspect::PixelAspect;
 use crate::rig::Rig;
 use crate::rigid::body::Mechanism;
 use crate::rigid::forecast::Motion;
@@ -58,10 +59,17 @@ pub fn track_recording(
     sink: &mut Sink<'_>,
 ) -> Result<TrackSummary> {
     rig.check("rig")?;
+    if rig.pixel_aspect != store.pixel_aspect() {
+        return Err(Error::Rig(
+            Fault::new("rig", format!("it is for pixels of {}", rig.pixel_aspect))
+                .advice(format!("Give the detections' own, {}", store.pixel_aspect())),
+        ));
+    }
     let mechanism = Mechanism::new(rig, 0.3);
     let habits = Habits::unknown(&mechanism, 0.05);
     let n = mechanism.nodes;
     let mut out = Output {
+        pixel_aspect: rig.pixel_aspect,
         partly: Partly::default(),
         returns: Returns::new(n),
         summary: TrackSummary {
@@ -155,6 +163,7 @@ fn start_frame(store: &DetectionStore, rig: &Rig) -> usize {
 }
 
 struct Output {
+    pixel_aspect: PixelAspect,
     partly: Partly,
     returns: Returns,
     summary: TrackSummary,
@@ -181,6 +190,7 @@ impl Output {
             if !stamp.decoded {
                 row.fill(Observation::UNDECODED);
             }
+            row.iter_mut().for_each(|o| *o = o.to_recorded(self.pixel_aspect));
             self.returns.mark(&mut row);
             let s = &mut self.summary;
             s.frames += 1;

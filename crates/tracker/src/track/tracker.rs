@@ -8,6 +8,7 @@ use super::rows::{Returns, observations, partly};
 use crate::detect::Detection;
 use crate::error::{Error, Fault, Result};
 use crate::observation::Observation;
+use crate::pixel_aspect::PixelAspect;
 use crate::rig::Rig;
 use crate::rigid::body::Mechanism;
 use crate::rigid::index::Sky;
@@ -17,6 +18,7 @@ use crate::store::FrameStamp;
 #[derive(Debug, Clone)]
 pub struct Tracker {
     engine: Engine,
+    pixel_aspect: PixelAspect,
     returns: Returns,
     last: Option<FrameStamp>,
 }
@@ -31,10 +33,11 @@ impl Tracker {
         let mechanism = Mechanism::new(rig, 0.3);
         let habits = Habits::unknown(&mechanism, 0.05);
         let returns = Returns::new(mechanism.nodes);
-        Ok(Self { engine: Engine::new(mechanism, habits), returns, last: None })
+        let (engine, pixel_aspect) = (Engine::new(mechanism, habits), rig.pixel_aspect);
+        Ok(Self { engine, pixel_aspect, returns, last: None })
     }
 
-    /// The nodes in the next frame, in the rig's order.
+    /// The nodes in the next frame, in the rig's order; detections and nodes are in recorded pixels.
     ///
     /// # Errors
     /// [`Error::Argument`] if the frame does not come after the one before it.
@@ -51,15 +54,17 @@ impl Tracker {
             ));
         }
         self.last = Some(*stamp);
-        let sky = Sky::new(detections);
+        let detections: Vec<Detection> = detections.iter().map(|d| d.to_square(self.pixel_aspect)).collect();
+        let sky = Sky::new(&detections);
         let seen = self.engine.step(stamp.index as f64, &sky, None);
-        let mut row = observations(&self.engine.bodies.mechanism, &seen, detections);
+        let mut row = observations(&self.engine.bodies.mechanism, &seen, &detections);
         for (k, partly) in partly(&self.engine.bodies.mechanism, &seen).into_iter().enumerate() {
             // Live, a part is believed only if the marker was seen in the frame before.
             if partly.is_some() && !self.returns.in_last(k) {
                 row[k] = Observation::MISSING;
             }
         }
+        row.iter_mut().for_each(|o| *o = o.to_recorded(self.pixel_aspect));
         self.returns.mark(&mut row);
         Ok(row)
     }

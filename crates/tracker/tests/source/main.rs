@@ -3,6 +3,7 @@
 
 mod film;
 
+mod aspect;
 mod cine;
 mod cut;
 mod damage;

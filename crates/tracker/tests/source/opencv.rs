@@ -71,6 +71,71 @@ fn both_decoders_give_the_same_frames_and_centres() {
     }
 }
 
+/// Writes a display matrix, its first two columns row by row, into the one track header of a QuickTime file.
+fn set_matrix(path: &Path, [a, b, c, d]: [i32; 4]) {
+    let mut bytes = std::fs::read(path).unwrap();
+    let header = bytes.windows(4).position(|w| w == b"tkhd").unwrap();
+    // Behind the box's type come 40 bytes, then nine numbers of which the first two of a row have 16 bits of fraction.
+    for (place, value) in [(0, a), (1, b), (3, c), (4, d)] {
+        let at = header + 44 + 4 * place;
+        bytes[at..at + 4].copy_from_slice(&(value << 16).to_be_bytes());
+    }
+    std::fs::write(path, bytes).unwrap();
+}
+
+#[test]
+fn both_decoders_turn_and_mirror_alike() {
+    if !have_ffmpeg() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    for ratio in ["1/1", "4/3"] {
+        let filter = format!("setsar={ratio}");
+        let path = encode(folder.path(), "a.mov", 4, &["-vf", &filter, "-c:v", "png", "-pix_fmt", "gray"]);
+        let plain = read_all(&mut *open(path.to_str().unwrap(), &OpenOptions::default()).unwrap());
+        // By 0, 90, 180 and 270 degrees, and mirrored left to right, top to bottom and at both diagonals.
+        for matrix in [
+            [1, 0, 0, 1],
+            [0, 1, -1, 0],
+            [-1, 0, 0, -1],
+            [0, -1, 1, 0],
+            [-1, 0, 0, 1],
+            [1, 0, 0, -1],
+            [0, 1, 1, 0],
+            [0, -1, -1, 0],
+        ] {
+            set_matrix(&path, matrix);
+            let name = path.to_str().unwrap();
+            let mut first = open(name, &OpenOptions::default()).unwrap();
+            let options = OpenOptions { decoder: Decoder::Opencv, ..OpenOptions::default() };
+            let mut second = open(name, &options).unwrap();
+            let (a, b) = (first.info().clone(), second.info().clone());
+            assert_eq!((a.width, a.height, a.pixel_aspect), (b.width, b.height, b.pixel_aspect));
+            let quarter = matrix[0] == 0;
+            let expected = if quarter {
+                ratio.split('/').rev().collect::<Vec<_>>().join(":")
+            } else {
+                ratio.replace('/', ":")
+            };
+            assert_eq!(a.pixel_aspect.to_string(), expected, "{matrix:?}");
+            assert_eq!(
+                a.warnings.iter().any(|w| w.to_string().starts_with("turned")),
+                matrix != [1, 0, 0, 1]
+            );
+            assert_eq!(a.warnings, b.warnings);
+            assert!(!second.sample(2).unwrap().is_empty());
+            let (p, q) = (read_all(&mut *first), read_all(&mut *second));
+            assert_eq!((p.len(), q.len()), (4, 4), "{matrix:?}");
+            for ((p, q), plain) in p.iter().zip(&q).zip(&plain) {
+                let (u, v) = (samples(p).unwrap(), samples(q).unwrap());
+                // Gray to BGR and back rounds twice at most.
+                assert!(u.iter().zip(&v).all(|(s, t)| s.abs_diff(*t) <= 2), "{matrix:?} frame {}", p.index);
+                assert_eq!(u == samples(plain).unwrap(), matrix == [1, 0, 0, 1]);
+            }
+        }
+    }
+}
+
 #[test]
 fn deep_recordings_are_not_squeezed() {
     if !have_ffmpeg() {

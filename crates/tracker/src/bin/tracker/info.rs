@@ -7,10 +7,11 @@ use rayon::prelude::*;
 use serde_json::{Value, json};
 use tracker::brightest::brightest;
 use tracker::error::Error;
-use tracker::frame::{Ending, Frame, FrameSource, PixelFormat};
+use tracker::frame::{Ending, Frame, FrameSource, PixelFormat, SourceInfo};
 use tracker::gaps::Damage;
 use tracker::name::{shown, text};
 use tracker::pipeline;
+use tracker::pixel_aspect::AspectOrigin;
 use tracker::source::{Interlaced, OpenOptions, open};
 use tracker::timing::{Steps, Timing, notes, rate_words, times_words};
 
@@ -155,6 +156,13 @@ fn format_name(format: PixelFormat) -> &'static str {
     }
 }
 
+fn aspect_words(info: &SourceInfo) -> String {
+    match (info.pixel_aspect.is_square(), info.pixel_aspect_origin) {
+        (true, AspectOrigin::Recording) => "1:1, square".to_owned(),
+        (_, origin) => format!("{}, {}", info.pixel_aspect.words(), origin.words()),
+    }
+}
+
 fn ending_words(ending: &Ending, damage: &Damage) -> String {
     let damaged = damage.words();
     match ending {
@@ -175,6 +183,7 @@ fn as_text(source: &dyn FrameSource, seen: &Seen, times: &Times) -> String {
     row("container", info.container.clone());
     row("codec", info.codec.clone());
     row("size", format!("{} x {} px", info.width, info.height));
+    row("pixel aspect", aspect_words(info));
     row("pixels", format!("{}, {} bit", format_name(info.format), info.depth_bits));
     if let Some(from) = &info.converted_from {
         row("converted", format!("from {from}, once for each frame"));
@@ -250,6 +259,8 @@ fn as_json(source: &dyn FrameSource, seen: &Seen, times: &Times) -> Value {
         "codec": info.codec,
         "width_px": info.width,
         "height_px": info.height,
+        "pixel_aspect": info.pixel_aspect,
+        "pixel_aspect_origin": info.pixel_aspect_origin,
         "pixel_format": format_name(info.format),
         "depth_bits": info.depth_bits,
         "converted_from": info.converted_from,

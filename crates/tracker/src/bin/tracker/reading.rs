@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use tracker::detect::{DetectSettings, Polarity, Threshold};
+use tracker::pixel_aspect::PixelAspect;
 use tracker::source::{Decoder, Interlaced, OpenOptions};
 
 /// How a recording is opened.
@@ -11,6 +12,9 @@ pub struct DecodeArgs {
     /// What reads compressed film
     #[arg(long, default_value = "auto", value_enum)]
     decoder: DecoderArg,
+    /// Width to height of a pixel, for example 16:15, instead of what the recording says
+    #[arg(long, value_name = "W:H")]
+    pixel_aspect: Option<PixelAspect>,
     /// Open network addresses and devices too
     #[arg(long)]
     allow_protocol: bool,
@@ -20,6 +24,7 @@ impl DecodeArgs {
     pub fn options(&self, fps: Option<f64>, threads: usize, interlaced: Interlaced) -> OpenOptions {
         OpenOptions {
             fps,
+            pixel_aspect: self.pixel_aspect,
             decoder: match self.decoder {
                 DecoderArg::Auto => Decoder::Auto,
                 DecoderArg::Ffmpeg => Decoder::Ffmpeg,

@@ -12,9 +12,11 @@ pub(crate) struct Patch<'a> {
     pub height: usize,
     /// Values from the start of one row to the next.
     pub stride: usize,
-    /// Image coordinates of its first pixel.
+    /// Image coordinates of its first pixel, in units of the square of a pixel's area, as all places here are.
     pub x0: f64,
     pub y0: f64,
+    /// Width and height of a pixel.
+    pub sides: [f64; 2],
 }
 
 const STEPS: [f32; LANES] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
@@ -64,13 +66,13 @@ impl Ring {
         self.saturated = 0;
     }
 
-    /// `count` pixels of a row from `values` on, the first at `x`; up to seven beyond are written too and then
-    /// overwritten by those that follow.
+    /// `count` pixels of a row from `values` on, the first at `x` and each `wide`; up to seven beyond are written too
+    /// and then overwritten by those that follow.
     #[inline(always)]
-    fn push<V: Eight>(&mut self, token: V::Token, x: f32, y: f32, values: &[f32], count: usize) {
-        let (steps, y) = (V::load(token, &STEPS), V::splat(token, y).array());
+    fn push<V: Eight>(&mut self, token: V::Token, [x, y]: [f32; 2], wide: f32, values: &[f32], count: usize) {
+        let (steps, y) = (V::load(token, &STEPS) * V::splat(token, wide), V::splat(token, y).array());
         for k in (0..count).step_by(LANES) {
-            let (at, first) = (self.used + k, x + k as f32);
+            let (at, first) = (self.used + k, x + k as f32 * wide);
             let to = at..at + LANES;
             self.x[to.clone()].copy_from_slice(&(V::splat(token, first) + steps).array());
             self.y[to.clone()].copy_from_slice(&y);
@@ -96,15 +98,16 @@ impl Job for Choose<'_> {
     fn run<V: Eight>(self, token: V::Token) {
         let Self { patch, centre: [cx, cy], outer, inner, ring } = self;
         let all = |v: f64| V::splat(token, v as f32);
+        let [wide, high] = patch.sides;
         let (left, above) = (cx - patch.x0, cy - patch.y0);
-        let first = (above - outer).max(0.0) as usize;
-        let last = ((above + outer).max(0.0) as usize + 1).min(patch.height);
+        let first = ((above - outer).max(0.0) / high) as usize;
+        let last = (((above + outer).max(0.0) / high) as usize + 1).min(patch.height);
         ring.begin(last.saturating_sub(first) * (patch.width + 2 * LANES));
         let (zero, width) = (all(0.0), all(patch.width as f64));
         // The first pixel behind a place.
-        let behind = |x: V| (x + all(1.0)).max(zero).min(width).trunc().map(|i| i as usize);
+        let behind = |x: V| (x * all(1.0 / wide) + all(1.0)).max(zero).min(width).trunc().map(|i| i as usize);
         for eight in (first..last).step_by(LANES) {
-            let dy = all(eight as f64 - above) + V::load(token, &STEPS);
+            let dy = all(eight as f64 * high - above) + V::load(token, &STEPS) * all(high);
             let half = |r: f64| (all(r * r) - dy * dy).max(zero).sqrt();
             let (far, near, middle) = (half(outer), half(inner), all(left));
             let (a, b) = (behind(middle - far), behind(middle - near));
@@ -117,7 +120,8 @@ impl Job for Choose<'_> {
                 for (from, to) in parts {
                     if from < to {
                         let values = &patch.values[j * patch.stride + from..];
-                        ring.push::<V>(token, (from as f64 - left) as f32, dy[k], values, to - from);
+                        let first = [(from as f64 * wide - left) as f32, dy[k]];
+                        ring.push::<V>(token, first, wide as f32, values, to - from);
                     }
                 }
             }

@@ -182,7 +182,12 @@ impl<const N: usize> Job for Equations<'_, N> {
                 let rho = (dx * dx + dy * dy).max(least).sqrt();
                 let inverse = one.div(rho);
                 let (c, s) = (dx * inverse, dy * inverse);
-                found.spot = model.table.spot(token, r - rho, c.abs().min(s.abs()));
+                let direction = if model.table.square {
+                    c.abs().min(s.abs())
+                } else {
+                    (s.abs() - c.abs() + one) * all(0.5)
+                };
+                found.spot = model.table.spot(token, r - rho, direction);
                 found.normal = [c.array(), s.array()];
             }
         };

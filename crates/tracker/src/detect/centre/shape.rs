@@ -56,7 +56,7 @@ pub(crate) fn judge(blob: &Blob, centre: &Centre, levels: &Levels) -> Flags {
         let ratio = area / whole;
         let misfit = centre.fitted.is_none_or(|f| misfit(&f, levels));
         let size = centre.fitted.map_or(0.0, |f| wrong_size(&f, levels));
-        if (ratio > 1.3 && (misfit || blob.elongation() > 1.4)) || size > 1.0 {
+        if (ratio > 1.3 && (misfit || blob.elongation(levels.pixel_aspect.sides()) > 1.4)) || size > 1.0 {
             flags |= Flags::MERGED;
         } else if misfit || size < -1.0 || ratio < 1.0 - slack - 2.0 * noise {
             flags |= Flags::PARTIAL;
@@ -73,10 +73,12 @@ pub(crate) fn two_discs(blob: &Blob, levels: &Levels) -> Option<[[f64; 3]; 2]> {
         return None;
     }
     let r = marker.radius_px;
-    let apart = (blob.axes()[0] - r * r / 4.0).max(0.0).sqrt();
+    let sides = levels.pixel_aspect.sides();
+    let apart = (blob.axes(sides)[0] - r * r / 4.0).max(0.0).sqrt();
     if apart < 0.45 * r {
         return None;
     }
-    let ([x, y], [ax, ay]) = (blob.mean(), blob.direction());
-    Some([[x - apart * ax, y - apart * ay, r], [x + apart * ax, y + apart * ay, r]])
+    let ([x, y], [ax, ay]) = (blob.mean(), blob.direction(sides));
+    let [dx, dy] = [apart * ax / sides[0], apart * ay / sides[1]];
+    Some([[x - dx, y - dy, r], [x + dx, y + dy, r]])
 }

@@ -1,6 +1,9 @@
 //! The sub-pixel centre of a blob and how sure it is.
 //!
 //! Owns: [`Centre`], [`Window`]. Must not: decide what is a marker.
+//!
+//! A disc is a circle in the world, not in pixels that are wider than high: places are in recorded pixels, but lengths
+//! (radii, paths, uncertainties) are in units of the square of a pixel's area.
 
 use super::disc_fit::{DiscFit, Fitted, LEAST_PATH_PX, Start};
 use super::edge_pixels::{Patch, Ring};
@@ -28,8 +31,10 @@ pub(crate) struct Centre {
 }
 
 /// Heights around a blob, in the detector's scratch.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(crate) struct Window {
+    /// Width and height of a pixel.
+    sides: [f64; 2],
     heights: Vec<f32>,
     row: Vec<u16>,
     x0: usize,
@@ -57,11 +62,33 @@ const STRETCHES: usize = 48;
 const MARGIN: usize = 4;
 
 impl Window {
+    /// For pixels of the given sides.
+    pub fn new(sides: [f64; 2]) -> Self {
+        Self {
+            sides,
+            heights: Vec::new(),
+            row: Vec::new(),
+            x0: 0,
+            y0: 0,
+            width: 0,
+            height: 0,
+            stride: 0,
+            ground: Vec::new(),
+            ring: Ring::default(),
+        }
+    }
+
+    /// From a place to the middle of pixel (i, j) of the window.
+    fn way(&self, [i, j]: [usize; 2], x: f64, y: f64) -> [f64; 2] {
+        [((self.x0 + i) as f64 - x) * self.sides[0], ((self.y0 + j) as f64 - y) * self.sides[1]]
+    }
+
     fn load(&mut self, pixels: &Pixels<'_>, blob: &Blob, margin: usize) {
-        self.x0 = (blob.x0 as usize).saturating_sub(margin);
-        self.y0 = (blob.y0 as usize).saturating_sub(margin);
-        self.width = (blob.x1 as usize + margin + 1).min(pixels.width) - self.x0;
-        self.height = (blob.y1 as usize + margin + 1).min(pixels.height) - self.y0;
+        let [across, down] = self.sides.map(|side| (margin as f64 / side).ceil() as usize);
+        self.x0 = (blob.x0 as usize).saturating_sub(across);
+        self.y0 = (blob.y0 as usize).saturating_sub(down);
+        self.width = (blob.x1 as usize + across + 1).min(pixels.width) - self.x0;
+        self.height = (blob.y1 as usize + down + 1).min(pixels.height) - self.y0;
         self.stride = self.width.next_multiple_of(LANES);
         self.heights.resize(self.height * self.stride + LANES, 0.0);
         let (from, size) = ([self.x0, self.y0], [self.width, self.height]);
@@ -88,7 +115,7 @@ impl Window {
             (0.0, -1.0),
             (0.7, -0.7),
         ] {
-            let (i, j) = (left + distance * dx, above + distance * dy);
+            let (i, j) = (left + distance * dx / self.sides[0], above + distance * dy / self.sides[1]);
             if i >= 0.0 && j >= 0.0 && (i as usize) < self.width && (j as usize) < self.height {
                 values[n] = self.heights[j as usize * self.stride + i as usize];
                 n += 1;
@@ -168,10 +195,19 @@ impl Window {
             width: self.width,
             stride: self.stride,
             height: self.height,
-            x0: self.x0 as f64,
-            y0: self.y0 as f64,
+            x0: self.x0 as f64 * self.sides[0],
+            y0: self.y0 as f64 * self.sides[1],
+            sides: self.sides,
         };
-        fit.fit(&patch, start, &mut self.ring)
+        let [wide, high] = self.sides;
+        let scaled = |[x, y, radius]: [f64; 3]| [x * wide, y * high, radius];
+        let [x, y, radius, base, height] = start.disc;
+        let [x, y, radius] = scaled([x, y, radius]);
+        let start = Start { disc: [x, y, radius, base, height], avoid: start.avoid.map(scaled), ..*start };
+        let mut fitted = fit.fit(&patch, &start, &mut self.ring)?;
+        fitted.x_px /= wide;
+        fitted.y_px /= high;
+        Some(fitted)
     }
 
     fn start(&self, fit: &DiscFit<'_>, disc: [f64; 3], avoid: [[f64; 3]; 2]) -> Option<Start> {
@@ -188,8 +224,7 @@ impl Window {
         let (mut s, mut xx, mut xy, mut yy, mut sx, mut sy) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
         for (j, row) in self.rows().enumerate() {
             for (i, &v) in row.iter().enumerate() {
-                let dx = (self.x0 + i) as f64 - disc.x_px;
-                let dy = (self.y0 + j) as f64 - disc.y_px;
+                let [dx, dy] = self.way([i, j], disc.x_px, disc.y_px);
                 if dx * dx + dy * dy <= outer {
                     let h = (f64::from(v) - disc.base) / disc.height;
                     s += h;
@@ -227,8 +262,7 @@ impl Window {
         let mut sums = [[0.0; 3]; 2];
         for (j, row) in self.rows().enumerate() {
             for (i, &v) in row.iter().enumerate() {
-                let dx = (self.x0 + i) as f64 - fitted.x_px;
-                let dy = (self.y0 + j) as f64 - fitted.y_px;
+                let [dx, dy] = self.way([i, j], fitted.x_px, fitted.y_px);
                 let inside = fitted.radius_px - dx.hypot(dy);
                 let v = f64::from(v);
                 let lost = fit.model.saturated(v);
@@ -251,13 +285,13 @@ impl Window {
     /// Whether heights above the ground fall below [`GAP`] of those on both sides somewhere along the
     /// blob's longer axis, near that axis.
     fn parted(&self, blob: &Blob, ground: f64, sign: f64) -> bool {
-        let ([mx, my], [ax, ay]) = (blob.mean(), blob.direction());
+        let ([mx, my], [ax, ay]) = (blob.mean(), blob.direction(self.sides));
         // Of a bar, 0.92 of its length, so that what comes behind its ends is left out; 0.55 of its width.
-        let [long, short] = blob.axes().map(|v| 1.6 * v.sqrt());
+        let [long, short] = blob.axes(self.sides).map(|v| 1.6 * v.sqrt());
         let mut sums = [[0.0; 2]; STRETCHES];
         for (j, row) in self.rows().enumerate() {
             for (i, &v) in row.iter().enumerate() {
-                let (dx, dy) = ((self.x0 + i) as f64 - mx, (self.y0 + j) as f64 - my);
+                let [dx, dy] = self.way([i, j], mx, my);
                 let along = ((dx * ax + dy * ay) / long + 1.0) / 2.0 * STRETCHES as f64;
                 if (dx * ay - dy * ax).abs() < 0.6 * short && (0.0..STRETCHES as f64).contains(&along) {
                     let s = &mut sums[along as usize];
@@ -285,7 +319,7 @@ impl Window {
         self.load(pixels, blob, MARGIN);
         let sign = levels.side.sign();
         let [mut cx, mut cy] = blob.mean();
-        let reach = blob.axes().map(|v| 2.0 * v.sqrt());
+        let reach = blob.axes(self.sides).map(|v| 2.0 * v.sqrt());
         let radius = reach[0] + 2.0;
         let (inner, outer) = (radius * radius, (radius + 1.5).powi(2));
         // Where all in all nothing rises above the background there is no centre by intensity: the marker is then somewhere
@@ -300,7 +334,7 @@ impl Window {
             ground.clear();
             for (j, row) in self.rows().enumerate() {
                 for (i, &v) in row.iter().enumerate() {
-                    let (dx, dy) = ((self.x0 + i) as f64 - cx, (self.y0 + j) as f64 - cy);
+                    let [dx, dy] = self.way([i, j], cx, cy);
                     let q = dx * dx + dy * dy;
                     if q > inner && q <= outer && sign * (f64::from(v) - threshold) < 0.0 {
                         ground.push(v);
@@ -317,7 +351,7 @@ impl Window {
             result.peak = 0.0;
             for (j, row) in self.rows().enumerate() {
                 for (i, &v) in row.iter().enumerate() {
-                    let (dx, dy) = ((self.x0 + i) as f64 - cx, (self.y0 + j) as f64 - cy);
+                    let [dx, dy] = self.way([i, j], cx, cy);
                     let d = dx * dx + dy * dy;
                     if d > inner || !spans.holds(self.x0 + i, self.y0 + j) {
                         continue;
@@ -342,12 +376,13 @@ impl Window {
                 break;
             }
             // The background's own error moves nothing while the disc is whole.
-            cx += sx / s;
-            cy += sy / s;
+            cx += sx / s / self.sides[0];
+            cy += sy / s / self.sides[1];
             result.sigma_px = (q.sqrt() / s).hypot(SHAPE_PX);
         }
         self.ground = ground;
-        result.parted = blob.elongation() > LONG && self.parted(blob, threshold - sign * levels.height, sign);
+        result.parted =
+            blob.elongation(self.sides) > LONG && self.parted(blob, threshold - sign * levels.height, sign);
         result.x_px = cx;
         result.y_px = cy;
         result

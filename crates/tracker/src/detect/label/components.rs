@@ -57,40 +57,41 @@ impl Blob {
         [self.sums[0] as f64 / n, self.sums[1] as f64 / n]
     }
 
-    /// Variances of its pixels along x and y and their covariance, px^2; each pixel counts as a square, not a
-    /// point.
-    fn spread(&self) -> [f64; 3] {
+    /// Variances of its pixels along x and y and their covariance, px^2; each pixel counts as an area of the given
+    /// sides, not a point.
+    fn spread(&self, [wide, high]: [f64; 2]) -> [f64; 3] {
         let n = self.area as f64;
         let [mx, my] = self.mean();
         let s = self.sums.map(|v| v as f64 / n);
-        [s[2] - mx * mx + 1.0 / 12.0, s[3] - mx * my, s[4] - my * my + 1.0 / 12.0]
+        let [xx, xy, yy] = [s[2] - mx * mx + 1.0 / 12.0, s[3] - mx * my, s[4] - my * my + 1.0 / 12.0];
+        [xx * (wide * wide), xy * (wide * high), yy * (high * high)]
     }
 
-    /// Variances of its pixels along the longer and the shorter principal axis, px^2.
-    pub fn axes(&self) -> [f64; 2] {
-        let [xx, xy, yy] = self.spread();
+    /// Variances of its pixels, of the given sides, along the longer and the shorter principal axis, px^2.
+    pub fn axes(&self, sides: [f64; 2]) -> [f64; 2] {
+        let [xx, xy, yy] = self.spread(sides);
         let (half, diff) = ((xx + yy) / 2.0, (xx - yy) / 2.0);
         let root = (diff * diff + xy * xy).sqrt();
         [half + root, (half - root).max(1.0 / 12.0)]
     }
 
     /// Direction of the longer principal axis.
-    pub fn direction(&self) -> [f64; 2] {
-        let [xx, xy, yy] = self.spread();
+    pub fn direction(&self, sides: [f64; 2]) -> [f64; 2] {
+        let [xx, xy, yy] = self.spread(sides);
         let angle = 0.5 * (2.0 * xy).atan2(xx - yy);
         [angle.cos(), angle.sin()]
     }
 
     /// Longer over shorter principal axis.
-    pub fn elongation(&self) -> f64 {
-        let [a, b] = self.axes();
+    pub fn elongation(&self, sides: [f64; 2]) -> f64 {
+        let [a, b] = self.axes(sides);
         (a / b).sqrt()
     }
 
     /// Its area over that of the ellipse with its second moments: 1 for a full disc or ellipse, 0.95 for a
     /// rectangle, far below 1 for something branched or hollow.
-    pub fn fill(&self) -> f64 {
-        let [a, b] = self.axes();
+    pub fn fill(&self, sides: [f64; 2]) -> f64 {
+        let [a, b] = self.axes(sides);
         self.area as f64 / (4.0 * std::f64::consts::PI * (a * b).sqrt())
     }
 }

@@ -16,6 +16,8 @@ pub(crate) struct Field<'a> {
     pub images: &'a [Vec<u16>],
     pub width: usize,
     pub height: usize,
+    /// Width and height of a pixel.
+    pub pixel_sides: [f64; 2],
     pub background: &'a Background,
     /// Noise variance of the background.
     pub read: f64,
@@ -187,7 +189,10 @@ fn markers(field: &Field<'_>, maps: &[Vec<u8>], height: f64, sigma: f64) -> Vec<
         labeller.find(&pixels, &plan, Side::Bright, &mut blobs);
         for blob in &blobs {
             let area = blob.area as usize;
-            if !(5..=most).contains(&area) || blob.elongation() > 6.0 || blob.fill() < 0.7 {
+            if !(5..=most).contains(&area)
+                || blob.elongation(field.pixel_sides) > 6.0
+                || blob.fill(field.pixel_sides) < 0.7
+            {
                 continue;
             }
             if let Some(c) = judge(&pixels, blob, threshold, sigma, image) {

@@ -102,7 +102,9 @@ impl Levels {
             Polarity::Bright => &[Side::Bright],
             Polarity::Dark => &[Side::Dark],
         };
-        let field = candidates::Field { images: &images, width, height, background: &background, read };
+        let pixel_sides = settings.pixel_aspect.sides();
+        let field =
+            candidates::Field { images: &images, width, height, pixel_sides, background: &background, read };
         let fixed = match settings.threshold {
             Threshold::Auto => None,
             Threshold::Raw(t) => Some(t),
@@ -132,13 +134,14 @@ impl Levels {
             .filter(|b| b.area >= area_px[0] && b.area <= area_px[1])
             .map(|b| Sample { pixels: planes[b.image], blob: b.blob })
             .collect();
-        let (marker, noise) = match marker::learn(&samples, best.side, noise, saturation) {
+        let (marker, noise) = match marker::learn(&samples, best.side, noise, saturation, pixel_sides) {
             Some((marker, noise)) => (Some(marker), noise),
             None => (None, noise),
         };
         Ok(Self {
             side: best.side,
             image_px: [known.width, known.height],
+            pixel_aspect: settings.pixel_aspect,
             depth_bits: known.depth_bits,
             background,
             height: best.height,

@@ -30,19 +30,20 @@ const ROUND: f64 = 1.4;
 /// Blobs that are fitted; more would change nothing.
 const MOST: usize = 60;
 
-/// Learns the marker and the noise from blobs; `None` where they are no discs.
+/// Learns the marker and the noise from blobs of pixels of the given sides; `None` where they are no discs.
 pub(crate) fn learn(
     samples: &[Sample<'_>],
     side: Side,
     noise: Noise,
     saturation: Option<f64>,
+    sides: [f64; 2],
 ) -> Option<(Marker, Noise)> {
     let step = samples.len().div_ceil(MOST).max(1);
     // Only what may be a disc teaches what discs look like.
     let samples: Vec<&Sample<'_>> = samples
         .iter()
         .step_by(step)
-        .filter(|s| !s.blob.border && s.blob.elongation() < ROUND && s.blob.fill() > 0.85)
+        .filter(|s| !s.blob.border && s.blob.elongation(sides) < ROUND && s.blob.fill(sides) > 0.85)
         .collect();
     let areas = sorted(samples.iter().map(|s| s.blob.area as f64));
     let radius = (quantile(&areas, 0.5) / std::f64::consts::PI).sqrt();
@@ -58,16 +59,19 @@ pub(crate) fn learn(
         };
         (0..samples.len())
             .into_par_iter()
-            .map_init(Window::default, |window, i| {
-                window.fit(&samples[i].pixels, &samples[i].blob, &fit, [[0.0; 3]; 2]).map(|f| (i, f))
-            })
+            .map_init(
+                || Window::new(sides),
+                |window, i| {
+                    window.fit(&samples[i].pixels, &samples[i].blob, &fit, [[0.0; 3]; 2]).map(|f| (i, f))
+                },
+            )
             .flatten()
             .filter(|(_, f)| f.rms < LARGEST_MISFIT * f.height.abs() + 2.0 * read.sqrt())
             .collect()
     };
     // Step 1: the blur whose discs fit best, first on the list, then between its neighbours.
     let misfit = |blur: f64, radius: f64| -> f64 {
-        let table = EdgeTable::new(radius, blur);
+        let table = EdgeTable::new(radius, blur, sides);
         let found = fits(&table, noise);
         if found.len() * 3 < samples.len() * 2 {
             return f64::INFINITY;
@@ -94,7 +98,7 @@ pub(crate) fn learn(
         if best == 0 && tried[0] <= misfit((low + high) / 2.0, radius) { 0.0 } else { (low + high) / 2.0 };
 
     // Step 2: with that blur, the noise inside and outside of the discs.
-    let table = EdgeTable::new(radius, blur);
+    let table = EdgeTable::new(radius, blur, sides);
     let found = fits(&table, noise);
     let mut flat = [Vec::new(), Vec::new()];
     let fit = DiscFit {
@@ -102,7 +106,7 @@ pub(crate) fn learn(
         band_px: BAND_PX,
         usual_chi2: 1.0,
     };
-    let mut window = Window::default();
+    let mut window = Window::new(sides);
     for (i, f) in &found {
         window.flat_variances(&samples[*i].pixels, &samples[*i].blob, f, &fit, &mut flat);
     }

@@ -124,6 +124,16 @@ impl Demuxer {
         unsafe { &*self.stream().codecpar }
     }
 
+    /// Width to height of a pixel: the container's, else the codec's; and the codec's own. 0 is not said.
+    pub(super) fn pixel_aspect(&self) -> [ffi::AVRational; 2] {
+        // SAFETY: the context is open and the stream one of its own; without a frame the codec's parameters are asked.
+        let told = unsafe {
+            let stream = *(*self.context).streams.add(self.stream);
+            ffi::av_guess_sample_aspect_ratio(self.context, stream, ptr::null_mut())
+        };
+        [told, self.parameters().sample_aspect_ratio]
+    }
+
     /// Short names of the container, comma-separated.
     pub(super) fn container(&self) -> String {
         // SAFETY: an open context has an input format, whose name is a static string.

@@ -11,6 +11,7 @@ use super::layout::{Layout, Orientation};
 use crate::error::{Error, Fault, Result};
 use crate::frame::{RateOrigin, SourceInfo, TimeBase};
 use crate::message::Message;
+use crate::pixel_aspect::PixelAspect;
 use crate::source::{OpenOptions, clock};
 
 /// What is known of a recording before any of it is decoded, and how its pictures are to be turned.
@@ -28,6 +29,7 @@ pub(super) fn describe(
     let mut warnings = Vec::new();
     let orientation = turn(demuxer, &mut warnings);
     let (width, height) = orientation.size(width, height);
+    let (pixel_aspect, pixel_aspect_origin) = options.aspect(aspect(demuxer, orientation, &mut warnings));
 
     let stream = demuxer.stream();
     let stream_base = positive(stream.time_base).unwrap_or((1, 1_000_000));
@@ -64,6 +66,8 @@ pub(super) fn describe(
         codec: codec_name(parameters.codec_id),
         width,
         height,
+        pixel_aspect,
+        pixel_aspect_origin,
         format: layout.format,
         depth_bits: layout.depth_bits,
         declared_frames: indexed.map(|(there, hidden)| there - hidden).or(declared),
@@ -114,6 +118,22 @@ fn size(parameters: &ffi::AVCodecParameters, name: &str) -> Result<(u32, u32)> {
                 .advice("Check that the file is complete and that `ffmpeg -i` reads it"),
         )),
     }
+}
+
+/// Width to height of a pixel of the turned picture, by the container or, where it does not say, by the codec.
+fn aspect(demuxer: &Demuxer, orientation: Orientation, warnings: &mut Vec<Message>) -> PixelAspect {
+    let [told, by_codec] = demuxer.pixel_aspect().map(|r| positive(r).unwrap_or((0, 0)));
+    let aspect = PixelAspect::said(told.0, told.1, warnings);
+    if let Some(other) = PixelAspect::new(by_codec.0, by_codec.1)
+        && PixelAspect::new(told.0, told.1).is_some()
+        && !other.agrees(aspect)
+    {
+        warnings.push(
+            format!("the container says that pixels are {aspect} (width:height), the coded film {other}; the container's is taken")
+                .into(),
+        );
+    }
+    if orientation.transposed { aspect.turned() } else { aspect }
 }
 
 /// How the container says that pictures are to be turned.

@@ -275,7 +275,7 @@ impl Bytes for Lent {
 
 /// How the picture must be turned to be seen as it was filmed: first transposed, then mirrored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) struct Orientation {
+pub(crate) struct Orientation {
     /// Rows become columns.
     pub transposed: bool,
     /// Left and right are exchanged, after that.
@@ -300,7 +300,7 @@ impl Orientation {
     }
 
     /// Width and height after turning.
-    pub(super) fn size(self, width: u32, height: u32) -> (u32, u32) {
+    pub(crate) fn size(self, width: u32, height: u32) -> (u32, u32) {
         if self.transposed { (height, width) } else { (width, height) }
     }
 
@@ -319,7 +319,13 @@ impl Orientation {
     }
 
     /// The turned samples and their row length in pixels.
-    fn apply(self, samples: Vec<u8>, width: usize, height: usize, bytes: usize) -> (Vec<u8>, usize) {
+    pub(crate) fn apply(
+        self,
+        samples: Vec<u8>,
+        width: usize,
+        height: usize,
+        bytes: usize,
+    ) -> (Vec<u8>, usize) {
         if self == Self::default() {
             return (samples, width);
         }

@@ -32,7 +32,8 @@ use demux::{Demuxer, Packet};
 use describe::{describe, step};
 use feed::Feed;
 use fields::FieldOrder;
-use layout::{Layout, Orientation};
+use layout::Layout;
+pub(crate) use layout::Orientation;
 use lost::Lost;
 use order::{Order, Sent};
 use stamps::Stamps;
@@ -180,6 +181,11 @@ impl FfmpegSource {
             user_clock: options.fps.is_some(),
             ending: Ending::Complete,
         })
+    }
+
+    /// How its pictures are turned.
+    pub(crate) fn orientation(&self) -> Orientation {
+        self.orientation
     }
 
     /// Whether the end was reached.

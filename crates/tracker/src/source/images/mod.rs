@@ -5,6 +5,7 @@
 pub mod names;
 mod page;
 pub mod picture;
+mod pixel_size;
 mod planes;
 mod stack;
 
@@ -130,12 +131,16 @@ impl SequenceSource {
         let (time_base, rate_hz, rate_origin) = rate(options, &mut warnings)?;
         let ending = path.extension().map_or(String::new(), |e| e.to_string_lossy().to_lowercase());
         let size_bytes = files.iter().flatten().map(|f| std::fs::metadata(f).map_or(0, |m| m.len())).sum();
+        let (pixel_aspect, pixel_aspect_origin) =
+            options.aspect(pixel_size::aspect(pixel_size::of_file(path), &mut warnings));
         let info = SourceInfo {
             name: name.to_owned(),
             container: "pictures".into(),
             codec: ending,
             width: first.width,
             height: first.height,
+            pixel_aspect,
+            pixel_aspect_origin,
             format: format(first.depth_bits),
             depth_bits: first.depth_bits,
             declared_frames: Some(files.len() as u64),

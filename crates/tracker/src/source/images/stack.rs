@@ -7,6 +7,7 @@ use tiff::decoder::Decoder;
 
 use super::page::{self, Layout};
 use super::picture::Picture;
+use super::pixel_size;
 use super::planes::{self, Planes};
 use super::{format, frame, rate};
 use crate::error::{Error, Fault, Result};
@@ -83,12 +84,16 @@ impl StackSource {
         warnings.extend(planes::channels_of_ome(&mut pages.decoder, &layout).map(Message::from));
         let size_bytes = std::fs::metadata(path(name)).ok().map(|m| m.len());
         let (time_base, rate_hz, rate_origin) = rate(options, &mut warnings)?;
+        let said = pixel_size::of_tiff(&mut pages.decoder);
+        let (pixel_aspect, pixel_aspect_origin) = options.aspect(pixel_size::aspect(said, &mut warnings));
         let mut info = SourceInfo {
             name: name.to_owned(),
             container: "TIFF".into(),
             codec: format!("{} bit pages", layout.bits),
             width: layout.width,
             height: layout.height,
+            pixel_aspect,
+            pixel_aspect_origin,
             format: format(layout.bits),
             depth_bits: layout.bits.max(8),
             declared_frames: declared.as_ref().map(|d| d.pictures),

@@ -19,6 +19,7 @@ use crate::frame::{
 };
 use crate::message::Setting;
 use crate::name::{path, text};
+use crate::pixel_aspect::PixelAspect;
 use header::{Header, Packing};
 
 /// Longest header that is read; real ones have some kB.
@@ -211,6 +212,7 @@ fn info(name: &str, header: &Header, packing: &Packing, options: &OpenOptions) -
     say("sensor depth", sensor);
     say("comment", header.comment.clone());
     let known = rate_origin != RateOrigin::Unknown;
+    let (pixel_aspect, pixel_aspect_origin) = options.aspect(PixelAspect::SQUARE);
     Ok(SourceInfo {
         name: name.to_owned(),
         container: "Photron MRAW".into(),
@@ -222,6 +224,8 @@ fn info(name: &str, header: &Header, packing: &Packing, options: &OpenOptions) -
         },
         width: header.width,
         height: header.height,
+        pixel_aspect,
+        pixel_aspect_origin,
         format: packing.format,
         depth_bits: packing.depth_bits,
         declared_frames: header.total_frames,

@@ -19,6 +19,7 @@ use super::{OpenOptions, clock};
 use crate::error::{Error, Fault, Place, Result};
 use crate::frame::{Bytes, Ending, Frame, FrameSource, PixelFormat, RateClaims, RateOrigin, SourceInfo};
 use crate::message::Message;
+use crate::pixel_aspect::PixelAspect;
 pub(crate) use header::is_norpix;
 use header::{Form, HEADER_BYTES, Header};
 
@@ -113,12 +114,15 @@ impl NorpixSource {
             Form::Raw { stored, .. } => stored,
             Form::Jpeg => Stored::Plain,
         };
+        let (pixel_aspect, pixel_aspect_origin) = options.aspect(PixelAspect::SQUARE);
         let mut info = SourceInfo {
             name: name.to_owned(),
             container: "NorPix sequence".into(),
             codec: codec(&header),
             width: header.width,
             height: header.height,
+            pixel_aspect,
+            pixel_aspect_origin,
             format: PixelFormat::Gray8,
             depth_bits: 8,
             declared_frames: (header.declared > 0).then_some(header.declared),

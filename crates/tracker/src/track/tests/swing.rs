@@ -7,6 +7,7 @@ use rand_distr::{Distribution, Normal, Poisson};
 
 use crate::detect::{Detection, Flags};
 use crate::observation::{Observation, Status};
+use crate::pixel_aspect::PixelAspect;
 use crate::rig::{Body, Joint, Node, Rig};
 use crate::stop::Stop;
 use crate::store::{DetectionStore, FrameStamp};
@@ -217,6 +218,7 @@ impl Swing {
         Rig {
             schema: 1,
             image_px: [1280, 1024],
+            pixel_aspect: PixelAspect::SQUARE,
             reference_frame: Some(reference as u64),
             region: None,
             lens: None,
