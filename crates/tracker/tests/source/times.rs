@@ -297,7 +297,10 @@ fn a_table_of_coarse_ticks_is_that_of_fine_ones() {
     let film = |name: &str, fps: &str, status: i32| {
         let (to, rig) = (word(name), word("rig.toml"));
         tracker(
-            &["film", "--preset", "clean", "--frames", "40", "--fps", fps, "-q", "--rig", &rig, "-o", &to],
+            &[
+                "film", "--preset", "clean", "--frames", "40", "--fps", fps, "-q", "--rig", &rig, "-o", &to,
+                "--force",
+            ],
             &[status],
         )
     };
