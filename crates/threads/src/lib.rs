@@ -69,12 +69,16 @@ mod tests {
 
     use super::*;
 
+    /// The tests hold the one pool's lock, so one at a time.
+    static ALONE: Mutex<()> = Mutex::new(());
+
     fn sum() -> u64 {
         (0..10_000u64).into_par_iter().sum()
     }
 
     #[test]
     fn one_pool_serves_all_calls_and_calls_from_within() {
+        let _alone = ALONE.lock();
         let first = pool().unwrap();
         assert_eq!(install(|| install(sum)), 49_995_000);
         assert!(Arc::ptr_eq(&first, &pool().unwrap()));
@@ -83,6 +87,7 @@ mod tests {
 
     #[test]
     fn a_pool_of_another_process_is_not_waited_for() {
+        let _alone = ALONE.lock();
         // As a fork leaves it: the lock held by a thread that is not there.
         let (tell, told) = channel();
         let (release, released) = channel::<()>();

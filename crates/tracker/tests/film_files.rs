@@ -110,7 +110,7 @@ fn lossy_codecs_stay_close_and_closer_with_quality() {
     {
         let rms = |q| {
             let options = WriteOptions { codec: Some(codec), quality: Some(q), ..WriteOptions::default() };
-            round_trip(&film, &folder.path().join(name), &options).1
+            round_trip(&film, &folder.path().join(format!("{q}{name}")), &options).1
         };
         let (fine, coarse) = (rms(fine), rms(coarse));
         // A fine quantiser keeps most of the noise, a coarse one takes it out: the difference is then the noise.
@@ -129,7 +129,7 @@ fn truth_tables_say_the_same_in_both_forms() {
     for name in ["t.parquet", "t.csv"] {
         let path = folder.path().join(name);
         let options = WriteOptions { truth: Some(path.clone()), ..WriteOptions::default() };
-        write(&film, &folder.path().join("a.avi"), &options, &mut |_| Ok(())).unwrap();
+        write(&film, &folder.path().join(format!("{name}.avi")), &options, &mut |_| Ok(())).unwrap();
         let read = Truth::read(&path).unwrap();
         assert_eq!(read.nodes, truth.nodes);
         for (a, b) in read.frames.iter().zip(&truth.frames) {
