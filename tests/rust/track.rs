@@ -485,7 +485,7 @@ fn what_makes_no_sense_is_refused_with_what_to_do() {
     let closed = "/proc/t.csv".to_owned();
     for (arguments, expected) in [
         (vec![none.as_str(), "-o", &out], "no such file"),
-        (vec![text.as_str(), "-o", &out], "text.mp4: not a recording"),
+        (vec![text.as_str(), "-o", &out], "text.mp4: text, not a recording"),
         (vec![&input, "-o", "t.xlsx"], "neither Parquet nor CSV"),
         (vec![&input, "-o", &nowhere], "nowhere/t.csv"),
         (vec![&input, "-o", &closed], "/proc/t.csv"),
