@@ -38,6 +38,17 @@ def held(
     return t, phi
 
 
+def thrown(deg: tuple[float, ...], w: tuple[float, float], throw_s: float) -> tuple[Floats, Floats]:
+    """Times and angles (T, 2) of links held still at ``deg`` for a second and thrown with the rates ``w``."""
+    t = np.arange(round((1 + throw_s) * FPS)) / FPS
+    phi = np.tile(np.radians(deg), (t.size, 1))
+    free = t >= 1
+    if free.any():
+        start = [*phi[0], *w]
+        phi[free] = simulate(derived("A"), LIGHT, start, t[free], tolerance=1e-9).phi_rad
+    return t, phi
+
+
 def filmed(t: Floats, phi: Floats, roll_deg: float = 0.0, zero: Any = "rest") -> LinkAngles:
     """The angles of a film whose camera is rolled, the links pointing down in its reference frame."""
     roll = np.radians(roll_deg)
@@ -171,6 +182,79 @@ def test_a_recording_that_only_hangs_is_believed_and_one_that_is_only_held_is_no
         filmed(t, still + np.radians(40.0))
 
 
+@pytest.mark.parametrize(
+    ("deg", "w", "throw_s"),
+    [
+        ((8.0, 8.0), (25.0, -10.0), 3.0),
+        ((8.0, 8.0), (25.0, -10.0), 0.8),
+        ((8.0, 8.0), (-25.0, 40.0), 3.0),
+        ((-8.0, -8.0), (25.0, -10.0), 3.0),
+        ((14.0, 14.0), (0.0, 0.0), 1.0),
+        ((14.0, 14.0), (0.0, 0.0), 0.02),
+        ((14.0, 14.0), (0.0, 0.0), 0.0),
+    ],
+)
+def test_a_hold_that_no_swing_speaks_of_is_refused_by_the_picture(
+    deg: tuple[float, ...], w: tuple[float, float], throw_s: float
+) -> None:
+    t, phi = thrown(deg, w, throw_s)
+    if w == (0.0, 0.0) and throw_s > 0.5:
+        phi[:] = np.radians(deg)
+    with pytest.raises(AnglesError, match="deg from the picture's vertical") as refused:
+        filmed(t, phi)
+    assert "too little of a free swing is seen to say that the links hang there" in str(refused.value)
+    assert "Give zero='vertical'" in str(refused.value)
+
+
+@pytest.mark.parametrize("deg", [(4.0, 4.0), (-5.0, -5.0), (0.0, 0.0)])
+@pytest.mark.parametrize("w", [(25.0, -10.0), (-25.0, 40.0)])
+def test_a_zero_that_no_swing_confirms_is_as_uncertain_as_its_tilt(
+    deg: tuple[float, ...], w: tuple[float, float]
+) -> None:
+    t, phi = thrown(deg, w, 0.8)
+    found = filmed(t, phi)
+    sigma = np.degrees(found.meta["zero"]["sigma_rad"])
+    # The picture's vertical is off by 0.9 deg for the upper link, and is uncertain by the roll of 1 deg.
+    np.testing.assert_array_less(np.hypot(np.abs(deg) - np.array([0.95, 0.1]), 1.0) - 0.1, sigma)
+    np.testing.assert_array_less(off_deg(found, phi), 1.3 * sigma)
+    (note,) = found.meta["notes"]
+    assert "deg from the picture's vertical, but too little of a free swing is seen to confirm it" in note
+    assert "the zero's uncertainty says so" in note
+
+
+@pytest.mark.parametrize(
+    ("deg", "swing_s", "damping"),
+    [
+        ((40.0,), 6.0, Damping(tau_c1=0.03)),
+        ((60.0,), 6.0, Damping(tau_c1=0.02)),
+        ((50.0,), 6.0, Damping(tau_c1=0.02)),
+        ((40.0,), 6.0, Damping(tau_c1=0.08)),
+        ((60.0, 60.0), 8.0, Damping(mu_v1=2e-4, tau_c1=2e-2, tau_c2=3e-3)),
+    ],
+)
+def test_a_stop_by_dry_friction_is_no_surer_than_the_swing(
+    deg: tuple[float, ...], swing_s: float, damping: Damping
+) -> None:
+    t, phi = held(deg, swing_s, damping=damping)
+    try:
+        found = filmed(t, phi)
+    except AnglesError as refused:
+        assert "the swing goes about a direction" in str(refused)  # noqa: PT017
+        return
+    np.testing.assert_array_less(off_deg(found, phi), 3 * np.degrees(found.meta["zero"]["sigma_rad"]))
+    if len(deg) == 2:
+        assert any("from the direction that the swing goes about" in n for n in found.meta["notes"])
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_clean_swing_keeps_its_zero_sure(seed: int) -> None:
+    t, phi = rig.drop(12.0, 500.0, seed, rest_s=1.0)
+    found = filmed(t, phi)
+    # The links hang before the swing, whose own zero is uncertain by 0.3 to 2 deg.
+    np.testing.assert_array_less(np.degrees(found.meta["zero"]["sigma_rad"]), 0.02)
+    np.testing.assert_array_less(off_deg(found, phi), 0.02)
+
+
 def test_a_lift_by_hand_does_not_speak_against_the_rest() -> None:
     t, phi = rig.drop(0.1, 500.0, 5, rest_s=1.0)
     for links in (1, 2):
@@ -223,3 +307,24 @@ def test_zero_in_words() -> None:
     t, phi = held((10.0,), 1.0)
     with pytest.raises(AnglesError, match="'upright' is not known"):
         filmed(t, phi, zero="upright")
+
+
+@pytest.mark.parametrize("zero", [None, True, b"rest", {"a": 1}, object(), ["a"], [[1.0], [1.0, 2.0]], 1j])
+def test_a_zero_of_no_kind_is_refused_with_the_choices(zero: Any) -> None:
+    t, phi = held((10.0,), 1.0)
+    with pytest.raises(AnglesError, match="is no zero") as refused:
+        filmed(t, phi, zero=zero)
+    assert "Give rest, vertical, reference_frame, one angle in rad per link, or the Nodes" in str(
+        refused.value
+    )
+
+
+def test_angles_that_are_too_many_are_told_in_both_units() -> None:
+    t, phi = held((10.0,), 1.0)
+    with pytest.raises(
+        AnglesError, match=r"2 angle\(s\) for 1 link\(s\): -2, 3 deg \(-0\.0349066, 0\.0523599 rad\)"
+    ):
+        filmed(t, phi, zero=parse_zero("-2,3"))
+    for wrong in (np.nan, [np.inf], [], np.zeros((1, 1))):
+        with pytest.raises(AnglesError, match="Give one finite angle per link"):
+            filmed(t, phi, zero=wrong)

@@ -4,24 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from pydpend.angles.linkage import Shape
 from pydpend.angles.markers import BodyMarkers, body_markers
 from pydpend.angles.pose import solve
-from pydpend.angles.rests import HANGS_WITHIN_RAD, hanging_rests, judge, unconfirmed
+from pydpend.angles.rests import (
+    HANGS_WITHIN_RAD,
+    confirmed_sigma,
+    hanging_rests,
+    judge,
+    off_the_swing,
+    unconfirmed,
+    unconfirmed_sigma,
+)
 from pydpend.angles.swing import Swing, find_swing
 from pydpend.angles.table import Floats, LinkAngles
 from pydpend.angles.unwrap import unwrap
 from pydpend.angles.vertical import ROLL_SIGMA_DEG, picture_down, vertical_zero
 from pydpend.angles.zero import find_rest, zero_of
 from pydpend.errors import AnglesError, Setting, fault
+from pydpend.nodes import Nodes
 from pydpend.series import highpass_noise
-
-if TYPE_CHECKING:
-    from pydpend.nodes import Nodes
 
 VERTICAL = "vertical"
 """The word for the picture's vertical, alone or with the roll's standard uncertainty in degrees: ``vertical=0.5``."""
@@ -83,6 +89,7 @@ def zero_for(
 ) -> tuple[Floats, dict[str, Any], list[str]]:
     """What to take off the turns ``phi`` (T, L) to have angles, (L,), where that comes from, and what is doubtful."""
     links = phi.shape[1]
+    given = _given(zero, links)
     if (
         isinstance(zero, str)
         and zero not in ("rest", "reference_frame")
@@ -103,7 +110,12 @@ def zero_for(
         judged = judge(rests, phi, swing, down)
         kept, notes = hanging_rests(judged, swing, label)
         value, sigma = zero_of(kept, label)
-        notes += unconfirmed(judged)
+        if swing is None:
+            notes += unconfirmed(judged)
+            sigma = unconfirmed_sigma(value, sigma, down)
+        else:
+            notes += off_the_swing(kept, value, sigma, swing)
+            sigma = confirmed_sigma(kept, value, sigma, swing)
         meta = {"from": "rest", "sigma_rad": sigma.tolist(), "rests": [j.to_json() for j in judged]}
         return value, meta | _told(swing, value), notes
     if isinstance(zero, str) and zero == "reference_frame":
@@ -115,16 +127,10 @@ def zero_for(
             "sigma_rad": sigma.tolist(),
             "roll_sigma_rad": roll_sigma(zero),
         }
-    elif isinstance(zero, (int, float, np.floating, Sequence, np.ndarray)):
-        given = np.atleast_1d(np.asarray(zero, dtype=np.float64))
-        if given.shape != (links,) or not np.isfinite(given).all():
-            raise AnglesError(
-                fault(
-                    Setting("zero"), f"{zero!r} for {links} link(s)", "Give one finite angle in rad per link"
-                )
-            )
+    elif given is not None:
         value, meta = -given, {"from": "given", "reference_frame_rad": given.tolist()}
     else:
+        assert isinstance(zero, Nodes)
         value, meta, notes = _zero_from_reference(zero, raw, markers, bodies, mirrored)
     if swing is not None and swing.refutes(value, np.array(meta.get("sigma_rad", 0.0))):
         off = " and ".join(f"{v:.1f}" for v in np.degrees(np.abs(swing.off(value))))
@@ -133,6 +139,45 @@ def zero_for(
             "off by that"
         )
     return value, meta | _told(swing, value), notes
+
+
+def _given(zero: object, links: int) -> Floats | None:
+    """The links' angles (L,) in the reference frame that a caller gives, rad; ``None`` if it is a word or a recording.
+
+    Raises :class:`AnglesError` if it is none of these, or not one finite angle per link.
+    """
+    if isinstance(zero, (str, Nodes)):
+        return None
+    angles: Floats | None = None
+    if isinstance(zero, (int, float, np.number, Sequence, np.ndarray)) and not isinstance(
+        zero, (bool, bytes)
+    ):
+        try:
+            angles = np.atleast_1d(np.asarray(zero, dtype=np.float64))
+        except (TypeError, ValueError):
+            angles = None
+    if angles is None:
+        what = repr(zero) if zero is None or isinstance(zero, (bool, bytes)) else f"a {type(zero).__name__}"
+        raise AnglesError(
+            fault(
+                Setting("zero"),
+                f"{what} is no zero",
+                f"Give rest, {VERTICAL}, reference_frame, one angle in rad per link, or the Nodes of a recording in "
+                "which the links hang at rest",
+            )
+        )
+    if angles.shape != (links,) or not np.isfinite(angles).all():
+        # The command line takes degrees, Python rad.
+        deg = ", ".join(f"{v:.6g}" for v in np.degrees(angles).ravel())
+        rad = ", ".join(f"{v:.6g}" for v in angles.ravel())
+        raise AnglesError(
+            fault(
+                Setting("zero"),
+                f"{angles.size} angle(s) for {links} link(s): {deg} deg ({rad} rad)",
+                "Give one finite angle per link",
+            )
+        )
+    return angles
 
 
 def _noise(phi: Floats, sigma: Floats) -> float:
@@ -170,4 +215,7 @@ def _zero_from_reference(
     judged = judge(rests, turns, swing, down, HANGS_WITHIN_RAD)
     kept, notes = hanging_rests(judged, swing, "reference recording")
     value, error = zero_of(kept, "reference recording")
+    if swing is not None:
+        notes += off_the_swing(kept, value, error, swing)
+        error = confirmed_sigma(kept, value, error, swing)
     return value, {"from": "reference recording", "sigma_rad": error.tolist()}, notes

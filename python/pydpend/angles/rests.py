@@ -7,18 +7,28 @@ from enum import Enum, auto
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pydpend.angles.swing import Swing, within_half_turn
 from pydpend.angles.table import Floats
-from pydpend.angles.vertical import Down
+from pydpend.angles.vertical import ROLL_SIGMA_DEG, Down
 from pydpend.angles.zero import GIVE_ZERO, Rest
 from pydpend.errors import AnglesError, fault
 
 HANGS_WITHIN_RAD = np.radians(60.0)
 """A link that hangs points down in the picture to within this, or the film is rolled."""
 
-UPRIGHT_RAD = np.radians(15.0)
-"""Where no swing says where the links hang, the picture must: a camera held in the hand is rolled by less than this."""
+UPRIGHT_SIGMA_RAD = np.radians(2.0)
+"""Where no swing says where the links hang, the picture must: a camera set up by eye is rolled by 1 deg, and the line
+of a link's joints or markers misses its centre of mass by some 1.7 deg. A rest farther than three times this (6 deg)
+from the picture's vertical is no zero."""
+
+UNSEEN_SIGMA_RAD = np.radians(15.0)
+"""Standard uncertainty of a rest of which neither swing nor picture says whether the links hang: one that is held more
+than three times as far off is seen to be held by whoever films it."""
+
+BEARINGS_RAD = np.radians(0.3)
+"""Ordinary dry friction lets a link stop this far off hanging: no more need be said of it."""
 
 MOVES_RAD = np.radians(0.25)
 """A link that leaves its rest by less than this, or than `MOVES_NOISE`, does not say to which side it moves."""
@@ -53,13 +63,12 @@ class Verdict(Enum):
 class Judged:
     """A rest with what is said of it.
 
-    ``tilt_rad`` (L,): from the picture's vertical, NaN where that is not known; ``moves``: whether a link leaves it.
+    ``tilt_rad`` (L,): from the picture's vertical, NaN where that is not known.
     """
 
     rest: Rest
     verdict: Verdict
     tilt_rad: Floats
-    moves: bool
 
     @property
     def hangs(self) -> bool:
@@ -78,34 +87,27 @@ class Judged:
 
 
 def judge(
-    rests: list[Rest], phi: Floats, swing: Swing | None, down: Down, upright_rad: float = UPRIGHT_RAD
+    rests: list[Rest], phi: Floats, swing: Swing | None, down: Down, upright_rad: float | None = None
 ) -> list[Judged]:
     """What turns ``phi`` (T, L) and the picture say of each rest.
 
-    The swing decides where it is known. Else the links must point down within ``upright_rad``, and the motion must not
-    look like one that was let go there.
+    The swing decides where it is known. Else the motion must not look like one that was let go there, and the links
+    must point down within ``upright_rad``, or else within three standard deviations (`UPRIGHT_SIGMA_RAD`).
     """
+    sigma = np.hypot(UPRIGHT_SIGMA_RAD, down.sigma_rad)
+    most = np.minimum(3 * sigma if upright_rad is None else upright_rad, HANGS_WITHIN_RAD)
     out = []
     for rest in rests:
         tilt = down.off(rest.phi_rad)
         if swing is not None:
             verdict = Verdict.REFUTED if swing.refutes(rest.phi_rad, rest.sigma_rad) else Verdict.CONFIRMED
-        elif (np.abs(tilt) > upright_rad + 3 * down.sigma_rad).any() or (
-            np.abs(tilt) > HANGS_WITHIN_RAD
-        ).any():
-            verdict = Verdict.TILTED
         elif _let_go(rest, phi, tilt):
             verdict = Verdict.ONE_SIDED
+        elif (np.abs(tilt) > most).any():
+            verdict = Verdict.TILTED
         else:
             verdict = Verdict.UNREFUTED
-        out.append(
-            Judged(
-                rest,
-                verdict,
-                tilt,
-                bool((np.nanmax(np.abs(phi - rest.phi_rad), axis=0) > _moves(rest, phi)).any()),
-            )
-        )
+        out.append(Judged(rest, verdict, tilt))
     return out
 
 
@@ -178,11 +180,54 @@ def _notes(kept: list[Judged], others: list[Judged], swing: Swing | None) -> lis
 def unconfirmed(judged: list[Judged]) -> list[str]:
     """What a reader must know where a zero rests on no swing: it moves too little, or by hand only."""
     kept = [j for j in judged if j.hangs]
-    if not all(j.verdict is Verdict.UNREFUTED and (j.moves or np.isnan(j.tilt_rad).any()) for j in kept):
+    if any(j.verdict is Verdict.CONFIRMED for j in kept):
+        return []
+    tilt = np.abs(kept[0].tilt_rad)
+    at = f", {_each(tilt)} deg from the picture's vertical" if np.isfinite(tilt).all() else ""
+    return [
+        f"nothing contradicts that the links hang in {_when(kept[0].rest)}{at}, but too little of a free swing is seen "
+        "to confirm it: the zero's uncertainty says so"
+    ]
+
+
+def unconfirmed_sigma(zero_rad: Floats, sigma_rad: Floats, down: Down) -> Floats:
+    """Standard uncertainty (L,) of a zero that no swing confirms: the links may hang as the picture's vertical says."""
+    tilt = down.off(zero_rad)
+    doubt = np.where(
+        np.isnan(tilt), UNSEEN_SIGMA_RAD, np.hypot(np.nan_to_num(tilt), np.radians(ROLL_SIGMA_DEG))
+    )
+    return np.asarray(np.hypot(sigma_rad, doubt))
+
+
+def confirmed_sigma(kept: list[Rest], zero_rad: Floats, sigma_rad: Floats, swing: Swing) -> Floats:
+    """Standard uncertainty (L,) of a zero that the swing goes about.
+
+    It is at least how far they are apart where dry friction may have stopped the links: in a rest after the swing, in
+    a swing with dry friction, or where they are more than three of their sigmas apart. After a swing with dry friction
+    it is no less than that of the swing: where the links stop says no more.
+    """
+    after = all(rest.start_s > swing.start_s for rest in kept)
+    apart = np.abs(swing.off(zero_rad))
+    if not (after or swing.dry):
+        apart = np.where(_disagree(apart, sigma_rad, swing), apart, 0.0)
+    if after and swing.dry:
+        apart = np.maximum(apart, swing.sigma_rad)
+    return np.asarray(np.hypot(sigma_rad, apart))
+
+
+def _disagree(apart_rad: Floats, sigma_rad: Floats, swing: Swing) -> NDArray[np.bool_]:
+    """Whether zeros of rest and swing (L,) differ by more than three of their sigmas, and than bearings explain."""
+    return np.asarray(apart_rad > np.maximum(3 * np.hypot(swing.sigma_rad, sigma_rad), BEARINGS_RAD))
+
+
+def off_the_swing(kept: list[Rest], zero_rad: Floats, sigma_rad: Floats, swing: Swing) -> list[str]:
+    """What a reader must know where a zero and the swing that confirms it differ by more than three of their sigmas."""
+    apart = np.abs(swing.off(zero_rad))
+    if not _disagree(apart, sigma_rad, swing).any():
         return []
     return [
-        f"nothing contradicts that the links hang in {_when(kept[0].rest)}, but too little of a free swing is seen to "
-        "confirm it"
+        f"the links rest {_each(apart)} deg from the direction that the swing goes about in {_when(kept[0])}, as dry "
+        "friction may stop them: the zero's uncertainty says so"
     ]
 
 
@@ -203,6 +248,8 @@ def _reason(j: Judged, swing: Swing | None) -> str:
         return f", and the swing goes about a direction {_each(off)} deg from there"
     if j.verdict is Verdict.ONE_SIDED:
         return ", and the motion goes to one side of it only"
+    if j.verdict is Verdict.TILTED:
+        return ", and too little of a free swing is seen to say that the links hang there"
     return ""
 
 

@@ -5,7 +5,7 @@ With the link's turns ``a``, ``b`` from any direction, and ``d = b - a``, the fr
     2 a'' + C b'' + C' b'^2 + S sin(a - a0) + friction = 0,    2 L b'' + C a'' - C' a'^2 + K sin(b - b0) + friction = 0
 
 with ``C = P cos d + Q sin d`` and ``C'`` its derivative. These are linear in ``L, P, Q, S sin a0, S cos a0,
-K sin b0, K cos b0`` and in viscous friction, so that any stretch of free motion gives the angles ``a0, b0`` at
+K sin b0, K cos b0`` and in viscous and dry friction, so that any stretch of free motion gives the angles ``a0, b0`` at
 which the links hang, whatever the pendulum is made of and however the camera was held.
 """
 
@@ -74,13 +74,17 @@ class Swing:
     """Where the links would hang by their motion.
 
     ``zero_rad`` (L,): turns within (-pi, pi]; ``sigma_rad`` (L,): standard uncertainties; ``width_rad`` (L,): half of
-    the range over which each link moves; ``share``: part of the instants in motion that obeys the equations.
+    the range over which each link moves; ``share``: part of the instants in motion that obeys the equations;
+    ``dry``: whether these are surest with dry friction, which lets a link stop off its zero;
+    ``start_s``: the first of those instants.
     """
 
     zero_rad: Floats
     sigma_rad: Floats
     width_rad: Floats
     share: float
+    dry: bool
+    start_s: float
 
     def off(self, turn_rad: Floats) -> Floats:
         """How far turns (L,) are from the swing's zero, rad, within (-pi, pi]."""
@@ -124,15 +128,22 @@ def find_swing(t_s: Floats, phi_rad: Floats, noise_rad: float, down_rad: Floats)
     local = _local(t_s, phi_rad, noise_rad)
     if local is None:
         return None
-    found = [_swing(local, _equations(local), down_rad)]
+    equations = _equations(local)
+    found = [
+        _swing(local, equations, down_rad),
+        _swing(local, _with_dry_friction(local, equations), down_rad, True),
+    ]
     if phi_rad.shape[1] == 1:
         found.append(_swing(local, _creeping(local), down_rad))
     known = [swing for swing in found if swing is not None]
-    return min(known, key=lambda swing: float(swing.sigma_rad.max()), default=None)
+    # Equations that few instants obey are no surer for it.
+    return min(known, key=lambda swing: float(swing.sigma_rad.max()) / swing.share, default=None)
 
 
-def _swing(local: _Local, equations: tuple[Floats, Floats, Floats], down_rad: Floats) -> Swing | None:
-    """The swing by one form of the equations."""
+def _swing(
+    local: _Local, equations: tuple[Floats, Floats, Floats], down_rad: Floats, dry: bool = False
+) -> Swing | None:
+    """The swing by one form of the equations, ``dry``: that with dry friction."""
     links = local.phi.shape[1]
     design, wanted, noise = equations
     best: NDArray[np.bool_] | None = None
@@ -156,7 +167,7 @@ def _swing(local: _Local, equations: tuple[Floats, Floats, Floats], down_rad: Fl
             return None
         kept, best = best, _obeyed(design, wanted, noise, x)
     assert x is not None
-    return _result(local.at(kept), design[kept], wanted[kept], noise[kept], x, float(kept.mean()))
+    return _result(local.at(kept), design[kept], wanted[kept], noise[kept], x, float(kept.mean()), dry)
 
 
 def _reversals(w: Floats) -> int:
@@ -258,6 +269,17 @@ def _equations(x: _Local) -> tuple[Floats, Floats, Floats]:
     )
 
 
+def _with_dry_friction(x: _Local, equations: tuple[Floats, Floats, Floats]) -> tuple[Floats, Floats, Floats]:
+    """The same equations with dry friction, which has the sign of a joint's rate."""
+    rows, wanted, noise = equations
+    w1 = np.sign(x.w[:, 0])
+    if x.phi.shape[1] == 1:
+        return np.concatenate([rows, w1[:, None, None]], axis=2), wanted, noise
+    w2, o = np.sign(x.w[:, 1] - x.w[:, 0]), np.zeros(w1.size)
+    dry = np.stack([np.stack([w1, -w2], axis=1), np.stack([o, w2], axis=1)], axis=1)
+    return np.concatenate([rows, dry], axis=2), wanted, noise
+
+
 def _creeping(x: _Local) -> tuple[Floats, Floats, Floats]:
     """The same of one link over its friction instead of its inertia: for a link that creeps to where it hangs, whose
     acceleration is lost in the noise."""
@@ -312,7 +334,7 @@ def _physical(x: Floats, links: int) -> bool:
 
 
 def _result(
-    local: _Local, design: Floats, wanted: Floats, noise: Floats, x: Floats, share: float
+    local: _Local, design: Floats, wanted: Floats, noise: Floats, x: Floats, share: float, dry: bool
 ) -> Swing | None:
     links = local.phi.shape[1]
     weight = 1 / np.hypot(noise, _size(wanted))
@@ -332,4 +354,4 @@ def _result(
         sigma[k] = float(np.sqrt(slope @ inverse[at : at + 2, at : at + 2] @ slope))
     if not (sigma < KNOWN_RAD).all():
         return None
-    return Swing(_zero(x, links), sigma, np.ptp(local.phi, axis=0) / 2, share)
+    return Swing(_zero(x, links), sigma, np.ptp(local.phi, axis=0) / 2, share, dry, float(local.t_s[0]))
