@@ -22,6 +22,7 @@ GROUPS: tuple[tuple[str, ...], ...] = (
         "kinds",
         "documents",
         "instants",
+        "units",
         "delimited",
         "columns",
         "arrays",

@@ -54,7 +54,8 @@ READ: dict[str, str | bytes] = {
     "separators at the ends of rows": HEAD + "0.5,0.65,,\n1,1.65,\n",
     "comments": "# a, b\n% c\n" + HEAD + "# d\n0.5,0.65\n% e\n// f, g, h\n1,1.65\n",
     "units": HEAD + "s,V\n0.5,0.65\n1,1.65\n",
-    "units with digits": HEAD + "(s),V/m2\n0.5,0.65\n1,1.65\n",
+    "units in brackets": HEAD + "(s),[V]\n0.5,0.65\n1,1.65\n",
+    "whole numbers in one row": "time_s,voltage_v,note\n0.5,0.65,12\n1,1.65,\n",
     "a sentence above with the names in it": "the columns time_s and voltage_v follow\n"
     + HEAD
     + "0.5,0.65\n1,1.65\n",
@@ -100,6 +101,26 @@ REFUSED: dict[str, tuple[str | bytes, str]] = {
     "underscores": (HEAD + "0.5,1_0\n", "'1_0' is not a number"),
     "other scripts' digits": (HEAD + "0.5,\u0661\n", "is not a number"),
     "a unit in the field": (HEAD + "0.5,0.65 V\n", "line 2, column voltage_v: '0.65 V' is not a number"),
+    "a unit with digits that is not known": (
+        HEAD + "(s),V/m2\n0.5,0.65\n",
+        "line 2, column voltage_v: the unit 'V/m2' is not known",
+    ),
+    "a unit that contradicts": (
+        HEAD + "ms,V\n2,0.65\n",
+        "line 2, column time_s: the unit is 'ms', and the column's name says 's'",
+    ),
+    "millivolts under volts": (HEAD + "s,mV\n2,650\n", "the unit is 'mV', and the column's name says 'v'"),
+    "bars": (HEAD.replace(",", "|") + "0.5|0.65\n", "line 1: the fields are parted by '|', a separator"),
+    "colons": (HEAD.replace(",", ":") + "0.5:0.65\n", "line 1: the fields are parted by ':', a separator"),
+    "hours and minutes": (
+        HEAD + "00:00,1\n00:01,2\n",
+        "line 2, column time_s: '00:00' may be hours:minutes or",
+    ),
+    "minutes and seconds": (HEAD + "00:00.5,1\n", "line 2, column time_s: '00:00.5' may be hours:minutes or"),
+    "hours and minutes later": (
+        HEAD + "00:00:00,1\n00:01,2\n",
+        "line 3, column time_s: '00:01' may be hours",
+    ),
     "a quote that stays open": (HEAD + '0.5,"0.65\n1,1.65\n', "line 2: a quote is opened and not closed"),
     "a second block of LabVIEW": (
         "time_s\tvoltage_v\n0.5\t0.65\ntime_s\tvoltage_v\n1\t1.65\n",
@@ -121,6 +142,212 @@ def test_what_can_be_read_two_ways_is_refused_by_its_line(tmp_path: Path, kind: 
         read(tmp_path, data)
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+CUT = {
+    "an empty note": "time_s,voltage_v,note\n2,5,64567\n3,5,65432\n",
+    "a short decimal as a note": "time_s,voltage_v,note\n0,5,65\n1,4,35\n",
+    "one decimal as a comment": "time_s,voltage_v,Comment\n0,5,6\n1,4,3\n",
+    "a note in one row": "time_s,voltage_v,note\n0,5,begin\n1,4,35\n",
+    "both cut": "a,time_s,voltage_v,flag\n0,0020,5,3219\n0,0040,5,3301\n",
+    "a flag": "time_s,voltage_v,flag\n1,5,32\n2,5,33\n",
+    "times cut": "time_s,voltage_v,note\n0,002,5\n1,004,5\n",
+    "leading zeros": "time_s,voltage_v,temperature\n1,5,02\n2,5,13\n",
+    "many decimals": "time_s,voltage_v,x\n1,-5,6432\n2,+4,643\n3,5,64\n",
+}
+
+
+@pytest.mark.parametrize("kind", CUT)
+def test_decimal_commas_are_not_cut_where_the_header_has_a_column_more(tmp_path: Path, kind: str) -> None:
+    with pytest.raises(EncoderError, match=r"line \d: the commas may be decimal marks: "):
+        read(tmp_path, CUT[kind])
+
+
+def test_decimal_commas_are_not_cut_without_times(tmp_path: Path) -> None:
+    path = tmp_path / "t.csv"
+    path.write_text("voltage_v,comment\n5,64567\n5,65432\n")
+    with pytest.raises(
+        EncoderError, match="line 2: the commas may be decimal marks: 5,64567 may be one number"
+    ):
+        read_encoder(path, column="voltage_v", rate_hz=500.0)
+
+
+WHOLE = {
+    "a temperature": ("time_s,voltage_v,temperature\n0,5,21\n1,6,22\n", [5.0, 6.0]),
+    "flags": ("time_s,voltage_v,flag\n0,5,0\n1,6,1\n", [5.0, 6.0]),
+    "notes": ("time_s,voltage_v,note\n0,5,begin\n1,6,\n", [5.0, 6.0]),
+    "counts beside points": ("time_s,voltage_v,raw\n0,5.0,20480\n1,6,24576\n", [5.0, 6.0]),
+    "points in another column": ("time_s,voltage_v,raw,x\n0,5,20480,0.5\n1,6,24576,1\n", [5.0, 6.0]),
+    "frames before": ("frame,time_s,voltage_v\n7,0,5\n8,1,6\n", [5.0, 6.0]),
+    "millivolts as the last": ("time_s,voltage_v\n0,5000\n1,6000\n", [5000.0, 6000.0]),
+    "semicolons": ("time_s;voltage_v;raw\n0;5;20480\n1;6;24576\n", [5.0, 6.0]),
+}
+
+
+@pytest.mark.parametrize("kind", WHOLE)
+def test_tables_of_whole_numbers_are_read(tmp_path: Path, kind: str) -> None:
+    text, volts = WHOLE[kind]
+    assert read(tmp_path, text).values["voltage_v"].tolist() == volts
+
+
+UNITS = {
+    # text, time's column, encoder's column, times in s, values in V or rad, which
+    "row ms, mV": ("t,U\nms,mV\n0,650\n2,1650\n", "t", "U", [0.65, 1.65], "v"),
+    "row [ms], (V)": ("t;U\n[ms];(V)\n0;0,65\n2;1,65\n", "t", "U", [0.65, 1.65], "v"),
+    "row us, deg": ("t,phi\nµs,°\n0,90\n2000,180\n", "t", "phi", [np.pi / 2, np.pi], "rad"),
+    "row ns, mrad": ("t,phi\nns,mrad\n0,500\n2000000,1500\n", "t", "phi", [0.5, 1.5], "rad"),
+    "row under names": (
+        "time_ms,voltage_mv\nms,mV\n0,650\n2,1650\n",
+        "time_ms",
+        "voltage_mv",
+        [0.65, 1.65],
+        "v",
+    ),
+    "names": ("time_ms,voltage_mv\n0,650\n2,1650\n", "time_ms", "voltage_mv", [0.65, 1.65], "v"),
+    "capitals": ("TIME_MS,VOLTAGE_MV\n0,650\n2,1650\n", "TIME_MS", "VOLTAGE_MV", [0.65, 1.65], "v"),
+    "brackets": ("t (ms),U [mV]\n0,650\n2,1650\n", "t (ms)", "U [mV]", [0.65, 1.65], "v"),
+    "slashes": ("t/ms,U / V\n0,0.65\n2,1.65\n", "t/ms", "U / V", [0.65, 1.65], "v"),
+    "camel case": ("timeMs,voltageMv\n0,650\n2,1650\n", "timeMs", "voltageMv", [0.65, 1.65], "v"),
+    "mrad": ("time_us,phi1_mrad\n0,500\n2000,1500\n", "time_us", "phi1_mrad", [0.5, 1.5], "rad"),
+    "deg in brackets": (
+        "time_s,phi1 (deg)\n0,90\n0.002,180\n",
+        "time_s",
+        "phi1 (deg)",
+        [np.pi / 2, np.pi],
+        "rad",
+    ),
+    "degrees": (
+        "time_s,angle_degrees\n0,90\n0.002,180\n",
+        "time_s",
+        "angle_degrees",
+        [np.pi / 2, np.pi],
+        "rad",
+    ),
+    "none": ("Zeit,Kanal (1)\n0,0.65\n0.002,1.65\n", "Zeit", "Kanal (1)", [0.65, 1.65], "v"),
+}
+
+
+@pytest.mark.parametrize("kind", UNITS)
+def test_units_in_names_and_under_the_header_are_scaled(tmp_path: Path, kind: str) -> None:
+    text, time, column, value, unit = UNITS[kind]
+    path = tmp_path / "t.csv"
+    path.write_text(text, encoding="utf-8")
+    found = read_encoder(path, column=column, time_column=time)
+    assert found.t_s == pytest.approx([0.0, 0.002], abs=1e-15)
+    assert found.value == pytest.approx(value, abs=1e-15)
+    assert found.unit == unit
+    if "\n0," not in text or text.count("\n") != 3:
+        return
+    names = [n.strip() for n in text.split("\n")[0].split(",")]
+    rows = np.array([[float(f) for f in line.split(",")] for line in text.split("\n")[1:3]])
+    pq.write_table(pa.table(dict(zip(names, rows.T, strict=True))), tmp_path / "t.parquet")
+    same = read_encoder(tmp_path / "t.parquet", column=column, time_column=time)
+    assert same.t_s.tolist() == found.t_s.tolist()
+    assert same.value.tolist() == found.value.tolist()
+
+
+@pytest.mark.parametrize(
+    ("header", "message"),
+    [
+        ("t,U\ns,counts", "line 2, column U: the unit 'counts' is not known"),
+        ("t,U\nfortnights,V", "line 2, column t: the unit 'fortnights' is not known"),
+        ("t,U\nV,s", "column t: 'V' is no known unit of time"),
+        ("t,U\ns,ms", "column U: 'ms' is no known unit of voltage or angle"),
+        ("t,U\ns,MV", "the unit 'MV' is not known"),
+        ("t (ticks),U", r"column t \(ticks\): 'ticks' is no known unit of time"),
+        ("t,U [counts]", "'counts' is no known unit of voltage or angle"),
+        ("t,omega_rad/s", "'s' is no known unit of voltage or angle"),
+    ],
+)
+def test_units_that_are_not_known_are_refused(tmp_path: Path, header: str, message: str) -> None:
+    path = tmp_path / "t.csv"
+    path.write_text(header + "\n0,0.65\n2,1.65\n")
+    time, column = header.split("\n")[0].split(",")
+    with pytest.raises(EncoderError, match=message):
+        read_encoder(path, column=column, time_column=time)
+
+
+def test_a_unit_that_is_given_and_another_in_the_name_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "t.csv"
+    path.write_text("time_s,voltage_mv,v_min\n0,650,0.65\n2,1650,1.65\n")
+    with pytest.raises(EncoderError, match="the unit is to be v, the column's is 'mv'"):
+        read_encoder(path, column="voltage_mv", unit="v")
+    assert read_encoder(path, column="v_min", unit="v").value.tolist() == [0.65, 1.65]
+
+
+def test_holds_and_angles_have_their_units_too(tmp_path: Path) -> None:
+    path = tmp_path / "t.csv"
+    path.write_text("angle_deg,U_mV\n0,5000\n360,5650\n")
+    assert [hold.mean_v for hold in read_holds([path], column="U_mV")] == [5.0, 5.65]
+    path.write_text("time_s,phi1_rad\nms,rad\n0,0.5\n2,0.6\n")
+    with pytest.raises(AnglesError, match="line 2, column time_s: the unit is 'ms'"):
+        read_angles(path)
+    path.write_text("time_ms,theta_deg\n0,0.5\n2,0.6\n")
+    with pytest.raises(AnglesError, match="column time_ms: its unit is 'ms', and time_s is in s"):
+        read_angles(path, columns={"time_s": "time_ms", "phi1_deg": "theta_deg"})
+
+
+def test_units_of_tdms_channels(tmp_path: Path) -> None:
+    path = tmp_path / "t.tdms"
+    with TdmsWriter(path) as writer:
+        writer.write_segment(
+            [
+                ChannelObject("g", "t_ms", np.array([0.0, 2.0])),
+                ChannelObject("g", "U", np.array([650.0, 1650.0]), {"unit_string": "mV"}),
+                ChannelObject("g", "on", np.array([True, False])),
+            ]
+        )
+    found = read_encoder(path, column="U", time_column="t_ms")
+    assert found.t_s.tolist() == [0.0, 0.002]
+    assert found.value.tolist() == [0.65, 1.65]
+    with pytest.raises(EncoderError, match="channel on: the channel holds truth values, not numbers"):
+        read_encoder(path, column="on", time_column="t_ms")
+
+
+@pytest.mark.parametrize(
+    ("first", "step", "what"),
+    [
+        (1714564800.0, 0.002, "since 1970"),
+        (1714564800000.0, 2.0, "since 1970"),
+        (1714564800000000.0, 2000.0, "since 1970"),
+        (20240501120000.0, 1.0, "a date as 20240501120000"),
+        (45413.5, 0.002 / 86400, "days since 1900 as spreadsheets store them"),
+    ],
+)
+def test_stamps_written_as_numbers_are_not_taken_for_seconds(
+    tmp_path: Path, first: float, step: float, what: str
+) -> None:
+    times = first + step * np.arange(50)
+    rows = "".join(f"{t!r},0.65\n" for t in times.tolist())
+    path = tmp_path / "t.csv"
+    path.write_text("time_s,voltage_v\n" + rows)
+    with pytest.raises(EncoderError, match=f"line 2, column time_s: the time .* may be .*{what}"):
+        read_encoder(path)
+    path.write_text("time_s,phi1_rad\n" + rows)
+    with pytest.raises(AnglesError, match=f"line 2, column time_s: the time .* may be .*{what}"):
+        read_angles(path)
+    pq.write_table(pa.table({"time_s": times, "voltage_v": np.zeros(50)}), tmp_path / "t.parquet")
+    with pytest.raises(EncoderError, match=f"row 0, column time_s: the time .* may be .*{what}"):
+        read_encoder(tmp_path / "t.parquet")
+
+
+def test_seconds_since_midnight_are_seconds(tmp_path: Path) -> None:
+    path = tmp_path / "t.csv"
+    path.write_text(HEAD + "".join(f"{43200 + k / 500:.3f},0.65\n" for k in range(500)))
+    assert read_encoder(path).t_s[-1] == 43200.998
+
+
+def test_whole_numbers_of_64_bits_and_truth_values_in_parquet(tmp_path: Path) -> None:
+    path = tmp_path / "t.parquet"
+    stamps = pa.array([1714564800000000001, 1714564800002000001], pa.int64())
+    pq.write_table(pa.table({"time_s": stamps, "voltage_v": pa.array([True, False])}), path)
+    with pytest.raises(EncoderError, match=r"column time_s: it has whole numbers above 2\^53"):
+        read_encoder(path)
+    with pytest.raises(EncoderError, match="column voltage_v: the column is of type bool, not numbers"):
+        read_encoder(path, column="voltage_v", rate_hz=500.0)
+    np.save(tmp_path / "t.npy", np.array([True, False]))
+    with pytest.raises(EncoderError, match="an array of bool, not of numbers"):
+        read_encoder(tmp_path / "t.npy", rate_hz=500.0)
 
 
 @pytest.mark.parametrize("delimiter", [",", ";"])
@@ -186,7 +413,7 @@ def test_clocks_that_go_back_are_refused(tmp_path: Path) -> None:
     """Local time without its zone, over the end of summer time: the hour that comes twice is not guessed at."""
     path = tmp_path / "t.csv"
     path.write_text(HEAD + "2024-10-27T02:59:59,1\n2024-10-27T02:00:00,2\n")
-    with pytest.raises(EncoderError, match="line 3, column time: the time -3599 s does not come after 0 s"):
+    with pytest.raises(EncoderError, match="line 3, column time_s: the time -3599 s does not come after 0 s"):
         read_encoder(path)
 
 

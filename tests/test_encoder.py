@@ -285,10 +285,10 @@ def test_other_files_say_the_same(tmp_path: Path) -> None:
         ("time_s,voltage_v\n0,5\n0.002,five\n", r"line 3, column voltage_v: 'five' is not a number"),
         (
             "time_s,voltage_v\n0,5\n0.002,5\n0.002,5\n",
-            r"line 4, column time: the time 0.002 s does not come after",
+            r"line 4, column time_s: the time 0.002 s does not come after",
         ),
-        ("time_s,voltage_v\n0,5\n0.004,5\n0.002,5\n", r"line 4, column time"),
-        ("time_s,voltage_v\n0,5\n,5\n", r"line 3, column time: there is no time"),
+        ("time_s,voltage_v\n0,5\n0.004,5\n0.002,5\n", r"line 4, column time_s:"),
+        ("time_s,voltage_v\n0,5\n,5\n", r"line 3, column time_s: there is no time"),
         ("time_s,voltage_v\n0,\n1,\n", "no sample has a value"),
         ("time_s,volts\n0,5\n", "which column is the encoder's"),
         ("zeit,voltage_v\n0,5\n", "no column time_s"),

@@ -7,7 +7,7 @@ Owns: reading the named columns of a table, Parquet or text, into float64. Knows
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +19,7 @@ from pydpend.delimited import Cells, Numbers, names_on_first_line, no_column, ta
 from pydpend.documents import read_bytes, unreadable
 from pydpend.errors import Message, PydpendError, Setting, fault
 from pydpend.instants import NotInstants, is_instant, seconds_of_arrow, seconds_of_text
+from pydpend.units import unit_at_end, unit_called
 
 PARQUET_FAULTS = (pa.ArrowException, OSError, UnicodeDecodeError, KeyError, MemoryError, OverflowError)
 """What pyarrow raises for a Parquet file that is damaged."""
@@ -34,6 +35,8 @@ class Columns:
     ``values[name]`` is a float64 array of shape (R,), NaN where the file has no value. ``lines`` (R,) is each
     row's line in the text file, from 1, or ``None`` for Parquet. ``header`` is every column name of the file.
     ``first_stamp`` is the date and time from which the seconds of a column of dates are counted, "" without one.
+    ``units[name]`` is a column's unit as the row under the header spells it, a known one that does not contradict the
+    column's name. ``has_instants``: the times are seconds because they were dates, times of day or durations.
     """
 
     source: str
@@ -42,6 +45,8 @@ class Columns:
     lines: NDArray[np.int64] | None
     metadata: dict[str, str]
     first_stamp: str = ""
+    units: dict[str, str] = field(default_factory=dict)
+    has_instants: bool = False
 
     def place(self, row: int, column: str = "") -> str:
         """Where a row is, for a message: ``line 12, column voltage_v`` or ``row 11, column voltage_v``."""
@@ -156,18 +161,30 @@ def _parquet(
     except PARQUET_FAULTS as problem:
         raise error(damaged_parquet(name, problem)) from problem
     values: dict[str, NDArray[np.float64]] = {}
-    first_stamp = ""
+    first_stamp, has_instants = "", False
     for column in wanted:
         array = table.column(column)
         instants = seconds_of_arrow(array) if column == time else None
         if instants is not None:
             values[column], first_stamp = instants
+            has_instants = True
             continue
         try:
+            if pa.types.is_boolean(array.type):
+                raise pa.ArrowInvalid("truth values")
             values[column] = np.asarray(
                 array.cast(pa.float64()).to_numpy(zero_copy_only=False), dtype=np.float64
             ).copy()
         except pa.ArrowException as problem:
+            if pa.types.is_integer(array.type):
+                raise error(
+                    fault(
+                        name,
+                        "it has whole numbers above 2^53, which a float64 cannot hold",
+                        "Write stamps as the type timestamp, other numbers as float64",
+                        place=f"column {column}",
+                    )
+                ) from problem
             raise error(
                 fault(
                     name,
@@ -176,7 +193,7 @@ def _parquet(
                     place=f"column {column}",
                 )
             ) from problem
-    return Columns(name, header, values, None, metadata, first_stamp)
+    return Columns(name, header, values, None, metadata, first_stamp, {}, has_instants)
 
 
 def _text(
@@ -191,14 +208,38 @@ def _text(
     cells = take_apart(name, data, required, error, naming)
     place = f"line {cells.header_line}"
     wanted = _wanted(name, cells.header, required, optional, error, naming, place)
-    fields, lines = cells.fields(wanted)
+    found = cells.fields(wanted)
+    fields, lines = dict(found.columns), found.lines
     values: dict[str, NDArray[np.float64]] = {}
     first_stamp = ""
-    if time in fields and is_instant(next((f for f in fields[time] if f), "")):
+    has_instants = time in fields and is_instant(next((f for f in fields[time] if f), ""))
+    if time is not None and has_instants:
         values[time], first_stamp = _instants(cells, time, fields.pop(time), lines)
     numbers = Numbers(cells, fields, lines)
     values |= {c: numbers.column(c) for c in wanted if c in fields}
-    return Columns(name, cells.header, values, np.asarray(lines, dtype=np.int64), {}, first_stamp)
+    units = {c: u for c, u in found.units.items() if not (c == time and has_instants)}
+    for column, spelled in units.items():
+        _check_unit(cells, column, spelled, found.units_line)
+    rows = np.asarray(lines, dtype=np.int64)
+    return Columns(name, cells.header, values, rows, {}, first_stamp, units, has_instants)
+
+
+def _check_unit(cells: Cells, column: str, spelled: str, line: int) -> None:
+    """Refuses a unit under the header that is not known or contradicts the column's name."""
+    unit, (named, of_name) = unit_called(spelled), unit_at_end(column)
+    place = f"line {line}, column {column}"
+    if unit is None:
+        cells.refuse(
+            f"the unit {spelled!r} is not known",
+            "Write s, ms, us, ns, V, mV, rad, mrad or deg, or remove the line",
+            place,
+        )
+    if of_name is not None and of_name != unit:
+        cells.refuse(
+            f"the unit is {spelled!r}, and the column's name says {named!r}",
+            "Name the column or its unit rightly",
+            place,
+        )
 
 
 def _instants(

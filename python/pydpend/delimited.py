@@ -29,8 +29,21 @@ _COMMENTS = ("#", "%", "//")
 
 _PARTERS = {",": "commas", ";": "semicolons", "\t": "tabs", " ": "spaces"}
 
+_NO_SEPARATORS = "|:&!~^"
+"""Characters that part the fields of some tables, and are not known here."""
+
 _COMMA_NUMBER = re.compile(r"[+-]?(\d+,\d*|,\d+)([eE][+-]?\d+)?")
 _MAY_BE_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
+
+_WHOLE = re.compile(r"[+-]?\d+")
+_SHORT_WHOLE = re.compile(r"[+-]?\d{1,2}")
+_POINT_NUMBER = re.compile(r"[+-]?(\d+\.\d*|\.\d+)([eE][+-]?\d+)?")
+_DIGITS = re.compile(r"\d+")
+_LEADING_ZERO = re.compile(r"0\d+")
+_MANY_DECIMALS = 3
+"""As many digits as this, right of whole numbers of one or two digits, may be decimals."""
+_NOTE_NAME = re.compile(r"|.*(note|comment|remark|bemerkung|kommentar|unnamed|text|label).*", re.IGNORECASE)
+_FLAG_NAME = re.compile(r".*(flag|status|quality|valid|marker|event).*", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -48,11 +61,20 @@ class Cells:
         """Raises the file's error."""
         raise self.error(fault(self.name, problem, advice, place=place))
 
-    def fields(self, wanted: Sequence[str]) -> tuple[dict[str, list[str]], list[int]]:
-        """The stripped fields of each wanted column, "" for those without a value, and each row's line."""
+    def fields(self, wanted: Sequence[str]) -> Fields:
+        """The stripped fields of each wanted column, "" for those without a value, each row's line, and the units.
+
+        Raises the file's error where commas part the fields and may be decimal marks as well.
+        """
         index = [self.header.index(c) for c in wanted]
-        out: list[list[str]] = [[] for _ in wanted]
+        count = len(index)
+        if self.delimiter == ",":
+            beside = {j for i in index for j in (i - 1, i + 1) if 0 <= j < len(self.header)}
+            index += sorted(beside - set(index))
+        out: list[list[str]] = [[] for _ in index]
         lines: list[int] = []
+        units: dict[str, str] = {}
+        units_line = 0
         units_may_come = True
         width = len(self.header)
         for line, row in self._rows():
@@ -65,12 +87,68 @@ class Cells:
             here = [row[i].strip() for i in index]
             if units_may_come:
                 units_may_come = False
-                if all(_is_word(f) for f in here):
+                if all(_is_word(f) for f in here[:count]):
+                    units, units_line = dict(zip(wanted, here[:count], strict=True)), line
                     continue
             lines.append(line)
             for column, field in zip(out, here, strict=True):
                 column.append("" if field.lower() in _EMPTY else field)
-        return dict(zip(wanted, out, strict=True)), lines
+        if self.delimiter == ",":
+            self._refuse_cut_numbers(dict(zip(index, out, strict=True)), set(index[:count]), lines)
+        return Fields(dict(zip(wanted, out[:count], strict=True)), lines, units, units_line)
+
+    def _refuse_cut_numbers(self, fields: dict[int, list[str]], wanted: set[int], lines: list[int]) -> None:
+        """Refuses whole numbers whose decimals may be the next column's digits: 5,64567 under ``voltage_v,note``."""
+        for left in sorted(fields):
+            right = left + 1
+            if right not in fields or not (left in wanted or right in wanted):
+                continue
+            whole = [f for f in fields[left] if f]
+            if not whole or not all(map(_WHOLE.fullmatch, whole)):
+                continue
+            row = self._row_of_decimals(
+                fields[left], fields[right], right, left in wanted and right not in wanted
+            )
+            if row is not None and not self._has_points():
+                self.refuse(
+                    f"the commas may be decimal marks: {fields[left][row]},{fields[right][row]} may be one number, or "
+                    f"{fields[left][row]} in column {self.header[left]} and {fields[right][row]} in column "
+                    f"{self.header[right] or '(no name)'}",
+                    "Write decimal points (5.0 for whole numbers too), or semicolons between the fields",
+                    f"line {lines[row]}",
+                )
+
+    def _has_points(self) -> bool:
+        """Whether any row has a number with a decimal point, so that commas only part fields."""
+        return any(
+            _POINT_NUMBER.fullmatch(field.strip())
+            for line, row in self._rows()
+            if line > self.header_line and not row[0].lstrip().startswith(_COMMENTS)
+            for field in row
+        )
+
+    def _row_of_decimals(
+        self, whole: list[str], fields: list[str], column: int, is_cut_from_wanted: bool
+    ) -> int | None:
+        """The first row in which digits right of whole numbers may be their decimals; ``None`` where they are not."""
+        digits = [row for row, f in enumerate(fields) if _DIGITS.fullmatch(f) and whole[row]]
+        if not digits:
+            return None
+        # A table has no leading zeros: decimals do.
+        only_digits = all(not f or _DIGITS.fullmatch(f) for f in fields)
+        leading = [row for row in digits if _LEADING_ZERO.fullmatch(fields[row])]
+        if leading and only_digits:
+            return leading[0]
+        if not is_cut_from_wanted:
+            return None
+        if _NOTE_NAME.fullmatch(self.header[column]):
+            return digits[0]
+        if not only_digits or not all(not f or _SHORT_WHOLE.fullmatch(f) for f in whole):
+            return None
+        if _FLAG_NAME.fullmatch(self.header[column]):
+            return None if all(fields[row] in ("0", "1") for row in digits) else digits[0]
+        long = [row for row in digits if len(fields[row]) >= _MANY_DECIMALS]
+        return long[0] if 2 * len(long) >= len(digits) else None
 
     def _rows(self) -> Iterator[tuple[int, list[str]]]:
         if self.delimiter == " ":
@@ -116,6 +194,16 @@ class Cells:
                 "decimal points; put text that holds commas in quotes"
             )
         self.refuse(problem, advice, f"line {line}")
+
+
+@dataclass(frozen=True)
+class Fields:
+    """The fields of the wanted columns (R each), each row's line, and the row of units under the header, if any."""
+
+    columns: dict[str, list[str]]
+    lines: list[int]
+    units: dict[str, str]
+    units_line: int
 
 
 def no_column(name: str, missing: Sequence[str], header: Sequence[str], naming: Setting | None) -> Message:
@@ -190,6 +278,17 @@ def _find_header(
                     first = names
                 if all(c in names for c in required):
                     return tuple(names), number, delimiter
+    for number, line in enumerate(bare, start=1):
+        for separator in _NO_SEPARATORS if line else "":
+            if separator in line and all(c in [f.strip() for f in line.split(separator)] for c in required):
+                raise error(
+                    fault(
+                        name,
+                        f"the fields are parted by {separator!r}, a separator that is not known",
+                        "Write the file with commas, semicolons, tabs or spaces between the fields",
+                        place=f"line {number}",
+                    )
+                )
     found = first or []
     if found and all(_is_number(f) for f in found):
         raise error(

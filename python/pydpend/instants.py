@@ -22,9 +22,19 @@ _TICKS_PER_S = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}
 _DATE = re.compile(r"\d{4}-\d{2}-\d{2}")
 _CLOCK = re.compile(
     r"(?:(?P<days>[+-]?\d+) days? )?(?P<sign>[+-]?)(?P<h>\d{1,4}):(?P<m>[0-5]\d)"
-    r"(?::(?P<s>[0-5]\d)(?:[.,](?P<f>\d{1,9})\d*)?)?"
+    r":(?P<s>[0-5]\d)(?:[.,](?P<f>\d{1,9})\d*)?"
 )
 """A time of day or a duration as pandas writes it: ``12:00:00.25``, ``0 days 00:00:01.5``."""
+
+_TWO_PARTS = re.compile(r"[+-]?\d{1,4}:\d\d(?:[.,]\d+)?")
+"""Hours and minutes or minutes and seconds."""
+
+_LONGEST_S = 1e8
+"""Three years: no recording is as long, and stamps (s since 1970, 20240501120000) are above."""
+_SERIAL_DAYS = (3e4, 6e4)
+"""Days since 1900, as spreadsheets store them, of the years 1982 to 2064."""
+_SERIAL_SPAN_DAYS = 0.1
+"""A recording of days as numbers spans less, 2.4 hours; seconds that span less are no swing."""
 
 
 class NotInstants(ValueError):
@@ -37,7 +47,24 @@ class NotInstants(ValueError):
 
 def is_instant(field: str) -> bool:
     """Whether a field of a text begins as a date, or is a time of day or a duration."""
-    return bool(_DATE.match(field) or _CLOCK.fullmatch(field))
+    return bool(_DATE.match(field) or _CLOCK.fullmatch(field) or _TWO_PARTS.fullmatch(field))
+
+
+def stamp_in(t_s: Floats) -> tuple[int, str] | None:
+    """The first row of times (T,) that are stamps and not seconds, and what they may be; ``None`` for seconds."""
+    t = np.abs(t_s)
+    late = np.flatnonzero(t > _LONGEST_S)
+    if late.size:
+        return int(late[0]), "s, ms, us or ns since 1970 or a date as 20240501120000"
+    low, high = _SERIAL_DAYS
+    if (
+        t.size > 1
+        and np.nanmin(t) > low
+        and np.nanmax(t) < high
+        and np.ptp(t[np.isfinite(t)]) < _SERIAL_SPAN_DAYS
+    ):
+        return 0, "days since 1900 as spreadsheets store them"
+    return None
 
 
 def seconds_of_text(fields: Sequence[str]) -> tuple[Floats, str]:
@@ -79,6 +106,8 @@ def _has_offset(text: str) -> bool:
 
 def _clock_s(field: str, row: int) -> float:
     found = _CLOCK.fullmatch(field)
+    if found is None and _TWO_PARTS.fullmatch(field):
+        raise NotInstants(row, f"{field!r} may be hours:minutes or minutes:seconds")
     if found is None:
         raise NotInstants(row, f"{field!r} is no time as hours:minutes:seconds")
     part = {k: int(v or 0) for k, v in found.groupdict(default="0").items() if k in ("days", "h", "m", "s")}

@@ -21,8 +21,10 @@ from pydpend.arrays import read_npy
 from pydpend.columns import Columns, read_columns
 from pydpend.documents import parse_json, read_text
 from pydpend.errors import AnglesError, Setting, fault
+from pydpend.instants import stamp_in
 from pydpend.kinds import expect
 from pydpend.output import AnyPath, path_of, whole, write_text
+from pydpend.units import unit_at_end, unit_called
 
 META_KEY = "pydpend_angles"
 """Key of the JSON that :func:`write_angles` puts into a Parquet file's metadata."""
@@ -77,10 +79,38 @@ def read_angles(
         return f"row {row}, column {theirs}" if table is None else table.place(row, theirs)
 
     check_table(str(path), t, phi, sigma, frame, place)
+    stamp = None if table is not None and table.has_instants else stamp_in(t)
+    if stamp is not None:
+        raise AnglesError(
+            fault(
+                str(path),
+                f"the time {t[stamp[0]]:.14g} s may be {stamp[1]}",
+                "Write the times in s from the first, or as dates (2024-05-01T12:00:00.250)",
+                place=place(stamp[0], "time_s"),
+            )
+        )
     return LinkAngles(t, phi, sigma, frame, meta, label)
 
 
 _TableParts = tuple[Floats, Floats, Floats, "NDArray[np.int64] | None", dict[str, Any], Columns]
+
+
+def _check_units(path: Path, table: Columns, theirs: Mapping[str, str]) -> None:
+    """Refuses a column whose name ends in another unit than that of pydpend's column which it stands for."""
+    for ours, name in theirs.items():
+        _, wanted = unit_at_end(ours)
+        if name not in table.values or wanted is None or (ours == "time_s" and table.has_instants):
+            continue
+        for spelled, unit in (unit_at_end(name), (u := table.units.get(name, ""), unit_called(u))):
+            if spelled and unit != wanted:
+                raise AnglesError(
+                    fault(
+                        str(path),
+                        f"its unit is {spelled!r}, and {ours} is in {wanted.name}",
+                        "Convert it, or name another column with " + Setting("columns"),
+                        place=f"column {name}",
+                    )
+                )
 
 
 def _read_table(path: Path, columns: dict[str, str]) -> _TableParts:
@@ -105,6 +135,7 @@ def _read_table(path: Path, columns: dict[str, str]) -> _TableParts:
         time=theirs["time_s"],
         naming=Setting("columns"),
     )
+    _check_units(path, table, theirs)
     if table.rows == 0:
         raise AnglesError(fault(str(path), "the table has a header and no rows", "Give one row per instant"))
 

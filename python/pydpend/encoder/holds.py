@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from pydpend.columns import read_columns
-from pydpend.encoder.signal import EncoderSignal, Unit, read_encoder
+from pydpend.encoder.scales import Unit, in_base
+from pydpend.encoder.signal import EncoderSignal, read_encoder
 from pydpend.errors import EncoderError, Setting, fault
 from pydpend.kinds import expect
 from pydpend.series import correlation_time
@@ -154,7 +155,16 @@ def _holds_of_table(path: Path, column: str) -> list[Hold]:
     angle = (
         table.values["angle_rad"] if "angle_rad" in table.values else np.radians(table.values["angle_deg"])
     )
-    volts = table.values[column]
+    volts, base = in_base(table.values[column], str(path), column, table.units.get(column, ""), None)
+    if base != "v":
+        raise EncoderError(
+            fault(
+                str(path),
+                "a hold must be in volts",
+                "Name the voltage's column with " + Setting("column"),
+                place=f"column {column}",
+            )
+        )
     bad = np.flatnonzero(~(np.isfinite(angle) & np.isfinite(volts)))
     if bad.size:
         raise EncoderError(

@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from pydpend.arrays import MAGIC, read_npy
 from pydpend.columns import Columns, read_columns
 from pydpend.documents import unreadable
+from pydpend.encoder.scales import Unit, in_base, in_seconds
 from pydpend.errors import EncoderError, Setting, fault
-from pydpend.instants import seconds_of_numpy
+from pydpend.instants import seconds_of_numpy, stamp_in
 from pydpend.kinds import expect
 from pydpend.output import AnyPath, path_of
 
 Floats = NDArray[np.float64]
-Unit = Literal["v", "rad", "deg"]
 
 TIME_COLUMN = "time_s"
 KNOWN_COLUMNS = ("voltage_v", "phi1_rad", "phi1_deg")
@@ -78,11 +78,14 @@ def read_encoder(
     ``group/channel``; the time is ``time_column``'s channel or else the waveform's own increment. NumPy:
     (T,), or (T, 2) or (2, T) with the time first. ``rate_hz`` gives the time where the file has none.
     Times given as dates become seconds from the first, which ``notes`` then names.
-    ``unit`` is taken from the ending of the column's name (``_v``, ``_rad``, ``_deg``), else volts.
+    Units are those of the row under the header or at the end of a column's name (``time_ms``, ``U [mV]``,
+    ``phi1 (deg)``): s, ms, us, ns, min, h; V, mV; rad, mrad, deg, turns. Times without one are s; values without one
+    are ``unit``'s, else V.
 
     A sample without a value is left out and noted, as are gaps and uneven steps. Raises
     :class:`~pydpend.errors.EncoderError` naming file, line and column for text that is no number, times that
-    are missing, repeated or falling, and columns that are not there.
+    are missing, repeated or falling, times that are stamps written as numbers, units that are not known or contradict
+    each other, and columns that are not there.
     """
     path = path_of(path)
     expect(path, ("encoder", "angles"), EncoderError)
@@ -105,10 +108,11 @@ def read_encoder(
         raise EncoderError(unreadable(path, problem)) from problem
     table: Columns | None = None
     notes: list[str] = []
+    when, stated = time_column or TIME_COLUMN, ""
     if magic[:4] == b"TDSm":
         from pydpend.encoder.tdms import read_tdms
 
-        t, value, label, notes = read_tdms(path, column, time_column, rate_hz)
+        t, value, (label, stated), notes = read_tdms(path, column, time_column, rate_hz)
     elif magic == MAGIC:
         for option, given in (("column", column), ("time_column", time_column)):
             if given is not None:
@@ -120,7 +124,11 @@ def read_encoder(
         t, value, label, table = _read_table(path, column, time_column, rate_hz)
         if table.first_stamp:
             notes.append(f"its times are dates; they are counted in s from the first, {table.first_stamp}")
-    return _checked(path, t, value, label, unit, table, notes)
+        stated = table.units.get(label, "")
+        if when in table.values and rate_hz is None and not table.has_instants:
+            t = in_seconds(t, str(path), when, table.units.get(when, ""))
+    value, base = in_base(value, str(path), label, stated, unit)
+    return _checked(path, t, value, label, when, base, table, notes)
 
 
 def _read_table(
@@ -181,7 +189,8 @@ def _checked(
     t: Floats,
     value: Floats,
     label: str,
-    unit: Unit | None,
+    when: str,
+    unit: Literal["v", "rad"],
     table: Columns | None,
     notes: list[str],
 ) -> EncoderSignal:
@@ -193,7 +202,17 @@ def _checked(
     bad = np.flatnonzero(~np.isfinite(t))
     if bad.size:
         raise EncoderError(
-            fault(str(path), "there is no time", "Give every sample a time", place=place(int(bad[0]), "time"))
+            fault(str(path), "there is no time", "Give every sample a time", place=place(int(bad[0]), when))
+        )
+    stamp = None if table is not None and table.has_instants else stamp_in(t)
+    if stamp is not None:
+        raise EncoderError(
+            fault(
+                str(path),
+                f"the time {t[stamp[0]]:.14g} s may be {stamp[1]}",
+                "Write the times in s from the first, or as dates (2024-05-01T12:00:00.250)",
+                place=place(stamp[0], when),
+            )
         )
     bad = np.flatnonzero(np.diff(t) <= 0) + 1
     if bad.size:
@@ -205,12 +224,9 @@ def _checked(
                 "Sort by time and remove repeats, or give "
                 + Setting("rate_hz")
                 + " if the stamps are coarse",
-                place=place(i, "time"),
+                place=place(i, when),
             )
         )
-    if unit is None:
-        ending = label.rsplit("_", 1)[-1].lower()
-        unit = "rad" if ending == "rad" else "deg" if ending == "deg" else "v"
     keep = np.isfinite(value)
     if not keep.any():
         raise EncoderError(
@@ -236,5 +252,4 @@ def _checked(
             notes.append(
                 f"uneven steps, {even.min():.4g} to {even.max():.4g} s; the times are used as they are"
             )
-    value = np.radians(value) if unit == "deg" else value
-    return EncoderSignal(t, value, "v" if unit == "v" else "rad", path.stem, tuple(notes))
+    return EncoderSignal(t, value, unit, path.stem, tuple(notes))

@@ -14,6 +14,7 @@ from nptdms.log import log_manager
 from nptdms.timestamp import TimestampArray
 from numpy.typing import NDArray
 
+from pydpend.encoder.scales import in_seconds
 from pydpend.errors import EncoderError, Setting, fault
 
 Floats = NDArray[np.float64]
@@ -22,16 +23,17 @@ T = TypeVar("T")
 
 def read_tdms(
     path: Path, channel: str | None, time_channel: str | None, rate_hz: float | None
-) -> tuple[Floats, Floats, str, list[str]]:
-    """Times in s, values, the channel's name and notes. A channel of time stamps gives seconds from its first.
+) -> tuple[Floats, Floats, tuple[str, str], list[str]]:
+    """Times in s, values, the channel's name and its unit, "" if it states none, and notes. A channel of time stamps
+    gives seconds from its first.
 
     Raises :class:`EncoderError` if they cannot be had.
     """
     with path.open("rb") as opened, _heard(path) as said:
         # Stamps come as whole seconds and fractions: as datetime64 they would be cut to microseconds.
         file = _asked(path, lambda: TdmsFile.open(opened, raw_timestamps=True))
-        t, value, label, notes = _read(path, file, channel, time_channel, rate_hz)
-    return t, value, label, [*notes, *said]
+        t, value, data, notes = _read(path, file, channel, time_channel, rate_hz)
+    return t, value, (str(data.name), _unit_string(data)), [*notes, *said]
 
 
 @contextmanager
@@ -77,7 +79,7 @@ def _asked(path: Path, ask: Callable[[], T]) -> T:
 
 def _read(
     path: Path, file: TdmsFile, channel: str | None, time_channel: str | None, rate_hz: float | None
-) -> tuple[Floats, Floats, str, list[str]]:
+) -> tuple[Floats, Floats, Any, list[str]]:
     notes = []
     if file.file_status.incomplete_final_segment:
         notes.append("the TDMS file ends in the middle of a segment: the recording was cut off")
@@ -95,9 +97,9 @@ def _read(
                     "Name the right channels with " + Setting("column") + " and " + Setting("time_column"),
                 )
             )
-        return t, value, str(data.name), notes
+        return t, value, data, notes
     if rate_hz is not None:
-        return np.arange(value.size, dtype=np.float64) / rate_hz, value, str(data.name), notes
+        return np.arange(value.size, dtype=np.float64) / rate_hz, value, data, notes
     step = _property(path, data, "wf_increment", None)
     if step is None or not step > 0:
         raise EncoderError(
@@ -114,7 +116,12 @@ def _read(
             )
         )
     start = _property(path, data, "wf_start_offset", 0.0) or 0.0
-    return start + np.arange(value.size, dtype=np.float64) * step, value, str(data.name), notes
+    return start + np.arange(value.size, dtype=np.float64) * step, value, data, notes
+
+
+def _unit_string(channel: Any) -> str:
+    stated = channel.properties.get("unit_string", "")
+    return stated.strip() if isinstance(stated, str) else ""
 
 
 def _property(path: Path, channel: Any, key: str, absent: float | None) -> float | None:
@@ -177,7 +184,9 @@ def _samples(path: Path, channel: Any) -> Any:
 def _times(path: Path, channel: Any, notes: list[str]) -> Floats:
     samples = _samples(path, channel)
     if not isinstance(samples, TimestampArray):
-        return _as_numbers(path, channel, samples)
+        return in_seconds(
+            _as_numbers(path, channel, samples), str(path), str(channel.name), _unit_string(channel)
+        )
     if samples.size == 0:
         return np.zeros(0)
     whole = np.asarray(samples.seconds, dtype=np.int64)
@@ -194,8 +203,9 @@ def _numbers(path: Path, channel: Any) -> Floats:
 
 def _as_numbers(path: Path, channel: Any, samples: Any) -> Floats:
     array = np.asarray(samples)
-    if array.dtype.kind not in "fiub":
-        what = "time stamps" if isinstance(samples, TimestampArray) or array.dtype.kind == "M" else "text"
+    if array.dtype.kind not in "fiu":
+        stamps = isinstance(samples, TimestampArray) or array.dtype.kind == "M"
+        what = "time stamps" if stamps else "truth values" if array.dtype.kind == "b" else "text"
         raise EncoderError(
             fault(
                 str(path),
