@@ -223,6 +223,7 @@ UNITS = {
         [np.pi / 2, np.pi],
         "rad",
     ),
+    "degree sign": ("time_s,angle°\n0,90\n0.002,180\n", "time_s", "angle°", [np.pi / 2, np.pi], "rad"),
     "none": ("Zeit,Kanal (1)\n0,0.65\n0.002,1.65\n", "Zeit", "Kanal (1)", [0.65, 1.65], "v"),
 }
 
