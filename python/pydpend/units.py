@@ -50,7 +50,7 @@ _SPELLINGS: tuple[tuple[UnitOf, str], ...] = (
 _KNOWN = {spelling: unit for unit, spellings in _SPELLINGS for spelling in spellings.split()}
 
 _BRACKETED = re.compile(r"[(\[<{]\s*([^()\[\]<>{}]*?)\s*[)\]>}]\s*$")
-_ENDING = re.compile(r"(?:^|[_\s./,:-]|(?=°))([A-Za-zµ°]+)$")
+_ENDING = re.compile(r"(?:^|[_\s./,:-]|(?=°))([A-Za-zµ]+|°)$")
 _CAMEL = re.compile(r"[a-z0-9](Ms|Us|Ns|Sec|Mv|MV|mV|Deg|Rad|Mrad|Degrees|Radians|Volts|Seconds)$")
 
 
