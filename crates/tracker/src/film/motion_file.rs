@@ -5,7 +5,7 @@ use std::path::Path;
 
 use arrow::array::{Array, AsArray};
 use arrow::datatypes::{DataType, Float64Type};
-use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use parquet::arrow::arrow_reader::{ArrowReaderOptions, ParquetRecordBatchReaderBuilder};
 
 use super::motion::MotionTable;
 use crate::error::{Error, Fault, Place, Result};
@@ -120,9 +120,12 @@ fn read_csv(path: &Path, name: &str) -> Result<(Vec<String>, Vec<Vec<f64>>)> {
 
 fn read_parquet(path: &Path, name: &str) -> Result<(Vec<String>, Vec<Vec<f64>>)> {
     let file = File::open(path).map_err(|e| unreadable(name, e))?;
-    let reader = ParquetRecordBatchReaderBuilder::try_new(file)
-        .and_then(ParquetRecordBatchReaderBuilder::build)
-        .map_err(|e| unreadable(name, e))?;
+    let reader = ParquetRecordBatchReaderBuilder::try_new_with_options(
+        file,
+        ArrowReaderOptions::new().with_skip_arrow_metadata(true),
+    )
+    .and_then(ParquetRecordBatchReaderBuilder::build)
+    .map_err(|e| unreadable(name, e))?;
     let mut header = Vec::new();
     let mut columns: Vec<Vec<f64>> = Vec::new();
     for batch in reader {

@@ -20,7 +20,7 @@ use std::sync::Arc;
 use arrow::array::{ArrayRef, AsArray, DictionaryArray, Float64Array, Int64Array, RecordBatch, StringArray};
 use arrow::datatypes::{DataType, Field, Float64Type, Int32Type, Int64Type, Schema};
 use parquet::arrow::ArrowWriter;
-use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use parquet::arrow::arrow_reader::{ArrowReaderOptions, ParquetRecordBatchReaderBuilder};
 use parquet::basic::{Compression, ZstdLevel};
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
@@ -352,9 +352,12 @@ fn read_parquet(path: &Path, name: &str) -> Result<Columns> {
     let unreadable =
         |e: &dyn std::fmt::Display| Error::Film(Fault::new(name, format!("the truth cannot be read ({e})")));
     let file = File::open(path).map_err(|e| unreadable(&e))?;
-    let reader = ParquetRecordBatchReaderBuilder::try_new(file)
-        .and_then(ParquetRecordBatchReaderBuilder::build)
-        .map_err(|e| unreadable(&e))?;
+    let reader = ParquetRecordBatchReaderBuilder::try_new_with_options(
+        file,
+        ArrowReaderOptions::new().with_skip_arrow_metadata(true),
+    )
+    .and_then(ParquetRecordBatchReaderBuilder::build)
+    .map_err(|e| unreadable(&e))?;
     let mut columns = Columns::default();
     for batch in reader {
         let batch = batch.map_err(|e| unreadable(&e))?;

@@ -17,7 +17,7 @@ use ::parquet::errors::{ParquetError, Result as ParquetResult};
 use ::parquet::file::reader::{ChunkReader, Length};
 use arrow::array::{Array, ArrayRef, AsArray, RecordBatch, StringArray};
 use arrow::compute::cast;
-use arrow::datatypes::{DataType, Float32Type, Float64Type, Int32Type, Int64Type};
+use arrow::datatypes::{DataType, FieldRef, Float32Type, Float64Type, Int32Type, Int64Type, Schema};
 use bytes::Bytes;
 use rayon::prelude::*;
 
@@ -75,11 +75,29 @@ impl Read for From {
     }
 }
 
+/// The metadata with types by the Parquet columns alone, words as dictionaries. The types that an Arrow writer adds to the file
+/// are left aside: damaged ones panic in arrow-ipc 59.
+fn load(file: &Shared) -> ParquetResult<ArrowReaderMetadata> {
+    let plain = ArrowReaderMetadata::load(file, ArrowReaderOptions::new().with_skip_arrow_metadata(true))?;
+    let coded = DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8));
+    let fields: Vec<FieldRef> = plain
+        .schema()
+        .fields()
+        .iter()
+        .map(|field| match field.data_type() {
+            DataType::Utf8 => Arc::new(field.as_ref().clone().with_data_type(coded.clone())),
+            _ => Arc::clone(field),
+        })
+        .collect();
+    let options = ArrowReaderOptions::new().with_schema(Arc::new(Schema::new(fields)));
+    ArrowReaderMetadata::try_new(Arc::clone(plain.metadata()), options)
+}
+
 fn open(path: &Path) -> Result<(Shared, ArrowReaderMetadata, TableMeta)> {
     let file = File::open(path).map_err(|e| read_fault(path, &e))?;
     let length = file.metadata().map_err(|e| read_fault(path, &e))?.len();
     let file = Shared { file: Arc::new(file), length };
-    let metadata = ArrowReaderMetadata::load(&file, ArrowReaderOptions::new()).map_err(|e| {
+    let metadata = load(&file).map_err(|e| {
         Error::Table(
             Fault::new(path.display(), format!("it is not a whole Parquet file ({e})"))
                 .advice("It may be cut off: copy it again, or run " + TRACK + " again"),
@@ -243,6 +261,9 @@ fn split<'a>(table: &'a mut Rows, first_rows: &[usize], nodes: usize) -> Vec<Par
     first_rows.iter().zip(ends).filter_map(|(&start, end)| rest.split_off_front(end - start, nodes)).collect()
 }
 
+/// Place of `time_s` among the columns.
+const TIME: usize = 1;
+
 /// A column of a batch as `to`, without nulls where none may be.
 fn column(batch: &RecordBatch, at: usize, to: &DataType, first_row: usize, name: &str) -> Result<ArrayRef> {
     let fault = |problem: String| Error::Table(Fault::new(name, problem).at(Place::Key(COLUMNS[at].into())));
@@ -253,6 +274,13 @@ fn column(batch: &RecordBatch, at: usize, to: &DataType, first_row: usize, name:
         let fault = Fault::new(name, format!("the column holds {}, not numbers", array.data_type()))
             .at(Place::Key(COLUMNS[at].into()))
             .advice("Write times in s from the recording's start");
+        return Err(Error::Table(fault));
+    }
+    // A duration comes as whole ticks of an unknown unit, because the types that say so are left aside.
+    if at == TIME && array.data_type().is_integer() {
+        let fault = Fault::new(name, "the column holds whole numbers, not seconds")
+            .at(Place::Key(COLUMNS[at].into()))
+            .advice("Write times in s as floating-point numbers from the recording's start");
         return Err(Error::Table(fault));
     }
     let array = if array.data_type() == to {

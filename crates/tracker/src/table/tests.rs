@@ -426,3 +426,24 @@ fn a_frame_without_pixels_neither_ends_a_gap_nor_makes_it_longer() {
         (2, 2, 2, 2, 0)
     );
 }
+
+#[test]
+fn types_that_an_arrow_writer_adds_are_not_believed() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("t.parquet");
+    let meta = meta(&[("a".into(), 0)], &["c".into()]);
+    let mut writer = TableWriter::create(&path, &meta.rig, Cells::Plain).unwrap();
+    writer.push(0, 0.0, &[Observation::MISSING]).unwrap();
+    writer.finish(&meta).unwrap();
+    let whole = std::fs::read(&path).unwrap();
+    let key = b"ARROW:schema";
+    let at = whole.windows(key.len()).position(|w| w == key).unwrap() + key.len();
+    // Behind the key comes its value, base64 of some hundred bytes: each of them damaged in turn, none is looked at.
+    for k in (at + 8..at + 400).step_by(3) {
+        let mut bytes = whole.clone();
+        bytes[k] = if bytes[k] == b'A' { b'z' } else { b'A' };
+        std::fs::write(&path, bytes).unwrap();
+        assert_eq!(crate::kind::kind_of(&path), crate::kind::Kind::NodeTable, "byte {k}");
+        assert_eq!(read_table(&path).unwrap().frames(), 1, "byte {k}");
+    }
+}
