@@ -237,7 +237,7 @@ def test_a_config_says_whatever_a_flag_can(tmp_path: Path, capsys: pytest.Captur
         "calibration": "holds", "model": "m.toml", "laws": "mu_v1,tau_c1", "ratios": "fixed", "free": "tilt,offset1",
         "intervals": "profile", "comparison": False, "prediction": False, "start_s": 1.5, "stop_s": 9.0,
         "angle_maps": True, "zero": "-178,-182", "link_length_m": 0.17, "estimator": "linkage",
-        "columns": "time_s=t", "hanging_deg": -180.0, "overlay": False, "threads": 3,
+        "columns": "time_s=t", "hanging_deg": -180.0, "overlay": False, "threads": 3, "pixel_aspect": "4:3",
     }  # fmt: skip
     energy: dict[str, object] = {"method": "energy", "laws": "paper", "ten_coefficients": True}
     single: dict[str, object] = {"pinned": True}

@@ -59,7 +59,7 @@ def measured(seed: int, folder: Path) -> dict[Method, tuple[Floats, Floats]]:
     stated sigma in all frames, each (2,).
     """
     made = scene(seed)
-    film = dp.film(made, folder / f"{seed}.avi", seed=seed, codec="raw", gray_only=True)
+    film = dp.film(made, folder / f"{seed}.avi", seed=seed, codec="raw")
     truth, nodes = film.truth(), dp.track(folder / f"{seed}.avi", progress=False)
     distance = np.hypot(*np.moveaxis(nodes.xy_px[:, :, None] - truth.xy_px[:, None], 3, 0))
     order = np.nanmedian(distance, axis=0).argmin(axis=1)

@@ -129,7 +129,7 @@ def test_bad_input_is_refused_in_words(folder: Path, tmp_path: Path) -> None:
         assert not (tmp_path / "none").exists()
     done = command("predict", folder / "21.csv", "--fit", tmp_path, "-o", tmp_path / "none")
     assert done.returncode == 2
-    assert "pydpend fit" in done.stderr
+    assert "it is a folder of tables, not a damping fit" in done.stderr
 
 
 def test_a_single_pendulum_with_a_model_of_one_link(folder: Path, tmp_path: Path) -> None:

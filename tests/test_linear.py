@@ -163,7 +163,7 @@ def test_figures_and_animation(tmp_path: Path) -> None:
     assert (tmp_path / "p.mp4").read_bytes()[4:8] == b"ftyp"
     with pytest.raises(SimulationError, match="is not a film"):
         physics.animate(run, model, tmp_path / "p.avi")
-    with pytest.raises(SimulationError, match="could not write it"):
+    with pytest.raises(SimulationError, match="cannot be written"):
         physics.animate(run, model, tmp_path / "none" / "p.mp4", fps=5)
 
 

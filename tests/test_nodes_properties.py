@@ -28,9 +28,12 @@ def tables(draw: st.DrawFn) -> Nodes:
     bodies = draw(st.lists(WORDS, min_size=1, max_size=min(3, len(names)), unique=True))
     # Every body has a node.
     of = [bodies[i % len(bodies)] for i in range(len(names))]
-    width, height = draw(st.integers(1, 9000)), draw(st.integers(1, 9000))
-    inside = st.tuples(st.floats(0, width - 1), st.floats(0, height - 1))
-    nodes = tuple(Node(n, b, *draw(inside)) for n, b in zip(names, of, strict=True))
+    width, height = draw(st.integers(2, 9000)), draw(st.integers(1, 9000))
+    # Each node has half a strip of its own: two of one body at one place are no rig.
+    strip = (width - 1) / 5
+    inside = st.tuples(st.floats(0, strip / 2), st.floats(0, height - 1))
+    placed = [(x + i * strip, y) for i, (x, y) in enumerate(draw(inside) for _ in names)]
+    nodes = tuple(Node(n, b, *at) for n, b, at in zip(names, of, placed, strict=True))
     joints = (Joint(draw(st.sampled_from(string.ascii_letters)), (bodies[0],), draw(PLACES), draw(PLACES)),)
     reference = draw(st.none() | st.integers(0, 1000))
     rig = Rig((width, height), nodes, tuple(bodies), joints, reference)

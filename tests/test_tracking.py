@@ -349,7 +349,7 @@ def test_each_fault_has_its_exception(film: Path, tmp_path: Path) -> None:
 
 def test_what_ffmpeg_says_of_a_file_reaches_the_user(tmp_path: Path) -> None:
     path = tmp_path / "no.mp4"
-    path.write_text("hello\n", encoding="utf-8")
+    path.write_bytes(bytes(range(1, 32)) * 40)
     # FFmpeg's own words; they were an empty pair of brackets once.
     with pytest.raises(dp.SourceError, match=r"no\.mp4: not a recording that can be read \(\w+"):
         dp.info(path)
