@@ -103,13 +103,10 @@ impl VideoWriter {
             return Err(fault(&name, "the frame rate is too fine a fraction".into(), "Give a rounder rate"));
         };
         let time_base = Rational(numerator, denominator);
-        if keeps_milliseconds(path) && i64::from(denominator) > 1000 * i64::from(numerator) {
-            let rate = f64::from(denominator) / f64::from(numerator);
-            return Err(fault(
-                &name,
-                format!("it keeps time stamps in milliseconds, too coarse for {rate} frames per s"),
-                "Name it .mp4, .mov or .avi, which keep every rate",
-            ));
+        let rate = f64::from(denominator) / f64::from(numerator);
+        if let Some(why) = up_to_1000_hz(path).filter(|_| rate > 1000.0) {
+            let problem = format!("it {why}, too coarse for {rate} frames per s");
+            return Err(fault(&name, problem, "Name it .mp4 or .mov, which keep every rate"));
         }
         let new = NewFile::create(path).map_err(|e| cannot_write(&name, &e))?;
         let mut output = muxer(&name, path, &new)?;
@@ -246,11 +243,14 @@ impl VideoWriter {
     }
 }
 
-/// Whether a file's ending stands for Matroska, as FFmpeg writes it: time stamps in milliseconds, and the exact time
-/// from frame to frame beside them only where that is longer.
-fn keeps_milliseconds(path: &Path) -> bool {
-    let ending = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
-    matches!(ending.as_deref(), Some("mkv" | "mk3d" | "webm"))
+/// Why a file of this ending holds at most 1000 frames per second, as FFmpeg writes it; `None` if it holds more. Matroska
+/// has the exact time from frame to frame beside its time stamps only where that is longer than a tick.
+fn up_to_1000_hz(path: &Path) -> Option<&'static str> {
+    match path.extension()?.to_string_lossy().to_ascii_lowercase().as_str() {
+        "mkv" | "mk3d" | "webm" => Some("keeps time stamps in milliseconds"),
+        "avi" => Some("is written with frames 1 ms or more apart"),
+        _ => None,
+    }
 }
 
 /// The container that the ending of `path` names, writing into `new` and nowhere else.

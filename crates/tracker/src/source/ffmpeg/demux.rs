@@ -13,6 +13,10 @@ use super::{formats, message};
 use crate::error::{Error, Fault, Result};
 use crate::name::path;
 
+/// The rate that libavformat counts time by in a coded stream whose bytes give none; it is told this one, which no file
+/// gives, to be known again.
+const NOT_GIVEN: ffi::AVRational = ffi::AVRational { num: 1_000_003, den: 40_000 };
+
 /// An open container with one video stream selected; all others are discarded unread.
 pub(super) struct Demuxer {
     context: *mut ffi::AVFormatContext,
@@ -58,6 +62,10 @@ impl Demuxer {
         if boxes.edits_change_time {
             // SAFETY: as above. Only the reader of MP4 and QuickTime knows it.
             unsafe { ffi::av_dict_set(&mut options, c"ignore_editlist".as_ptr(), c"1".as_ptr(), 0) };
+        }
+        if let Ok(rate) = CString::new(format!("{}/{}", NOT_GIVEN.num, NOT_GIVEN.den)) {
+            // SAFETY: as above. Only readers of streams without a container know it.
+            unsafe { ffi::av_dict_set(&mut options, c"framerate".as_ptr(), rate.as_ptr(), 0) };
         }
         let mut context: *mut ffi::AVFormatContext = ptr::null_mut();
         // SAFETY: `context` is null, so it is allocated; on failure it is freed and set to null by the call.
@@ -142,13 +150,25 @@ impl Demuxer {
 
     /// The rate that the container claims, frames per second.
     pub(super) fn rate(&self) -> Option<ffi::AVRational> {
-        self.rates().next()
+        let stream = self.stream();
+        [stream.avg_frame_rate, stream.r_frame_rate].into_iter().find(|r| is_rate(*r))
     }
 
-    /// Rates that the container gives, frames per second, the likeliest first.
+    /// Rates that the container gives, frames per second, the likeliest first. Of MP4 and QuickTime the average is none of
+    /// them: it is the number of frames over the whole length, which a last frame that is shown longer falsifies.
     pub(super) fn rates(&self) -> impl Iterator<Item = ffi::AVRational> + use<> {
         let stream = self.stream();
-        [stream.avg_frame_rate, stream.r_frame_rate].into_iter().filter(|r| r.num > 0 && r.den > 0)
+        let is_counted = self.container().contains("mp4");
+        let average = Some(stream.avg_frame_rate).filter(|_| !is_counted);
+        average.into_iter().chain([stream.r_frame_rate]).filter(|r| is_rate(*r))
+    }
+
+    /// Whether neither the file nor the coded film says anything of time.
+    pub(super) fn is_untimed(&self) -> bool {
+        let stream = self.stream();
+        let rates = [stream.avg_frame_rate, stream.r_frame_rate];
+        let is_told = |r: &ffi::AVRational| (r.num, r.den) == (NOT_GIVEN.num, NOT_GIVEN.den);
+        rates.iter().any(is_told) && !rates.into_iter().any(is_rate)
     }
 
     /// What the file's boxes say, if it has such.
@@ -249,6 +269,11 @@ impl Demuxer {
         // SAFETY: the context is open and the stream's index valid.
         unsafe { ffi::av_seek_frame(self.context, self.stream as i32, ticks, ffi::AVSEEK_FLAG_BACKWARD) >= 0 }
     }
+}
+
+/// Whether it is a rate that the file gives.
+fn is_rate(r: ffi::AVRational) -> bool {
+    r.num > 0 && r.den > 0 && (r.num, r.den) != (NOT_GIVEN.num, NOT_GIVEN.den)
 }
 
 impl Drop for Demuxer {

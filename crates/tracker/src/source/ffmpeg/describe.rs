@@ -37,6 +37,10 @@ pub(super) fn describe(
     let stream_rate_hz = rate.map(|r| f64::from(r.num) / f64::from(r.den));
     let (time_base, rate_hz, rate_origin) = match options.fps {
         Some(fps) => (clock::time_base(fps)?, Some(fps), RateOrigin::User),
+        // Times are frame numbers.
+        None if demuxer.is_untimed() => {
+            (TimeBase { numerator: 1, denominator: 1 }, None, RateOrigin::Unknown)
+        }
         None => (
             TimeBase { numerator: stream_base.0, denominator: stream_base.1 },
             stream_rate_hz,

@@ -98,7 +98,8 @@ pub struct FfmpegSource {
     /// Frames given as samples of a pipe, to be handed out in their turn.
     replay: VecDeque<Frame>,
     next_index: u64,
-    user_clock: bool,
+    /// Ticks are frame numbers: the user gives the rate, or nothing does.
+    counts_frames: bool,
     ending: Ending,
 }
 
@@ -132,6 +133,7 @@ impl FfmpegSource {
         let intra_only = properties & ffi::AV_CODEC_PROP_INTRA_ONLY != 0;
         let (mut info, orientation) = describe(&demuxer, &layout, name, options)?;
 
+        let counts_frames = options.fps.is_some() || demuxer.is_untimed();
         let step = step(&demuxer);
         let feed = Feed::new(demuxer, name, can_reopen, if intra_only { 1 } else { 6 })?;
         if let Some(order) = feed.field_order(name)? {
@@ -178,7 +180,7 @@ impl FfmpegSource {
             ready: VecDeque::new(),
             replay: VecDeque::new(),
             next_index: 0,
-            user_clock: options.fps.is_some(),
+            counts_frames,
             ending: Ending::Complete,
         })
     }
@@ -317,7 +319,7 @@ impl FfmpegSource {
         };
         Frame {
             index,
-            ticks: if self.user_clock { index as i64 } else { ready.ticks },
+            ticks: if self.counts_frames { index as i64 } else { ready.ticks },
             width: self.info.width,
             height: self.info.height,
             stride,
@@ -368,7 +370,7 @@ impl FrameSource for FfmpegSource {
 
     fn stamps(&mut self) -> Result<Option<(Vec<i64>, bool)>> {
         // A packet that holds one field is no frame.
-        if !self.can_reopen || self.user_clock || self.feed.has_single_fields() {
+        if !self.can_reopen || self.counts_frames || self.feed.has_single_fields() {
             return Ok(None);
         }
         let input = Input::File(self.url.clone());
