@@ -61,7 +61,15 @@ def coefficients(laws: str | Sequence[str]) -> tuple[str, ...]:
                 f"Use paper, full, or some of {', '.join(FULL)}",
             )
         )
+    check_once("laws", laws)
     return tuple(name for name in FULL if name in laws)
+
+
+def check_once(setting: str, names: Sequence[str]) -> None:
+    """Raises FitOptionError if a name stands twice in a setting."""
+    for i, name in enumerate(names):
+        if name in names[:i]:
+            raise FitOptionError(fault(Setting(setting), f"{name} is given twice", "Give each name once"))
 
 
 def unit(name: str) -> str:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from pydpend import _tracker
 from pydpend.coefficients import coefficients, parameters
-from pydpend.errors import FitError, fault
+from pydpend.errors import FitError, Setting, fault
 from pydpend.model import Model
 
 Floats = NDArray[np.float64]
@@ -143,6 +143,16 @@ def fit_profiles(profiles: Sequence[EnergyProfile], *, bounded: bool = True) -> 
             fault("energy fit", "the profiles have different laws", "Make them with the same laws")
         )
     design, scale = _design(profiles)
+    n, p = design.shape
+    if n <= p:
+        raise FitError(
+            fault(
+                "energy fit",
+                f"{n} energies do not determine {len(names)} coefficients and the energy at the "
+                "start of each recording",
+                "Fit fewer laws, give a longer decay or go over to " + Setting("method", "trajectory"),
+            )
+        )
     energy = np.concatenate([p.energy_j for p in profiles])
     known = [p.sigma_j for p in profiles if p.sigma_j is not None]
     sigma = np.concatenate(known) if len(known) == len(profiles) else np.ones(energy.size)
@@ -155,7 +165,6 @@ def fit_profiles(profiles: Sequence[EnergyProfile], *, bounded: bool = True) -> 
     )
     x = result.x / size / scale
     residual = design @ (result.x / size) - energy
-    n, p = design.shape
     chi2 = float(np.sum((residual / sigma) ** 2)) / max(n - p, 1)
     growth = max(1.0, chi2)
     if not known:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 
-from pydpend.coefficients import FULL, JOINT_OF, PAPER, coefficients
+from pydpend.coefficients import FULL, JOINT_OF, PAPER, check_once, coefficients
 from pydpend.errors import FitOptionError, Message, Setting, Text, fault, listed, one_of
 
 METHODS = ("trajectory", "energy")
@@ -57,9 +57,11 @@ def check_fit(
     intervals = options.get("intervals", INTERVALS[0])
     if intervals not in INTERVALS:
         raise FitOptionError(one_of("intervals", intervals, INTERVALS))
-    for name in free_names(options.get("free")):
+    free = free_names(options.get("free"))
+    for name in free:
         if name not in FREE:
             raise FitOptionError(one_of("free", name, FREE))
+    check_once("free", free)
     for option, value in options.items():
         owner = METHOD_OF.get(option, method)
         if owner != method and value not in NOTHING:

@@ -94,6 +94,27 @@ def whole(path: AnyPath) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
+def check_folder(path: AnyPath) -> Path:
+    """The folder that results go into. Raises ArgumentError if a file has its name or the name of one above it."""
+    folder = path_of(path)
+    there = next((p for p in (folder, *folder.parents) if p.exists()), None)
+    if there is not None and not there.is_dir():
+        what = "it is a file, and the results need a folder"
+        raise ArgumentError(fault(str(there), what, "Give the name of a folder"))
+    return folder
+
+
+def results_folder(path: AnyPath) -> Path:
+    """The folder that results go into, made if it is not there. Raises ArgumentError if it cannot be."""
+    folder = check_folder(path)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as problem:
+        what = f"the folder cannot be made ({problem.strerror})"
+        raise ArgumentError(fault(str(folder), what, "Give a folder that can be written")) from problem
+    return folder
+
+
 def write_text(path: AnyPath, text: str) -> None:
     """Writes a text file, UTF-8; what UTF-8 cannot hold, as of a name that is not UTF-8, is written out.
 

@@ -19,7 +19,7 @@ from pydpend._tracker import fingerprint, recording_files
 from pydpend.analyse.contents import made_by
 from pydpend.documents import Table, read_json
 from pydpend.errors import PydpendError, fault
-from pydpend.output import check_kept, write_text
+from pydpend.output import check_kept, results_folder, write_text
 
 RUN_SCHEMA = 3
 """A folder of an older schema is done again, one of a newer is refused."""
@@ -119,11 +119,7 @@ class RunFolder:
                 raise RunFolderError(
                     fault(str(path), "is not empty and not a run of pydpend", "Give a new folder with -o")
                 )
-            try:
-                path.mkdir(parents=True, exist_ok=True)
-            except OSError as error:
-                raise RunFolderError(fault(str(path), f"cannot be made ({error.strerror})")) from None
-            return cls(path)
+            return cls(results_folder(path))
         raw = read_json(record, RunFolderError, "Use a new folder")
         schema = raw.whole("schema")
         if schema > RUN_SCHEMA:

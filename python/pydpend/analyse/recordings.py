@@ -42,11 +42,20 @@ def recordings(options: Options, digests: Digests) -> tuple[Recording, ...]:
             fault("INPUTS", "there is nothing to analyse", "Name a film, a node table or angles")
         )
     names: set[str] = set()
+    contents: dict[str, str] = {}
     out = []
     for i, given in enumerate(options.inputs):
         path = Path(given)
         if not path.exists():
             raise PydpendError(fault(given, "there is no such file", "Check the name"))
+        content = digests.of(path)
+        if content in contents:
+            other = contents[content]
+            also = "" if other == given else f" (as {other} too)"
+            raise PydpendError(
+                fault(given, f"the recording is given twice{also}", "Give each recording once")
+            )
+        contents[content] = given
         stem = re.sub(r"[^A-Za-z0-9._-]+", "_", path.stem or path.name).strip("._") or "recording"
         name = stem
         count = 1
@@ -60,7 +69,7 @@ def recordings(options: Options, digests: Digests) -> tuple[Recording, ...]:
                 label=path.name,
                 path=str(path),
                 kind=recording_kind(path),
-                digest=digests.of(path),
+                digest=content,
                 encoder=options.encoder if i == 0 else None,
             )
         )

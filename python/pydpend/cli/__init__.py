@@ -167,6 +167,11 @@ def _run(args: argparse.Namespace) -> int:
         # The reader (head, less) has gone; nothing is lost that anyone wants.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
+    except OSError as error:
+        # A full disk or a folder that may not be written; the reason is the system's.
+        named = "" if error.filename is None else f"{os.fsdecode(error.filename)}: "
+        print(f"pydpend: {named}{error.strerror or error}", file=sys.stderr)
+        return 2
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from pathlib import Path
 
 HELP = "hold recordings in, the encoder's volts-to-angle line out"
 
@@ -62,6 +63,10 @@ def run(args: argparse.Namespace) -> int:
     from pydpend.encoder import calibrate, read_holds
     from pydpend.errors import EncoderError, fault
 
+    if Path(args.output).suffix.lower() != ".json":
+        raise EncoderError(
+            fault(f"-o {args.output}", "a calibration is a .json", "Give a name that ends in .json")
+        )
     rails = numbers(args.range_v, "--range-v")
     if len(rails) != 2 or rails[0] >= rails[1]:
         raise EncoderError(fault("--range-v", f"{args.range_v!r} is not a range", "Give LOW,HIGH"))

@@ -47,6 +47,13 @@ def add_arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument("--json", action="store_true", help="compare.json on stdout too")
 
 
+def part(share: float, digits: int) -> str:
+    """A part of the residual's variance in percent; in words where the noise that is stated is far too large."""
+    return (
+        f"{100 * share:.{digits}f} %" if not share > 2 else "more than whole: less noise is there than stated"
+    )
+
+
 def run(args: argparse.Namespace) -> int:
     """Runs the command; 1 if readings were left out and said."""
     import numpy as np
@@ -55,11 +62,12 @@ def run(args: argparse.Namespace) -> int:
 
     from pydpend.encoder import calibrate, compare, encoder_angles, read_calibration, read_encoder, read_holds
     from pydpend.errors import EncoderError, fault
-    from pydpend.output import whole, write_text
+    from pydpend.output import check_folder, results_folder, whole, write_text
     from pydpend.plots.angles import angles_figure
     from pydpend.plots.encoder import calibration_figure, comparison_figure
     from pydpend.plots.style import save
 
+    check_folder(args.output)
     video = read(args.angles, args)
     signal = read_encoder(
         args.encoder, column=args.column, time_column=args.time_column, rate_hz=args.rate_hz, unit=args.unit
@@ -69,9 +77,8 @@ def run(args: argparse.Namespace) -> int:
         path = Path(args.calibration)
         line = calibrate(read_holds([path])) if path.is_dir() else read_calibration(path)
     found = compare(video, encoder_angles(signal, line), args.link - 1, clocks=args.clocks)
-    folder = Path(args.output)
+    folder = results_folder(args.output)
     try:
-        folder.mkdir(parents=True, exist_ok=True)
         write_text(folder / "compare.json", found.to_json())
         with whole(folder / "residuals.parquet") as new, new.open("wb") as file:
             pq.write_table(pa.table(found.to_columns()), file)
@@ -102,8 +109,8 @@ def run(args: argparse.Namespace) -> int:
         )
         print(
             f"residual RMS {np.degrees(found.rms_rad):.4f} deg, largest {np.degrees(found.largest_rad):.4f} deg; "
-            f"explained by the encoder's noise {100 * found.share_encoder:.1f} %, "
-            f"by the video's {100 * found.share_video:.2f} %"
+            f"explained by the encoder's noise {part(found.share_encoder, 1)}, "
+            f"by the video's {part(found.share_video, 2)}"
         )
     for note in found.notes:
         print(f"note: {note}", file=sys.stderr)

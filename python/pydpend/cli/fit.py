@@ -191,7 +191,9 @@ def run(args: argparse.Namespace) -> int:
 
     from pydpend.damping import fit_damping
     from pydpend.damping.stored import write_fit, write_json
+    from pydpend.output import check_folder, results_folder
 
+    check_folder(args.output)
     check_fit(args.method, args.laws, vars(args), single=args.pinned)
     recordings = [read(path, args) for path in args.angles]
     with warnings.catch_warnings():
@@ -227,7 +229,7 @@ def run(args: argparse.Namespace) -> int:
         from pydpend.trials import summary
 
         trials = summary([fit_damping(r, model, **options) for r in recordings], fit)
-    args.output.mkdir(parents=True, exist_ok=True)
+    results_folder(args.output)
     write_fit(fit, args.output)
     if trials is not None:
         write_json(args.output / "trials.json", trials.to_json())

@@ -13,7 +13,7 @@ import json
 from pathlib import Path
 
 from pydpend.cli.fit import add_angles_arguments, add_output_arguments, read
-from pydpend.output import write_text
+from pydpend.output import check_folder, results_folder, write_text
 
 HELP = "predict a recording from a fit to others"
 
@@ -34,6 +34,7 @@ def run(args: argparse.Namespace) -> int:
     from pydpend.damping.stored import load_fit, write_json
     from pydpend.errors import FitError, fault
 
+    check_folder(args.output)
     stored = load_fit(args.fit)
     try:
         windows = [float(w) for w in args.windows.split(",")]
@@ -42,7 +43,7 @@ def run(args: argparse.Namespace) -> int:
     if not windows or min(windows) <= 0:
         raise FitError(fault("--windows", f"{args.windows!r} is no list of lengths in s", "Write 0.5,1,2"))
     result = stored.predict(read(args.angles, args), windows, start_s=args.start_s, stop_s=args.stop_s)
-    args.output.mkdir(parents=True, exist_ok=True)
+    results_folder(args.output)
     write_json(args.output / "predict.json", result.to_json())
     links = next(iter(result.rows.values())).shape[1] - 1
     lines = [",".join(("window_s", "start_s", *(f"phi{j + 1}_rms_deg" for j in range(links))))]

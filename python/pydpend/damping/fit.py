@@ -15,7 +15,7 @@ from pydpend.damping.compare import compare_terms
 from pydpend.damping.plausible import modes_hz
 from pydpend.damping.prediction import held_out
 from pydpend.damping.profile import fit_energy
-from pydpend.damping.recording import Recording, prepare
+from pydpend.damping.recording import Recording, check_distinct, prepare
 from pydpend.damping.result import DampingFit, EnergyCurve, estimates
 from pydpend.damping.shares import shares
 from pydpend.damping.shooting import Progress
@@ -85,6 +85,7 @@ def fit_damping(
         "stop_s": stop_s,
     }
     names = check_fit(method, laws, options, single=single)
+    check_distinct(given)
     if single:
         given, model = reduced(given, model, pinned)
         if not names:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -120,6 +121,25 @@ class Recording:
                     "(no stated uncertainty agrees with it)"
                 )
         return out
+
+
+SAME = 1e-7
+"""Times in s and angles in rad that agree everywhere within this are the same numbers, written to seven digits or more:
+the noise of an angle is a thousand times more."""
+
+
+def check_distinct(angles: Sequence[LinkAngles]) -> None:
+    """Raises FitError for a recording given twice: it would count as two trials, with too small uncertainties."""
+    for i, one in enumerate(angles):
+        for other in angles[:i]:
+            if one.phi_rad.shape == other.phi_rad.shape and all(
+                np.allclose(a, b, rtol=0, atol=SAME, equal_nan=True)
+                for a, b in ((one.t_s, other.t_s), (one.phi_rad, other.phi_rad))
+            ):
+                also = "" if one.name == other.name else f" (as {other.name} too)"
+                raise FitError(
+                    fault(one.name, f"the recording is given twice{also}", "Give each recording once")
+                )
 
 
 def prepare(

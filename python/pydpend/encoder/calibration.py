@@ -31,6 +31,14 @@ SPEC_V = 2.5e-3
 RANGE_V = (0.0, 10.0)
 """What the encoder can put out, V (Section 5)."""
 
+CHANCE = 1e-3
+"""What is less likely than this by noise alone is not noise."""
+
+MOST_OFF = 0.01
+"""Holds further off the line than this part of the span, and further than their noise explains, are refused: a slope
+with a hold of another angle in it is of no use with any uncertainty. Hands that hold the link 10 deg wrong in four
+turns stay below it: their scatter goes into the uncertainty."""
+
 LEAST_DOF = 3
 """With fewer degrees of freedom the holds' own noise says how well the line is known, not their scatter."""
 
@@ -68,9 +76,14 @@ class Calibration:
         return float(a), float(b)
 
     @property
+    def from_scatter(self) -> bool:
+        """Whether the uncertainties are from the scatter of the holds about the line, not from the noise in them."""
+        return self.dof >= LEAST_DOF or _contradicted(self.holds, self.residual_v, self.spec_v)
+
+    @property
     def interval_95(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """95 % intervals of offset (V) and slope (V per rad)."""
-        factor = float(scipy.special.stdtrit(self.dof, 0.975)) if self.dof >= LEAST_DOF else 1.959964
+        factor = float(scipy.special.stdtrit(self.dof, 0.975)) if self.from_scatter else 1.959964
         a, b = self.sigma
         return (
             (self.offset_v - factor * a, self.offset_v + factor * a),
@@ -224,24 +237,22 @@ def calibrate(
             )
     std = np.array([h.std_v for h in holds])
     n = np.array([h.n for h in holds])
-    sigma = np.array([h.sigma_v for h in holds])
-    # A hold that reads one converter step all the time has no scatter; it is not exact for that.
-    usual = float(np.median(sigma[sigma > 0])) if (sigma > 0).any() else 1.0
-    sigma = np.maximum(sigma, 0.1 * usual)
+    sigma = _sigmas(holds, spec_v)
     if wraps:
         volts = _unwrapped_holds(phi, volts, sigma, range_v[1] - range_v[0])
     weight = 1 / sigma**2
     design = np.stack([np.ones_like(phi), phi], axis=1)
     normal = design.T @ (design * weight[:, None])
-    covariance = np.linalg.inv(normal)
+    covariance: Floats = np.asarray(np.linalg.inv(normal), dtype=np.float64)
     offset, slope = covariance @ (design.T @ (weight * volts))
     residual = volts - offset - slope * phi
     dof = len(holds) - 2
     notes: list[str] = []
     chi2 = float((weight * residual**2).sum())
-    if dof >= LEAST_DOF:
-        covariance = covariance * (chi2 / dof)
-        if scipy.special.chdtrc(dof, chi2) < 1e-3:
+    contradicted = _contradicted(holds, residual, spec_v)
+    if dof >= LEAST_DOF or contradicted:
+        covariance = np.asarray(covariance * (chi2 / dof), dtype=np.float64)
+        if contradicted:
             notes.append(
                 f"the holds scatter about the line {np.sqrt(chi2 / dof):.1f} times more than their noise: "
                 "the angles of the holds are not exact, or the encoder is not linear"
@@ -250,10 +261,22 @@ def calibrate(
         notes.append(
             f"{len(holds)} holds: the uncertainties are from the noise within them, not their scatter"
         )
+    linearity = float(np.abs(residual).max() / (abs(slope) * np.ptp(phi)))
     if abs(slope) * np.ptp(phi) < 10 * float(np.sqrt((sigma**2).mean())):
         raise EncoderError(
             fault(
                 "calibration", "the voltage does not change with the angle", "Check the wiring and the angles"
+            )
+        )
+    if contradicted and linearity > MOST_OFF:
+        worst = int(np.abs(residual).argmax())
+        raise EncoderError(
+            fault(
+                "calibration",
+                f"the holds do not lie on a line: {holds[worst].name} is {residual[worst]:+.4f} V off it, "
+                f"{100 * linearity:.2f} % of the span and {abs(residual[worst]) / sigma[worst]:.0f} times its noise"
+                + _culprit(holds, phi, volts, sigma),
+                "Check the angles of the holds, and that each file is of its own hold",
             )
         )
     weights = np.maximum(n - 1, 0)
@@ -265,7 +288,7 @@ def calibrate(
         dof,
         tuple(holds),
         residual,
-        float(np.abs(residual).max() / (abs(slope) * np.ptp(phi))),
+        linearity,
         noise if noise > 0 else spec_v,
         spec_v,
         tuple(h.name for h in holds if _too_noisy(h, spec_v)),
@@ -279,13 +302,41 @@ def _names(holds: Sequence[Hold]) -> str:
     return ", ".join(h.name for h in holds) or "none"
 
 
+def _sigmas(holds: Sequence[Hold], spec_v: float) -> Floats:
+    """Standard errors of the holds' means, V. ``spec_v`` where none of them tells its noise."""
+    sigma = np.array([h.sigma_v for h in holds], dtype=np.float64)
+    # A hold that reads one converter step all the time has no scatter; it is not exact for that.
+    usual = float(np.median(sigma[sigma > 0])) if (sigma > 0).any() else 10 * spec_v
+    return np.asarray(np.maximum(sigma, 0.1 * usual))
+
+
+def _contradicted(holds: Sequence[Hold], residual_v: Floats, spec_v: float) -> bool:
+    """Whether the holds are off the line by more than one in a thousand would by their noise, however few they are."""
+    chi2 = float(((residual_v / _sigmas(holds, spec_v)) ** 2).sum())
+    return len(holds) > 2 and bool(scipy.special.chdtrc(len(holds) - 2, chi2) < CHANCE)
+
+
+def _culprit(holds: Sequence[Hold], phi: Floats, volts: Floats, sigma: Floats) -> str:
+    """Words for the one hold without which the others lie on a line; empty if there is not just one such."""
+    alone = []
+    for i in range(len(holds) if len(holds) > 3 else 0):
+        rest = np.arange(len(holds)) != i
+        if np.ptp(phi[rest]) < 1e-6:
+            continue
+        slope, offset = np.polyfit(phi[rest], volts[rest], 1, w=1 / sigma[rest])
+        off = np.abs(volts[rest] - offset - slope * phi[rest]).max()
+        if off <= MOST_OFF * abs(slope) * np.ptp(phi[rest]):
+            alone.append(holds[i].name)
+    return f"; without {alone[0]} the others lie on one" if len(alone) == 1 else ""
+
+
 def _too_noisy(hold: Hold, spec_v: float) -> bool:
     """Whether the hold scatters by more than specified, and by more than one in a thousand would by chance."""
     if hold.std_v <= spec_v or hold.n < 2:
         return False
     # Readings that hang together count as fewer.
     free = max((hold.std_v / hold.sigma_v) ** 2 - 1, 1.0)
-    return bool((hold.std_v / spec_v) ** 2 > scipy.special.chdtri(free, 1e-3) / free)
+    return bool((hold.std_v / spec_v) ** 2 > scipy.special.chdtri(free, CHANCE) / free)
 
 
 def _unwrapped_holds(phi: Floats, volts: Floats, sigma: Floats, span: float) -> Floats:

@@ -13,12 +13,21 @@ from numpy.typing import NDArray
 
 from pydpend.angles.table import LinkAngles
 from pydpend.encoder.sync import Course, Synchronisation, synchronise
+from pydpend.errors import EncoderError, fault
 from pydpend.series import correlation_time, highpass_noise
 
 Floats = NDArray[np.float64]
 
 BLOCK_S = 1.0
 """Agreement below the encoder's noise is judged from means of the residual over this long."""
+
+
+MOST_DRIFT = 0.5
+"""No clocks of one recording differ by half; a motion that fits only so, or backwards, is another one."""
+
+SAME_RAD = 1e-7
+"""Angles that agree everywhere within this are the same numbers, written to seven digits or more: the noise of a
+video's angle is a thousand times more."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,6 +161,15 @@ def compare(
     sync = synchronise(video, encoder, link, clocks=clocks)
     course = Course.of(video, link)
     seen = encoder.seen[:, 0]
+    if not abs(sync.drift) < MOST_DRIFT:
+        raise EncoderError(
+            fault(
+                encoder.name,
+                f"by its motion the video's clock would run {1 + sync.drift:.3g} times as fast as its own: it is no "
+                f"encoder of link {link + 1} of {video.name}",
+                "Check the link, the encoder's column and both rates",
+            )
+        )
     there = sync.video_time(encoder.t_s[seen])
     angle = course.at(there)
     inside = np.isfinite(angle)
@@ -161,6 +179,14 @@ def compare(
     gain = 1.0 / sync.gain
     offset = -sync.zero_rad / sync.gain
     residual = video_rad - offset - gain * encoder_rad
+    if float(np.abs(residual).max()) < SAME_RAD:
+        raise EncoderError(
+            fault(
+                encoder.name,
+                f"its {residual.size} readings are the very angles that it is compared with: it is the same recording",
+                "Give the encoder's own recording",
+            )
+        )
     together = correlation_time(residual - residual.mean())
     mean = float(residual.mean())
     half = 1.96 * float(residual.std(ddof=1)) * float(np.sqrt(together / residual.size))

@@ -12,7 +12,7 @@ import numpy as np
 from pydpend.columns import read_columns
 from pydpend.encoder.scales import Unit, in_base
 from pydpend.encoder.signal import EncoderSignal, read_encoder
-from pydpend.errors import EncoderError, Setting, fault
+from pydpend.errors import EncoderError, Setting, fault, listed
 from pydpend.kinds import expect
 from pydpend.series import correlation_time
 
@@ -119,6 +119,17 @@ def read_holds(
     if angles_deg is None:
         angles = angles_from_names([f.stem for f in files])
         if angles is None:
+            without = [f for f in files if not _ANGLE.search(f.stem)]
+            if without and len(without) < len(files):
+                raise EncoderError(
+                    fault(
+                        listed((f.name for f in without), "and"),
+                        f"the name has no angle at its end, as those of the other holds have ({len(files)} in all)",
+                        "Rename it like hold_-360deg.csv, leave it out, or give "
+                        + Setting("angles_deg")
+                        + " in the files' order",
+                    )
+                )
             raise EncoderError(
                 fault(
                     "calibration",

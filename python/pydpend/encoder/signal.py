@@ -106,6 +106,10 @@ def read_encoder(
             magic = file.read(6)
     except OSError as problem:
         raise EncoderError(unreadable(path, problem)) from problem
+    if column is not None and column == (time_column or (None if rate_hz is not None else TIME_COLUMN)):
+        raise EncoderError(
+            fault(Setting("column"), f"{column!r} is the column of the times", "Name the encoder's readings")
+        )
     table: Columns | None = None
     notes: list[str] = []
     when, stated = time_column or TIME_COLUMN, ""
