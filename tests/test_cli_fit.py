@@ -127,8 +127,7 @@ def test_bad_input_is_refused_in_words(folder: Path, tmp_path: Path) -> None:
         assert words in done.stderr, done.stderr
         assert "Traceback" not in done.stderr
         assert not (tmp_path / "none").exists()
-    (tmp_path / "empty").mkdir()
-    done = command("predict", folder / "21.csv", "--fit", tmp_path / "empty", "-o", tmp_path / "none")
+    done = command("predict", folder / "21.csv", "--fit", tmp_path, "-o", tmp_path / "none")
     assert done.returncode == 2
     assert "it is a folder of tables, not a damping fit" in done.stderr
 
