@@ -212,7 +212,7 @@ def _tables() -> dict[str, Format]:
         "--method",
         "energy",
         "--laws",
-        "mu_v1,mu_v2",
+        "mu_v1",
         "--no-figures",
         "--quiet",
         "-o",
@@ -279,7 +279,7 @@ def _documents() -> dict[str, Format]:
         "--method",
         "energy",
         "--laws",
-        "mu_v1,mu_v2",
+        "mu_v1",
         "--no-figures",
         "--quiet",
     )

@@ -200,9 +200,9 @@ def replaced(
         (
             replaced(101, time="0.196"),
             2,
-            "daq.csv, line 101, column time: the time 0.196 s does not come after 0.196",
+            "daq.csv, line 101, column time_s: the time 0.196 s does not come after 0.196",
         ),
-        (replaced(101, time=""), 2, "daq.csv, line 101, column time: there is no time"),
+        (replaced(101, time=""), 2, "daq.csv, line 101, column time_s: there is no time"),
         (replaced(101, time="0.1987"), 0, "uneven steps"),
         (
             replaced(101, volts="12.5"),

@@ -14,7 +14,6 @@ from playwright.sync_api import Browser, Page
 from pydpend.analyse import Options, analyse
 from pydpend.nodes import Rig, read_nodes
 from pydpend.report import report_page
-from pydpend.report.page import Heading
 
 from tests.browsing import open_report, until
 
@@ -169,15 +168,12 @@ def test_the_answer_comes_first_and_in_words(opened: Page) -> None:
 
 def test_an_energy_fit_whose_laws_miss_is_warned_of(demo_run: Path, tmp_path: Path) -> None:
     nodes = str(demo_run / "drop" / "nodes.parquet")
-    options = Options(
-        inputs=(nodes,), zero="-178,-182", start_s=0.6, method="energy", laws="paper", ten_coefficients=True
-    )
+    # Of its few energies no more than two laws are determined.
+    options = Options(inputs=(nodes,), zero="-178,-182", start_s=0.6, method="energy", laws="mu_v1,mu_q1")
     analyse(options, tmp_path / "run")
     page = report_page(tmp_path / "run")
     # The film has constant dry torques, which are none of the paper's laws.
     assert any("do not take out the energy" in w for w in page.warnings)
-    headings = [b.text for s in page.sections for b in s.blocks if isinstance(b, Heading)]
-    assert "The paper's ten coefficients" in headings
 
 
 @pytest.fixture(scope="module")
