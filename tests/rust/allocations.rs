@@ -7,8 +7,8 @@ use std::cell::Cell;
 use std::sync::Arc;
 
 use tracker::detect::{DetectSettings, Detector, Levels};
-use tracker::film::{Film, preset};
 use tracker::frame::Frame;
+use tracker::synth::{Film, preset};
 
 thread_local! {
     static REQUESTS: Cell<usize> = const { Cell::new(0) };

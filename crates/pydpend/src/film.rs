@@ -8,8 +8,8 @@ use numpy::{
 };
 use pyo3::prelude::*;
 use tracker::error::{Error, Fault};
-use tracker::film::{self, Film, MotionTable, Scene, Truth, WriteOptions};
 use tracker::score::{Tracked, score};
+use tracker::synth::{self, Film, MotionTable, Scene, Truth, WriteOptions};
 
 use crate::errors::raise;
 use crate::settings::cells;
@@ -74,7 +74,7 @@ impl PyFilm {
     #[staticmethod]
     #[pyo3(signature = (name, seed))]
     fn preset(py: Python<'_>, name: &str, seed: u64) -> PyResult<Self> {
-        made(py, film::preset(name, seed), &None)
+        made(py, synth::preset(name, seed), &None)
     }
 
     /// The scene as JSON.
@@ -152,10 +152,10 @@ impl PyFilm {
     ) -> PyResult<()> {
         let codec = match codec {
             None => None,
-            Some("h264") => Some(film::encode::Codec::H264),
-            Some("ffv1") => Some(film::encode::Codec::Ffv1),
-            Some("mjpeg") => Some(film::encode::Codec::Mjpeg),
-            Some("raw") => Some(film::encode::Codec::Raw),
+            Some("h264") => Some(synth::encode::Codec::H264),
+            Some("ffv1") => Some(synth::encode::Codec::Ffv1),
+            Some("mjpeg") => Some(synth::encode::Codec::Mjpeg),
+            Some("raw") => Some(synth::encode::Codec::Raw),
             Some(other) => {
                 let fault = Fault::new("codec", format!("{other:?} is not one"))
                     .advice("Choose h264, ffv1, mjpeg or raw");
@@ -174,7 +174,7 @@ impl PyFilm {
             reads,
         };
         let done = py.detach(|| {
-            film::write(&self.film, &output, &options, &mut |_| {
+            synth::write(&self.film, &output, &options, &mut |_| {
                 Python::attach(|py| py.check_signals()).map_err(|_| Error::Interrupted)
             })
         });

@@ -7,6 +7,7 @@ mod errors;
 mod film;
 mod images;
 mod live;
+mod rig;
 mod settings;
 mod simulation;
 mod smoothing;
@@ -24,13 +25,14 @@ mod _tracker {
     #[pymodule_export]
     use super::live::{LiveTracker, detect};
     #[pymodule_export]
+    use super::rig::{read_rig, rig_toml, write_rig};
+    #[pymodule_export]
     use super::simulation::{poincare_section, simulate_ensemble, simulate_motion, tangent_growth};
     #[pymodule_export]
     use super::smoothing::{learn_noise, smooth_angles};
     #[pymodule_export]
     use super::tables::{
-        arrow_reader, check_table, damage_words, kind_of, misplaced, read_meta, read_rig, read_table,
-        rig_toml, write_rig, write_table,
+        arrow_reader, check_table, damage_words, kind_of, misplaced, read_meta, read_table, write_table,
     };
     #[pymodule_export]
     use super::track::{check_outputs, fingerprint, info, overlay_film, recording_files, setup, track};

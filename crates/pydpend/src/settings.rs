@@ -86,5 +86,5 @@ pub fn cells(safe_csv: bool) -> Cells {
 
 /// A rig of its JSON, checked.
 pub fn rig(py: Python<'_>, text: Option<&str>) -> PyResult<Option<Rig>> {
-    text.map(crate::tables::rig_of_json).transpose().map_err(|e| raise(py, e))
+    text.map(crate::rig::rig_of_json).transpose().map_err(|e| raise(py, e))
 }

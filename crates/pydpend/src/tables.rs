@@ -16,10 +16,10 @@ use pyo3_arrow::PyRecordBatchReader;
 use tracker::error::{Error, Fault};
 use tracker::gaps::Damage;
 use tracker::kind::{self, Kind};
-use tracker::rig::Rig;
 use tracker::table::{self, NodeTable, Rows, TableMeta};
 
 use crate::errors::{argument, raise, to_python};
+use crate::rig::rig_of_json;
 use crate::settings::cells;
 
 /// Columns as NumPy arrays, and the metadata as JSON.
@@ -149,20 +149,6 @@ pub fn arrow_reader(py: Python<'_>, held: Held<'_>, rig: &str) -> PyResult<PyRec
     Ok(PyRecordBatchReader::new(Box::new(RecordBatchIterator::new(batches, table::schema()))))
 }
 
-/// A rig from its JSON, checked.
-pub fn rig_of_json(text: &str) -> tracker::error::Result<Rig> {
-    let rig: Rig = serde_json::from_str(text).map_err(|e| Error::Rig(Fault::new("rig", e.to_string())))?;
-    rig.check("rig")?;
-    Ok(rig)
-}
-
-/// Reads a rig file and gives it as JSON.
-#[pyfunction]
-pub fn read_rig(py: Python<'_>, path: PathBuf) -> PyResult<String> {
-    let rig = Rig::read(&path).map_err(|e| raise(py, e))?;
-    rig_json(&rig).map_err(|e| raise(py, e))
-}
-
 /// What a file or folder is: the name of a `tracker::kind::Kind`.
 #[pyfunction]
 pub fn kind_of(path: PathBuf) -> &'static str {
@@ -175,21 +161,4 @@ pub fn misplaced(py: Python<'_>, path: PathBuf, wanted: Vec<String>) -> PyResult
     let known = |name: &String| Kind::ALL.into_iter().find(|k| k.name() == name);
     let wanted: Vec<Kind> = wanted.iter().filter_map(known).collect();
     kind::misplaced(&path, &wanted).map(|fault| to_python(py, &fault.message())).transpose()
-}
-
-/// A rig as JSON.
-pub fn rig_json(rig: &Rig) -> tracker::error::Result<String> {
-    serde_json::to_string(rig).map_err(|e| Error::Rig(Fault::new("rig", e.to_string())))
-}
-
-/// Writes a rig, given as JSON, as TOML.
-#[pyfunction]
-pub fn write_rig(py: Python<'_>, path: PathBuf, rig: &str) -> PyResult<()> {
-    rig_of_json(rig).and_then(|r| r.write(&path)).map_err(|e| raise(py, e))
-}
-
-/// A rig's TOML from its JSON.
-#[pyfunction]
-pub fn rig_toml(py: Python<'_>, rig: &str) -> PyResult<String> {
-    rig_of_json(rig).and_then(|r| r.to_toml()).map_err(|e| raise(py, e))
 }

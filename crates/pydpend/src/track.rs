@@ -15,8 +15,9 @@ use tracker::source;
 use tracker::table::{Fingerprint, SourceFacts};
 
 use crate::errors::{argument, raise, to_python};
+use crate::rig::rig_json;
 use crate::settings::{DetectArguments, OpenArguments, cells, detect_settings, open_options, rig};
-use crate::tables::{Columns, Held, columns, rig_json, table_of};
+use crate::tables::{Columns, Held, columns, table_of};
 use crate::watch::Watch;
 
 /// Frames from the first up to but not with the last; `None` is to the end.

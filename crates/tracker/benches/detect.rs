@@ -22,10 +22,10 @@ use opencv::imgproc::{self, CHAIN_APPROX_NONE, RETR_EXTERNAL, THRESH_BINARY};
 use opencv::prelude::*;
 use rayon::prelude::*;
 use tracker::detect::{DetectSettings, Detection, Detector, Levels};
-use tracker::film::scene::{Link, Marker};
-use tracker::film::{Film, Scene, WriteOptions, preset, write};
 use tracker::frame::Frame;
 use tracker::pipeline::{Observer, RunSettings, Stage, run};
+use tracker::synth::scene::{Link, Marker};
+use tracker::synth::{Film, Scene, WriteOptions, preset, write};
 
 const SIZE: [u32; 2] = [1280, 1024];
 const FRAMES: u64 = 16;

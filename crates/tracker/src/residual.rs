@@ -75,7 +75,7 @@ pub fn residuals(rig: &Rig, rows: &Rows) -> Vec<NodeMotion> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::preset;
+    use crate::synth::preset;
     use crate::track::tests::bed::{Bed, QUIET, hide};
 
     #[test]

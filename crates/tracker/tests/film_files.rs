@@ -5,14 +5,14 @@
 use std::path::Path;
 
 use opencv::prelude::MatTraitConst;
-use tracker::film::encode::Codec;
-use tracker::film::scene::{LinkMotion, Marker};
-use tracker::film::{Film, Scene, Truth, WriteOptions, preset, write};
 use tracker::frame::TimeBase;
 use tracker::pipeline::{RunSettings, Silent, run};
 use tracker::score::{LIMIT_PX, Tracked, score};
 use tracker::setup::{Setup, find};
 use tracker::source::{Ending, OpenOptions, open};
+use tracker::synth::encode::Codec;
+use tracker::synth::scene::{LinkMotion, Marker};
+use tracker::synth::{Film, Scene, Truth, WriteOptions, preset, write};
 
 /// The paper's layout in a small image, 12 frames.
 fn scene(depth_bits: u32) -> Scene {

@@ -6,7 +6,7 @@ mod films;
 
 use films::Filmed;
 use rayon::prelude::*;
-use tracker::film::preset;
+use tracker::synth::preset;
 
 #[test]
 fn on_films_never_tuned_on_no_name_is_wrong_and_what_is_seen_is_named() {

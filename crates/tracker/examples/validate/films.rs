@@ -5,14 +5,14 @@ use std::sync::Arc;
 use anyhow::Result;
 use tracker::detect::{DetectSettings, Detector, Levels};
 use tracker::discover::discover;
-use tracker::film::{Film, Scene, Truth};
 use tracker::frame::FrameSource;
 use tracker::observation::Status;
 use tracker::rig::Rig;
 use tracker::score::{LIMIT_PX, Score, Tracked, score};
-use tracker::source::synthetic::SyntheticSource;
 use tracker::stop::Stop;
 use tracker::store::{DetectionStore, FrameStamp};
+use tracker::synth::SyntheticSource;
+use tracker::synth::{Film, Scene, Truth};
 use tracker::track::track_recording;
 
 /// Frames whose detections are learned from, as in `pipeline`.

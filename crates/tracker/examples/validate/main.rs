@@ -19,9 +19,9 @@ use std::process::ExitCode;
 use anyhow::{Context, Result, bail};
 use films::{Filmed, Followed};
 use rayon::prelude::*;
-use tracker::film::{NodeTruth, PRESETS, preset};
 use tracker::observation::Status;
 use tracker::score::{FULL, HALF, LIMIT_PX, Score, Tracked};
+use tracker::synth::{NodeTruth, PRESETS, preset};
 
 struct Outcome {
     score: Score,

@@ -2,7 +2,7 @@
 //! Any bytes as a `.cihx`, bare and inside its envelope.
 
 use libfuzzer_sys::fuzz_target;
-use tracker_fuzz::source::mraw::header::Header;
+use tracker_fuzz::source::mraw::Header;
 
 fuzz_target!(|bytes: &[u8]| {
     for wrapped in [bytes.to_vec(), [b"<cih>".as_slice(), bytes, b"</cih>"].concat()] {

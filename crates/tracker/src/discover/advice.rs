@@ -137,8 +137,8 @@ fn not_at_rest(rig: &Rig, rows: &Rows) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::scene::LinkMotion;
-    use crate::film::{Scene, preset};
+    use crate::synth::scene::LinkMotion;
+    use crate::synth::{Scene, preset};
     use crate::track::tests::bed::{Bed, QUIET, scene, tumble};
 
     fn advice(scene: &Scene) -> Vec<String> {

@@ -8,15 +8,16 @@ use opencv::core::{Mat, Rect};
 use opencv::imgproc;
 use opencv::prelude::*;
 
-use super::{Overlay, failed};
+use super::draw::Overlay;
+use super::picture::failed;
 use crate::error::{Error, Fault, Result};
-use crate::film::encode::{Codec, VideoSettings, VideoWriter};
 use crate::frame::TimeBase;
 use crate::message::Setting;
 use crate::observation::Observation;
 use crate::output;
 use crate::pipeline::{self, Observer, Stage};
 use crate::source::{self, OpenOptions};
+use crate::synth::encode::{Codec, VideoSettings, VideoWriter};
 use crate::table::NodeTable;
 
 /// How the film with the drawings is written.

@@ -8,7 +8,6 @@ use opencv::core::{Mat, Size, Vector};
 use opencv::prelude::*;
 use opencv::{imgcodecs, imgproc};
 
-use super::failed;
 use crate::error::{Error, Fault, Result};
 use crate::frame::{Frame, PixelFormat};
 use crate::name::text;
@@ -109,6 +108,10 @@ pub fn save(picture: &Mat, path: &Path) -> Result<()> {
     }
     output::write(path, bytes.as_slice())
         .map_err(|e| Error::Film(Fault::new(&name, format!("the picture cannot be written ({e})"))))
+}
+
+pub(super) fn failed(e: opencv::Error) -> Error {
+    Error::Film(Fault::new("overlay", format!("drawing failed ({e})")))
 }
 
 #[cfg(test)]

@@ -3,8 +3,8 @@
 //! Owns: [`Comparison`]. Must not: read tables.
 
 use super::result::{AngleError, FULL, HALF, Match, Reacquisition, Score, Tracked};
-use crate::error::Result;
-use crate::film::Truth;
+use crate::error::{Error, Fault, Result};
+use crate::synth::Truth;
 
 /// A table and a truth, frame by frame.
 pub(super) struct Comparison<'a> {
@@ -255,4 +255,44 @@ impl Comparison<'_> {
 
 fn part(some: u64, all: u64) -> f64 {
     if all == 0 { 1.0 } else { some as f64 / all as f64 }
+}
+
+/// Distance within which a place agrees with a marker, px.
+pub const LIMIT_PX: f64 = 2.0;
+
+/// Compares a table with the truth; `limit_px` is [`LIMIT_PX`] unless there is a reason.
+///
+/// # Errors
+/// [`Error::Argument`] if the two have no frame in common or the lengths do not fit.
+pub fn score(tracked: &Tracked, truth: &Truth, limit_px: f64) -> Result<Score> {
+    let n = tracked.nodes.len();
+    if n == 0 || tracked.xy_px.len() != n * tracked.frames.len() {
+        return Err(Error::Argument(Fault::new(
+            "nodes",
+            format!("{} places for {} frames of {n} nodes", tracked.xy_px.len(), tracked.frames.len()),
+        )));
+    }
+    let rows = pair_frames(tracked, truth);
+    if rows.is_empty() {
+        return Err(Error::Argument(
+            Fault::new("nodes", "no frame is both in the table and in the truth")
+                .advice("Give the truth of the same film"),
+        ));
+    }
+    Comparison { tracked, truth, rows, limit2: limit_px * limit_px }.score()
+}
+
+/// (row of the table, row of the truth) of each frame that both have.
+fn pair_frames(tracked: &Tracked, truth: &Truth) -> Vec<(usize, usize)> {
+    let mut pairs = Vec::new();
+    let mut i = 0;
+    for (k, frame) in truth.frames.iter().enumerate() {
+        while i < tracked.frames.len() && tracked.frames[i] < frame.frame {
+            i += 1;
+        }
+        if tracked.frames.get(i) == Some(&frame.frame) {
+            pairs.push((i, k));
+        }
+    }
+    pairs
 }

@@ -5,7 +5,7 @@
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-use super::file::{json_beside, write_fault};
+use super::shared::{json_beside, write_fault};
 use super::{COLUMNS, Rows, STATUS_WORDS, TableMeta};
 use crate::csv_text::Cells;
 use crate::error::{Error, Fault, Result};

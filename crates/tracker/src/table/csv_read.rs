@@ -6,7 +6,7 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, ErrorKind};
 use std::path::{Path, PathBuf};
 
-use super::file::{json_beside, read_fault};
+use super::shared::{json_beside, read_fault};
 use super::{COLUMNS, NodeTable, Rows, STATUS_WORDS, TableMeta};
 use crate::csv_text::{read_cell, split};
 use crate::error::{Error, Fault, Place, Result};

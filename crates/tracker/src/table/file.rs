@@ -2,21 +2,17 @@
 //!
 //! Owns: [`Form`], [`TableWriter`], [`read_table`]. Must not: know how a form looks inside.
 
-use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use super::check::{Before, first_fault};
+use super::shared::{GROUP_ROWS, json_beside};
 use super::{NodeTable, Rows, TableMeta, csv, csv_read, parquet, parquet_read, row_fault};
 use crate::csv_text::Cells;
 use crate::error::{Error, Fault, Result};
 use crate::kind::{self, Kind};
-use crate::message::{Setting, TRACK};
 use crate::name::text;
 use crate::observation::Observation;
 use crate::rig::Rig;
-
-/// Rows of a Parquet row group, and of what is held in memory before it is written, about 5 MB.
-pub(super) const GROUP_ROWS: usize = 1 << 17;
 
 /// The form of a table's file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -43,13 +39,6 @@ impl Form {
             )),
         }
     }
-}
-
-/// The file with a CSV's metadata: `drop.csv` has `drop.csv.json`.
-pub(super) fn json_beside(path: &Path) -> PathBuf {
-    let mut name = path.as_os_str().to_owned();
-    name.push(".json");
-    PathBuf::from(name)
 }
 
 /// The files that a table at `path` is made of.
@@ -142,6 +131,26 @@ impl TableWriter {
     }
 }
 
+impl NodeTable {
+    /// Writes it to `path`, as Parquet or CSV by the ending, first under a temporary name; `cells` is how a CSV writes
+    /// names.
+    ///
+    /// # Errors
+    /// [`Error::Table`] if it is not valid or cannot be written.
+    pub fn write(&self, path: &Path, cells: Cells) -> Result<()> {
+        self.check(&text(path))?;
+        let nodes = self.nodes();
+        let mut writer = TableWriter::create(path, &self.meta.rig, cells)?;
+        let mut seen = Vec::with_capacity(nodes);
+        for t in 0..self.frames() {
+            seen.clear();
+            seen.extend((0..nodes).filter_map(|n| self.rows.observation(t, n, nodes)));
+            writer.push(self.rows.frame[t] as u64, self.rows.time_s[t], &seen)?;
+        }
+        writer.finish(&self.meta)
+    }
+}
+
 /// Reads and checks a table, Parquet or CSV by the ending.
 ///
 /// # Errors
@@ -166,21 +175,4 @@ pub fn read_meta(path: &Path) -> Result<TableMeta> {
         Form::Parquet => parquet_read::read_meta(path),
         Form::Csv => csv_read::read_meta(path),
     }
-}
-
-pub(super) fn read_fault(path: &Path, e: &std::io::Error) -> Error {
-    Error::Table(
-        Fault::new(text(path), format!("it cannot be read ({e})")).advice("Give a table written by " + TRACK),
-    )
-}
-
-pub(super) fn write_fault(path: &Path, e: &std::io::Error) -> Error {
-    let advice = match e.kind() {
-        ErrorKind::StorageFull | ErrorKind::QuotaExceeded => {
-            "Free some space and run again with " + Setting::Resume
-        }
-        ErrorKind::InvalidFilename => "Choose a shorter name".into(),
-        _ => "Choose a folder that can be written".into(),
-    };
-    Error::Table(Fault::new(text(path), format!("it cannot be written ({e})")).advice(advice))
 }

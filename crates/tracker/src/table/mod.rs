@@ -21,149 +21,16 @@ mod fingerprint;
 mod meta;
 mod parquet;
 mod parquet_read;
+mod rows;
+mod shared;
 mod tally;
 #[cfg(test)]
 pub(crate) mod tests;
-
-use std::path::Path;
 
 pub use self::parquet::{batch, schema};
 pub use file::{Form, TableWriter, read_meta, read_table, table_files};
 pub use fingerprint::{Fingerprint, changed};
 pub use meta::{RunEnding, SCHEMA_VERSION, SourceFacts, TableMeta};
+use rows::row_fault;
+pub use rows::{COLUMNS, NodeTable, Rows, STATUS_WORDS};
 pub use tally::{NodeSummary, Tally};
-
-use crate::csv_text::Cells;
-use crate::observation::{Observation, Status};
-
-/// Columns of the table in their order.
-pub const COLUMNS: [&str; 9] =
-    ["frame", "time_s", "node", "body", "x_px", "y_px", "sigma_px", "area_px", "status"];
-
-/// The words of the column `status`, by their number in [`Rows::status`].
-pub const STATUS_WORDS: [&str; 5] = ["missing", "seen", "reacquired", "ambiguous", "undecoded"];
-
-/// T frames of N nodes, column by column. What is not seen is NaN.
-#[derive(Debug, Clone, Default)]
-pub struct Rows {
-    /// Index in the recording, (T,).
-    pub frame: Vec<i64>,
-    /// Time in s, (T,).
-    pub time_s: Vec<f64>,
-    /// Centres in px, (T, N, 2): x right, y down.
-    pub xy_px: Vec<f64>,
-    /// Standard uncertainty of each coordinate in px, (T, N).
-    pub sigma_px: Vec<f32>,
-    /// Blob area in px, (T, N).
-    pub area_px: Vec<f32>,
-    /// [`Status`] as a number, (T, N).
-    pub status: Vec<u8>,
-}
-
-impl Rows {
-    /// Number of frames.
-    pub fn frames(&self) -> usize {
-        self.frame.len()
-    }
-
-    /// Adds one frame; `observations` is in the order of the rig's nodes.
-    pub fn push(&mut self, frame: u64, time_s: f64, observations: &[Observation]) {
-        self.frame.push(frame as i64);
-        self.time_s.push(time_s);
-        for o in observations {
-            // Only what is seen has a place; whatever else the caller holds is not part of the table.
-            let o = if o.status.is_seen() {
-                *o
-            } else {
-                Observation { status: o.status, ..Observation::MISSING }
-            };
-            self.xy_px.extend([o.x_px, o.y_px]);
-            self.sigma_px.push(o.sigma_px);
-            self.area_px.push(o.area_px);
-            self.status.push(o.status as u8);
-        }
-    }
-
-    /// Empties it and keeps its memory.
-    pub fn clear(&mut self) {
-        self.frame.clear();
-        self.time_s.clear();
-        self.xy_px.clear();
-        self.sigma_px.clear();
-        self.area_px.clear();
-        self.status.clear();
-    }
-
-    /// The observation of node `n` of `nodes` in the `t`-th frame; `None` outside.
-    pub fn observation(&self, t: usize, n: usize, nodes: usize) -> Option<Observation> {
-        let k = t * nodes + n;
-        (n < nodes && t < self.frames()).then(|| Observation {
-            x_px: self.xy_px[2 * k],
-            y_px: self.xy_px[2 * k + 1],
-            sigma_px: self.sigma_px[k],
-            area_px: self.area_px[k],
-            status: Status::from_number(self.status[k]).unwrap_or_default(),
-        })
-    }
-
-    /// Whether all values are the same, bit for bit but for NaN.
-    pub fn same(&self, other: &Self) -> bool {
-        let same64 = |a: &[f64], b: &[f64]| {
-            a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a == b || (a.is_nan() && b.is_nan()))
-        };
-        let same32 = |a: &[f32], b: &[f32]| {
-            a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a == b || (a.is_nan() && b.is_nan()))
-        };
-        self.frame == other.frame
-            && same64(&self.time_s, &other.time_s)
-            && same64(&self.xy_px, &other.xy_px)
-            && same32(&self.sigma_px, &other.sigma_px)
-            && same32(&self.area_px, &other.area_px)
-            && self.status == other.status
-    }
-}
-
-/// A node table with all that is known of where it comes from.
-#[derive(Debug, Clone)]
-pub struct NodeTable {
-    /// Rig, recording, settings, ending.
-    pub meta: TableMeta,
-    /// The rows.
-    pub rows: Rows,
-}
-
-impl NodeTable {
-    /// Number of nodes N.
-    pub fn nodes(&self) -> usize {
-        self.meta.rig.nodes.len()
-    }
-
-    /// Number of frames T.
-    pub fn frames(&self) -> usize {
-        self.rows.frames()
-    }
-
-    /// Writes it to `path`, as Parquet or CSV by the ending, first under a temporary name; `cells` is how a CSV writes
-    /// names.
-    ///
-    /// # Errors
-    /// [`crate::error::Error::Table`] if it is not valid or cannot be written.
-    pub fn write(&self, path: &Path, cells: Cells) -> crate::error::Result<()> {
-        self.check(&crate::name::text(path))?;
-        let nodes = self.nodes();
-        let mut writer = TableWriter::create(path, &self.meta.rig, cells)?;
-        let mut seen = Vec::with_capacity(nodes);
-        for t in 0..self.frames() {
-            seen.clear();
-            seen.extend((0..nodes).filter_map(|n| self.rows.observation(t, n, nodes)));
-            writer.push(self.rows.frame[t] as u64, self.rows.time_s[t], &seen)?;
-        }
-        writer.finish(&self.meta)
-    }
-}
-
-/// A fault that names a row of a table, counted from 0 over all its rows.
-fn row_fault(name: &str, row: usize, problem: String) -> crate::error::Error {
-    use crate::error::{Error, Fault, Place};
-    Error::Table(Fault::new(name, problem).at(Place::Row(row as u64)))
-}

@@ -21,7 +21,7 @@ use arrow::buffer::{NullBuffer, ScalarBuffer};
 use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
 use arrow::record_batch::RecordBatch;
 
-use super::file::{GROUP_ROWS, write_fault};
+use super::shared::{GROUP_ROWS, write_fault};
 use super::{COLUMNS, Rows, STATUS_WORDS, TableMeta};
 use crate::error::{Error, Fault, Result};
 use crate::output::NewFile;

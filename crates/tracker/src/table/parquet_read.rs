@@ -21,8 +21,8 @@ use arrow::datatypes::{DataType, FieldRef, Float32Type, Float64Type, Int32Type, 
 use bytes::Bytes;
 use rayon::prelude::*;
 
-use super::file::read_fault;
 use super::parquet::KEY_PREFIX;
+use super::shared::read_fault;
 use super::{COLUMNS, NodeTable, Rows, STATUS_WORDS, TableMeta, row_fault};
 use crate::error::{Error, Fault, Place, Result};
 use crate::message::TRACK;

@@ -2,10 +2,13 @@
 
 use proptest::prelude::*;
 
+use std::path::Path;
+
 use super::*;
 use crate::csv_text::Cells;
 use crate::frame::RateOrigin;
 use crate::gaps::Damage;
+use crate::observation::{Observation, Status};
 use crate::pixel_aspect::PixelAspect;
 use crate::rig::{Body, Joint, Node, Rig};
 

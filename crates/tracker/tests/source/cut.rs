@@ -4,9 +4,9 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use tracker::brightest::brightest;
-use tracker::film::{Film, WriteOptions, preset, write};
 use tracker::pipeline::{Observer, RunSettings, Stage, run};
 use tracker::source::{OpenOptions, open};
+use tracker::synth::{Film, WriteOptions, preset, write};
 
 const COUNT: u64 = 60;
 const WORDS: &str = "the file became shorter while it was read";

@@ -6,6 +6,7 @@ use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser, Subcommand};
 
+use crate::words::CommandLine;
 use crate::{check, completions, film, info, overlay, score, setup, track};
 
 /// A film of markers on rigid links in; where each marker is in each frame out.
@@ -45,9 +46,9 @@ enum Command {
 }
 
 impl Cli {
-    /// The name of the subcommand.
-    pub fn subcommand(&self) -> &'static str {
-        match self.command {
+    /// The subcommand's way of writing settings and steps.
+    pub fn front(&self) -> CommandLine {
+        let subcommand = match self.command {
             Command::Info(_) => "info",
             Command::Setup(_) => "setup",
             Command::Track(_) => "track",
@@ -56,15 +57,16 @@ impl Cli {
             Command::Film(_) => "film",
             Command::Score(_) => "score",
             Command::Completions(_) => "completions",
-        }
+        };
+        CommandLine::new(Self::command(), subcommand)
     }
 
     /// Runs the subcommand.
-    pub fn run(self) -> anyhow::Result<ExitCode> {
+    pub fn run(self, front: &CommandLine) -> anyhow::Result<ExitCode> {
         match self.command {
-            Command::Info(args) => info::run(args),
-            Command::Setup(args) => setup::run(args),
-            Command::Track(args) => track::run(args),
+            Command::Info(args) => info::run(args, front),
+            Command::Setup(args) => setup::run(args, front),
+            Command::Track(args) => track::run(args, front),
             Command::Overlay(args) => overlay::run(args),
             Command::Check(args) => check::run(args),
             Command::Film(args) => film::run(args),

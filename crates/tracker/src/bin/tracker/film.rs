@@ -5,10 +5,10 @@ use std::process::ExitCode;
 
 use tracker::csv_text::Cells;
 use tracker::error::Error;
-use tracker::film::encode::Codec;
-use tracker::film::{Film, MotionTable, PRESETS, Scene, WriteOptions, film_files, preset, write};
 use tracker::output;
 use tracker::pipeline::{Observer, Stage};
+use tracker::synth::encode::Codec;
+use tracker::synth::{Film, MotionTable, PRESETS, Scene, WriteOptions, film_files, preset, write};
 
 use crate::print;
 use crate::watch::Watch;

@@ -65,16 +65,16 @@ struct Times {
 }
 
 /// Runs the subcommand.
-pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+pub fn run(args: Args, front: &CommandLine) -> anyhow::Result<ExitCode> {
     // What film is can be told of interlaced film too.
     let options = args.decode.options(args.fps, OpenOptions::default().threads, Interlaced::AsFrames);
     let mut source = open(&text(&args.input), &options)?;
     let seen = look(&mut *source, args.count)?;
     let times = times(&*source, &seen)?;
     if args.json {
-        print::json(&as_json(&*source, &seen, &times))?;
+        print::json(&as_json(&*source, &seen, &times, front))?;
     } else {
-        print::lines(&as_text(&*source, &seen, &times))?;
+        print::lines(&as_text(&*source, &seen, &times, front))?;
     }
     let early = matches!(seen.ending, Some(Ending::Early { .. }));
     Ok(ExitCode::from(u8::from(early || seen.damage.is_damaged())))
@@ -175,7 +175,7 @@ fn ending_words(ending: &Ending, damage: &Damage) -> String {
     }
 }
 
-fn as_text(source: &dyn FrameSource, seen: &Seen, times: &Times) -> String {
+fn as_text(source: &dyn FrameSource, seen: &Seen, times: &Times, front: &CommandLine) -> String {
     let info = source.info();
     let mut rows: Vec<(String, String)> = Vec::new();
     let mut row = |word: &str, value: String| rows.push((word.to_owned(), value));
@@ -202,8 +202,8 @@ fn as_text(source: &dyn FrameSource, seen: &Seen, times: &Times) -> String {
     if let Some(brightest) = seen.brightest {
         row("brightest", format!("{brightest} of {}", (1u32 << info.depth_bits) - 1));
     }
-    let (timing, words) = (&times.timing, CommandLine::of("info"));
-    row("rate", words.say(&rate_words(timing)));
+    let timing = &times.timing;
+    row("rate", front.say(&rate_words(timing)));
     let of = if seen.is_whole {
         String::new()
     } else {
@@ -229,10 +229,10 @@ fn as_text(source: &dyn FrameSource, seen: &Seen, times: &Times) -> String {
         row("warning", dropped);
     }
     for note in &notes(timing) {
-        row("note", words.say(note));
+        row("note", front.say(note));
     }
     for warning in &info.warnings {
-        row("warning", words.say(warning));
+        row("warning", front.say(warning));
     }
     rows.iter().map(|(word, value)| format!("{word:<14} {}\n", shown(value))).collect()
 }
@@ -242,7 +242,7 @@ fn packets(seen: &Seen) -> Option<u64> {
     (seen.is_whole && seen.counted.is_none()).then(|| seen.steps.len())
 }
 
-fn as_json(source: &dyn FrameSource, seen: &Seen, times: &Times) -> Value {
+fn as_json(source: &dyn FrameSource, seen: &Seen, times: &Times, front: &CommandLine) -> Value {
     let info = source.info();
     let details: serde_json::Map<String, Value> =
         info.details.iter().map(|(k, v)| (k.clone(), Value::from(v.clone()))).collect();
@@ -278,7 +278,7 @@ fn as_json(source: &dyn FrameSource, seen: &Seen, times: &Times) -> Value {
         "first_times_s": times.first_s,
         "size_bytes": info.size_bytes,
         "details": details,
-        "warnings": info.warnings.iter().map(|w| CommandLine::of("info").say(w)).collect::<Vec<_>>(),
+        "warnings": info.warnings.iter().map(|w| front.say(w)).collect::<Vec<_>>(),
         "ending": ending,
     })
 }

@@ -31,8 +31,8 @@ fn main() -> ExitCode {
             return ExitCode::from(2);
         }
     };
-    let front = words::CommandLine::of(cli.subcommand());
-    match watch::listen().and_then(|()| cli.run()) {
+    let front = cli.front();
+    match watch::listen().and_then(|()| cli.run(&front)) {
         Ok(status) => status,
         // Whoever reads our output may stop reading it.
         Err(error) if error.downcast_ref().is_some_and(is_closed) => ExitCode::SUCCESS,

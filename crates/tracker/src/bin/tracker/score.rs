@@ -4,8 +4,8 @@ use std::fmt::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use tracker::film::Truth;
 use tracker::score::{LIMIT_PX, Score, Tracked, score};
+use tracker::synth::Truth;
 use tracker::table::read_table;
 
 use crate::print;

@@ -40,7 +40,7 @@ pub struct Args {
 }
 
 /// Runs it.
-pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+pub fn run(args: Args, front: &CommandLine) -> anyhow::Result<ExitCode> {
     let picture = args.picture.clone().unwrap_or_else(|| args.output.with_extension("png"));
     let input = text(&args.input);
     let outputs = [args.output.clone(), picture.clone()];
@@ -60,7 +60,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     overlay::save(&found.picture, &picture)?;
     rig.write(&args.output)?;
     for warning in &found.warnings {
-        print::say(format!("note: {}", CommandLine::of("setup").say(warning)));
+        print::say(format!("note: {}", front.say(warning)));
     }
     if !args.quiet {
         let mut out = String::new();

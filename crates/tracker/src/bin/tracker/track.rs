@@ -87,11 +87,10 @@ impl Args {
 }
 
 /// Runs it.
-pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+pub fn run(args: Args, front: &CommandLine) -> anyhow::Result<ExitCode> {
     let mut watch = Watch::new(args.quiet);
     let outcome = run_pipeline(&args.settings()?, &mut watch);
     watch.finish();
-    let front = CommandLine::of("track");
     let state = partial_path(&args.output);
     if matches!(outcome, Err(Error::Interrupted)) && state.exists() {
         let state = text(&state);
@@ -132,14 +131,14 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         RunEnding::Complete => 0,
     };
     if args.json {
-        print_json(&args, &summary, status)?;
+        print_json(&args, &summary, status, front)?;
     } else if !args.quiet {
         print_text(&args, &summary)?;
     }
     Ok(ExitCode::from(status))
 }
 
-fn print_json(args: &Args, summary: &RunSummary, status: u8) -> anyhow::Result<()> {
+fn print_json(args: &Args, summary: &RunSummary, status: u8, front: &CommandLine) -> anyhow::Result<()> {
     let value = serde_json::json!({
         "output": shown(&text(&args.output)),
         "status": status,
@@ -149,7 +148,7 @@ fn print_json(args: &Args, summary: &RunSummary, status: u8) -> anyhow::Result<(
         "resumed_frames": summary.resumed,
         "lost": summary.lost(),
         "nodes": summary.nodes,
-        "warnings": summary.warnings.iter().map(|w| CommandLine::of("track").say(w)).collect::<Vec<_>>(),
+        "warnings": summary.warnings.iter().map(|w| front.say(w)).collect::<Vec<_>>(),
         "source": summary.meta.source,
     });
     print::json(&value)

@@ -1,18 +1,16 @@
 //! What the library says, in the words of the command line: settings are flags, steps are commands to type.
 
-use clap::CommandFactory;
 use tracker::message::{FrontEnd, Message, Setting};
-
-use crate::args::Cli;
 
 /// The command line at the subcommand that runs. A setting that it has not is named with a subcommand that has it.
 pub struct CommandLine {
+    whole: clap::Command,
     subcommand: &'static str,
 }
 
 impl CommandLine {
-    pub fn of(subcommand: &'static str) -> Self {
-        Self { subcommand }
+    pub fn new(whole: clap::Command, subcommand: &'static str) -> Self {
+        Self { whole, subcommand }
     }
 
     /// A message as this subcommand's user types it.
@@ -22,10 +20,9 @@ impl CommandLine {
 
     /// A subcommand with this flag, and whether it is the one that runs.
     fn owner(&self, flag: &str) -> Option<String> {
-        let whole = Cli::command();
         let has = |c: &clap::Command| c.get_arguments().any(|a| a.get_long() == Some(flag));
-        let here = whole.find_subcommand(self.subcommand).filter(|c| has(c));
-        here.or_else(|| whole.get_subcommands().find(|c| has(c))).map(|c| c.get_name().to_owned())
+        let here = self.whole.find_subcommand(self.subcommand).filter(|c| has(c));
+        here.or_else(|| self.whole.get_subcommands().find(|c| has(c))).map(|c| c.get_name().to_owned())
     }
 }
 

@@ -9,8 +9,8 @@ use rand_chacha::ChaCha8Rng;
 
 use super::detect;
 use crate::detect::{Centroid, DetectSettings, Detection, Flags, Levels};
-use crate::film::Film;
-use crate::film::scene::{Camera, Light, Link, Marker, SCENE_SCHEMA, Scene};
+use crate::synth::Film;
+use crate::synth::scene::{Camera, Light, Link, Marker, SCENE_SCHEMA, Scene};
 
 /// Markers of one kind, each on a body of its own that flies straight on.
 struct Kind {

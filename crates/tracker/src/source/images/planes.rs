@@ -8,7 +8,7 @@ use std::io::{Read, Seek};
 use tiff::decoder::Decoder;
 use tiff::tags::Tag;
 
-use super::page::Layout;
+use super::tiff_layout::Layout;
 use crate::source::raw::Stored;
 
 /// MetaMorph's table of times and heights, an entry for each picture.

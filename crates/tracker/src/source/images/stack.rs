@@ -5,11 +5,10 @@ use std::io::BufReader;
 
 use tiff::decoder::Decoder;
 
-use super::page::{self, Layout};
-use super::picture::Picture;
-use super::pixel_size;
+use super::picture::{Picture, format, frame, rate};
 use super::planes::{self, Planes};
-use super::{format, frame, rate};
+use super::tiff_layout::{Layout, is_reduced};
+use super::{pixel_size, tiff_page};
 use crate::error::{Error, Fault, Result};
 use crate::frame::{Ending, Frame, FrameSource, RateClaims, SourceInfo};
 use crate::message::Message;
@@ -44,7 +43,7 @@ impl Pages {
     fn open(name: &str) -> Result<Self> {
         let mut pages = Self { decoder: decoder(name)?, whole_only: true };
         // A file of nothing but small copies is one of small pictures.
-        if page::is_reduced(&mut pages.decoder) && pages.turn() != Ok(true) {
+        if is_reduced(&mut pages.decoder) && pages.turn() != Ok(true) {
             pages = Self { decoder: decoder(name)?, whole_only: false };
         }
         Ok(pages)
@@ -57,7 +56,7 @@ impl Pages {
                 return Ok(false);
             }
             self.decoder.next_image().map_err(|e| e.to_string())?;
-            if !(self.whole_only && page::is_reduced(&mut self.decoder)) {
+            if !(self.whole_only && is_reduced(&mut self.decoder)) {
                 return Ok(true);
             }
         }
@@ -136,7 +135,7 @@ impl StackSource {
                 ending: Ending::Complete,
             });
         }
-        let first = page::page(&mut pages.decoder).map_err(unreadable)?;
+        let first = tiff_page::read(&mut pages.decoder).map_err(unreadable)?;
         (info.depth_bits, info.format) = (first.depth_bits, format(first.depth_bits));
         info.converted_from = first.converted_from;
         Ok(Self {
@@ -151,7 +150,7 @@ impl StackSource {
         if next > 0 && !pages.turn()? {
             return Ok(None);
         }
-        page::page(&mut pages.decoder).map(Some)
+        tiff_page::read(&mut pages.decoder).map(Some)
     }
 
     /// The end that comes before all that the description declares.
@@ -244,7 +243,7 @@ impl FrameSource for StackSource {
                 break;
             }
             if wanted.next_if_eq(&at).is_some() {
-                let picture = page::page(&mut reader.decoder).ok();
+                let picture = tiff_page::read(&mut reader.decoder).ok();
                 frames.extend(Some(frame(&self.info, at, picture)).filter(|f| f.plane.is_some()));
             }
         }

@@ -5,7 +5,7 @@
 
 use std::collections::HashMap;
 
-use super::header::{Header, Names};
+use super::fields::{Header, Names};
 use crate::error::Result;
 
 const NAMES: Names = Names {

@@ -6,13 +6,13 @@ use rand_distr::{Distribution, Normal};
 
 use crate::detect::{Detection, Flags};
 use crate::discover::{Discovery, discover};
-use crate::film::scene::{Hidden, Link, LinkMotion, Marker};
-use crate::film::{Film, MotionTable, Scene, Truth, preset};
 use crate::observation::Status;
 use crate::rig::Rig;
 use crate::score::{LIMIT_PX, Score, Tracked, score};
 use crate::stop::Stop;
 use crate::store::{DetectionStore, FrameStamp};
+use crate::synth::scene::{Hidden, Link, LinkMotion, Marker};
+use crate::synth::{Film, MotionTable, Scene, Truth, preset};
 use crate::table::Rows;
 use crate::track::track_recording;
 

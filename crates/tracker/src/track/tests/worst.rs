@@ -1,9 +1,9 @@
 //! The worst cases, made on purpose: names stay open where nothing decides, and are never wrong.
 
 use super::bed::{Bed, Faults, QUIET, hide, scene, tumble};
-use crate::film::scene::{Distractor, LinkMotion, Marker};
-use crate::film::{MotionTable, Scene, preset};
 use crate::observation::{Observation, Status};
+use crate::synth::scene::{Distractor, LinkMotion, Marker};
+use crate::synth::{MotionTable, Scene, preset};
 use crate::track::Tracker;
 
 const PIVOT: [f64; 2] = [360.0, 360.0];

@@ -4,8 +4,8 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use super::Film;
 use super::encode::cannot_write;
+use super::film::Film;
 use crate::error::{Error, Fault, Place, Result};
 use crate::name::text;
 use crate::output::NewFile;

@@ -2,6 +2,7 @@
 
 use super::scene::*;
 use super::*;
+use crate::frame::TimeBase;
 use rayon::prelude::*;
 
 fn scene(text: &str) -> Scene {

@@ -12,7 +12,7 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
-use super::Film;
+use super::film::Film;
 use super::sink::{Sink, files};
 use super::truth_table::TruthWriter;
 use super::write_options::WriteOptions;

@@ -1,21 +1,15 @@
-//! The detections of a whole recording, kept while the rig is found and the markers are followed.
+//! Keeps the detections of a whole recording, in memory and past a bound on disk.
 //!
-//! Owns: [`FrameStamp`], [`DetectionStore`]. A recording is decoded once; its detections are small, yet those of
-//! an hour are not: past a bound they go to disk, in blocks, and memory does not grow with the recording.
-//! Must not: know what a detection is followed into.
-
-mod block;
-mod spool;
-mod stamp;
+//! Owns: [`DetectionStore`]. Must not: know what a detection is followed into.
 
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
+use super::block::{BLOCK_FRAMES, Block};
+use super::spool::{Finished, Spool};
+use super::stamp::FrameStamp;
 use crate::detect::Detection;
 use crate::error::{Error, Fault, Place, Result};
 use crate::pixel_aspect::PixelAspect;
-use block::{BLOCK_FRAMES, Block};
-pub use spool::{Finished, Spool};
-pub use stamp::FrameStamp;
 
 /// Bytes of detections held in memory before they go to disk: about 15,000 frames of 20 markers.
 pub const MEMORY_BOUND_BYTES: usize = 12 << 20;

@@ -2,10 +2,9 @@
 
 use std::sync::Arc;
 
-use super::{Ending, FrameSource, SourceInfo};
+use super::{Film, Scene};
 use crate::error::Result;
-use crate::film::{Film, Scene};
-use crate::frame::{Frame, PixelFormat, RateClaims, RateOrigin};
+use crate::frame::{Ending, Frame, FrameSource, PixelFormat, RateClaims, RateOrigin, SourceInfo};
 use crate::pixel_aspect::{AspectOrigin, PixelAspect};
 
 /// Frames of a [`Film`], made when they are asked for.

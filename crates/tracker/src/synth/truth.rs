@@ -1,8 +1,12 @@
 //! What is true of a frame: where every marker is and how much of it can be seen.
 //!
-//! Owns: [`NodeTruth`], [`FrameTruth`], `visible_part`. The table's form is in [`super::table`].
+//! Owns: [`NodeTruth`], [`FrameTruth`], `visible_part`. The table's form is in [`super::truth_table`].
 
 use super::coverage::{Quad, disc_rectangle_area};
+use super::film::Film;
+use super::motion::bar;
+use super::render::{instant_s, instants};
+use super::scene::within;
 
 /// One marker in one frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,17 +38,69 @@ pub struct FrameTruth {
     pub phi_rad: Vec<f64>,
 }
 
+impl Film {
+    /// What is true of a frame.
+    pub fn truth(&self, index: u64) -> FrameTruth {
+        let scene = &self.scene;
+        let size = scene.image_px.map(f64::from);
+        let time_s = self.time_s(index);
+        let mut poses = Vec::new();
+        let n = instants(self, index, &mut poses);
+        // The seen part changes slowly: at most 16 instants of the exposure tell it.
+        let n = n.min(16);
+        let hidden_links = self.hidden_links(index);
+        let hidden_markers = self.hidden_markers(index);
+        let black = scene.dropouts.iter().any(|d| within(index, d.first, d.count));
+        let mut nodes = vec![
+            NodeTruth { x_px: 0.0, y_px: 0.0, mean_x_px: 0.0, mean_y_px: 0.0, visible: 0.0 };
+            scene.markers.len()
+        ];
+        let (mut quads, mut discs) = (Vec::new(), Vec::new());
+        for k in 0..n {
+            self.mechanism.poses(time_s + instant_s(scene.camera.exposure_s, k, n), &mut poses);
+            for (j, m) in scene.markers.iter().enumerate() {
+                let link = self.marker_links[j];
+                let at = poses[link].point(m.at_px);
+                nodes[j].mean_x_px += at[0] / n as f64;
+                nodes[j].mean_y_px += at[1] / n as f64;
+                if black || hidden_links[link] || hidden_markers[j] {
+                    continue;
+                }
+                quads.clear();
+                discs.clear();
+                quads
+                    .extend((0..link).filter(|&i| !hidden_links[i]).filter_map(|i| bar(scene, i, &poses[i])));
+                quads.extend(scene.screens.iter().map(|s| Quad {
+                    origin: [0.0, 0.0],
+                    along: [1.0, 0.0],
+                    across: [0.0, 1.0],
+                    u: [s.edges_px[0], s.edges_px[2]],
+                    v: [s.edges_px[1], s.edges_px[3]],
+                }));
+                for (o, other) in scene.markers.iter().enumerate() {
+                    let front = self.marker_links[o];
+                    let before = front < link || (front == link && o > j);
+                    if before && !hidden_links[front] && !hidden_markers[o] {
+                        let p = poses[front].point(other.at_px);
+                        discs.push([p[0], p[1], other.radius_px]);
+                    }
+                }
+                nodes[j].visible += visible_part(at, m.radius_px, &quads, &discs, size) / n as f64;
+            }
+        }
+        self.mechanism.poses(time_s, &mut poses);
+        for (j, m) in scene.markers.iter().enumerate() {
+            [nodes[j].x_px, nodes[j].y_px] = poses[self.marker_links[j]].point(m.at_px);
+        }
+        FrameTruth { frame: index, time_s, nodes, phi_rad: poses.iter().map(|p| p.phi_rad).collect() }
+    }
+}
+
 /// Part of the disc about `(x, y)` that `quads` and `discs` (x, y, radius) leave free, inside an image of `size`.
 ///
 /// Exact where one rectangle or the border hides some of it; where several things do, by 4096 points of equal area
 /// on the disc (miscounted on the edges only, under 0.01).
-pub(crate) fn visible_part(
-    [x, y]: [f64; 2],
-    r: f64,
-    quads: &[Quad],
-    discs: &[[f64; 3]],
-    size: [f64; 2],
-) -> f64 {
+fn visible_part([x, y]: [f64; 2], r: f64, quads: &[Quad], discs: &[[f64; 3]], size: [f64; 2]) -> f64 {
     let area = std::f64::consts::PI * r * r;
     let inside = disc_rectangle_area(x, y, r, [-0.5, size[0] - 0.5], [-0.5, size[1] - 0.5]) / area;
     if inside <= 0.0 {

@@ -6,9 +6,9 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use super::Film;
 use super::camera_raw::{MrawWriter, pair};
 use super::encode::{Codec, ImageKind, VideoSettings, VideoWriter, cannot_write, encode_image};
+use super::film::Film;
 use super::write_options::{WriteOptions, codec_of, ending};
 use crate::error::{Error, Fault, Place, Result};
 use crate::name::{self, text};

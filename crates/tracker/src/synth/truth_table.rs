@@ -25,7 +25,7 @@ use parquet::basic::{Compression, ZstdLevel};
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
 
-use super::Film;
+use super::film::Film;
 use super::truth::FrameTruth;
 use crate::csv_text::{Cells, read_cell, split};
 use crate::error::{Error, Fault, Place, Result};
@@ -162,7 +162,7 @@ impl TruthWriter {
                 arrow::array::Int32Array::from_iter_values(keys.iter().copied().cycle().take(n * held.len()));
             Arc::new(DictionaryArray::<Int32Type>::new(keys, Arc::new(StringArray::from(words))))
         };
-        let per_node = |value: fn(&super::NodeTruth) -> f64| -> ArrayRef {
+        let per_node = |value: fn(&super::truth::NodeTruth) -> f64| -> ArrayRef {
             Arc::new(Float64Array::from_iter_values(held.iter().flat_map(|f| f.nodes.iter().map(value))))
         };
         let per_frame = |value: &dyn Fn(&FrameTruth) -> f64| -> ArrayRef {
@@ -285,7 +285,7 @@ impl Columns {
                 frame: index,
                 time_s: self.numbers[0][first],
                 nodes: (first..first + n)
-                    .map(|r| super::NodeTruth {
+                    .map(|r| super::truth::NodeTruth {
                         x_px: self.numbers[1][r],
                         y_px: self.numbers[2][r],
                         mean_x_px: self.numbers[1][r],

@@ -1,15 +1,8 @@
-//! The recording with nodes, names, bodies, trails and gaps drawn into it, as pictures and as a film.
+//! Draws nodes, names, bodies, trails and gaps into a frame.
 //!
-//! Owns: [`Overlay`], [`still`], [`film`]. Must not: track: it draws what a table says.
+//! Owns: [`Overlay`], [`still`]. Must not: track: it draws what a table says.
 //!
 //! Every stroke has a dark rim, so that it is read on bright and on dark ground.
-
-mod film;
-mod picture;
-
-pub use film::{FilmSettings, Filmed, film};
-use picture::colour;
-pub use picture::{rgb, save, size};
 
 use std::collections::VecDeque;
 
@@ -17,8 +10,9 @@ use nalgebra::{Isometry2, Vector2};
 use opencv::core::{Mat, Point, Scalar};
 use opencv::imgproc;
 
+use super::picture::{colour, failed};
 use crate::detect::Detection;
-use crate::error::{Error, Fault, Result};
+use crate::error::Result;
 use crate::frame::Frame;
 use crate::observation::{Observation, Status};
 use crate::rig::Rig;
@@ -40,10 +34,6 @@ const COLOURS: [[f64; 3]; 6] = [
     [0.0, 94.0, 213.0],
 ];
 
-fn failed(e: opencv::Error) -> Error {
-    Error::Film(Fault::new("overlay", format!("drawing failed ({e})")))
-}
-
 /// Draws frame after frame of one recording.
 pub struct Overlay {
     rig: Rig,
@@ -52,7 +42,7 @@ pub struct Overlay {
     /// In square pixels, as all places here are.
     trails: Vec<VecDeque<Vector2<f64>>>,
     /// Width and height of the pictures, px.
-    size: [i32; 2],
+    pub(super) size: [i32; 2],
     /// Pixels of the picture for a square one of the recording.
     zoom: f64,
     /// Size of marks in the picture: 1 in one of 1280 px.

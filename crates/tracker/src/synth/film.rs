@@ -1,67 +1,33 @@
-//! The film maker: films with known truth, of any planar mechanism of rigid links with markers on them.
+//! Prepares a scene for making frames: its motion, what stands still, what hides and glints when.
 //!
-//! ```text
-//! Scene (TOML) + MotionTable ─▶ Film ─▶ expected image ─noise─▶ recorded frame ─▶ file, SyntheticSource
-//!                                  └──▶ truth: place, visible part, angles
-//! ```
-//!
-//! Owns: [`Scene`], [`MotionTable`], [`Film`], the presets, writing films and truth. Must not: know of pendulums or
-//! metres, or of detection and tracking, which it exists to judge.
-//!
-//! A frame's time is the middle of its exposure. Everything random comes from the scene's seed and the frame's
-//! index, so frames may be made in any order and by any number of threads. The noise model is in [`noise`].
-
-mod camera_raw;
-pub mod coverage;
-pub mod encode;
-mod motion;
-mod motion_file;
-pub mod noise;
-mod presets;
-mod render;
-pub mod scene;
-mod scene_check;
-mod sink;
-mod spline;
-mod truth;
-mod truth_table;
-mod write;
-mod write_options;
+//! Owns: [`Film`]. Must not: paint.
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
-pub use motion::MotionTable;
-pub use presets::{PRESETS, paper_layout, preset};
-pub use scene::Scene;
-pub use sink::files as film_files;
-pub use truth::{FrameTruth, NodeTruth};
-pub use truth_table::{Truth, TruthWriter};
-pub use write::write;
-pub use write_options::WriteOptions;
-
+use super::canvas::ground;
+use super::motion::{Mechanism, MotionTable};
+use super::scene::{Glint, Scene, within};
 use crate::error::Result;
-use crate::frame::{Frame, PixelFormat, TimeBase};
+use crate::frame::{PixelFormat, TimeBase};
 use crate::pixel_aspect::PixelAspect;
 use crate::rig::{Body, Joint, Node, RIG_SCHEMA, Rig};
-use motion::{Mechanism, bar};
-use scene::{Glint, within};
 
 /// A scene ready to be filmed. Shared between threads; nothing in it changes.
 #[derive(Debug, Clone)]
 pub struct Film {
-    scene: Scene,
-    mechanism: Mechanism,
-    ground: Vec<f32>,
+    pub(super) scene: Scene,
+    pub(super) mechanism: Mechanism,
+    pub(super) ground: Vec<f32>,
     /// Pixel numbers of hot pixels.
-    hot: Vec<usize>,
+    pub(super) hot: Vec<usize>,
     /// All glints, by first frame.
-    glints: Vec<Glint>,
+    pub(super) glints: Vec<Glint>,
     /// Longest duration among them.
-    longest_glint: u64,
+    pub(super) longest_glint: u64,
     /// For each marker the index of its link.
-    marker_links: Vec<usize>,
-    time_base: TimeBase,
+    pub(super) marker_links: Vec<usize>,
+    pub(super) time_base: TimeBase,
 }
 
 impl Film {
@@ -96,7 +62,7 @@ impl Film {
         let hot = (0..scene.camera.hot_pixels).map(|_| (uniform() * pixels) as usize).collect();
         let glints = glints(scene);
         Ok(Self {
-            ground: render::ground(scene),
+            ground: ground(scene),
             mechanism,
             hot,
             longest_glint: glints.iter().map(|g| g.count).max().unwrap_or(0),
@@ -132,104 +98,9 @@ impl Film {
         if self.scene.camera.depth_bits > 8 { 2 } else { 1 }
     }
 
-    /// Expected levels of a frame, row by row, into `out` (cleared first): what the mean over many recordings would
-    /// be without saturation and rounding. See [`noise`].
-    pub fn expected(&self, index: u64, out: &mut Vec<f32>) {
-        render::expected(self, index, out);
-        for &pixel in &self.hot {
-            out[pixel] += self.scene.camera.hot_level as f32;
-        }
-    }
-
-    /// Variance of a recorded level expected at `level`, see [`noise::variance`].
-    pub fn variance(&self, level: f64) -> f64 {
-        noise::variance(&self.scene.camera, level)
-    }
-
-    /// Recorded levels of a frame, row by row without padding, one byte or two (little-endian) per pixel, into `out`
-    /// (cleared first).
-    pub fn render(&self, index: u64, out: &mut Vec<u8>) {
-        let mut expected = Vec::new();
-        self.expected(index, &mut expected);
-        noise::record(&self.scene.camera, self.scene.seed, index, &expected, out);
-    }
-
-    /// A recorded frame as a source hands it out.
-    pub fn frame(&self, index: u64) -> Frame {
-        let mut plane = Vec::new();
-        self.render(index, &mut plane);
-        let [width, height] = self.scene.image_px;
-        Frame {
-            index,
-            ticks: index as i64,
-            width,
-            height,
-            stride: width as usize * self.bytes_per_pixel(),
-            format: self.format(),
-            depth_bits: self.scene.camera.depth_bits,
-            plane: Some(Box::new(plane)),
-        }
-    }
-
     /// How recorded frames are stored.
     pub fn format(&self) -> PixelFormat {
         if self.scene.camera.depth_bits > 8 { PixelFormat::Gray16 } else { PixelFormat::Gray8 }
-    }
-
-    /// What is true of a frame.
-    pub fn truth(&self, index: u64) -> FrameTruth {
-        let scene = &self.scene;
-        let size = scene.image_px.map(f64::from);
-        let time_s = self.time_s(index);
-        let mut poses = Vec::new();
-        let n = render::instants(self, index, &mut poses);
-        // The seen part changes slowly: at most 16 instants of the exposure tell it.
-        let n = n.min(16);
-        let hidden_links = self.hidden_links(index);
-        let hidden_markers = self.hidden_markers(index);
-        let black = scene.dropouts.iter().any(|d| within(index, d.first, d.count));
-        let mut nodes = vec![
-            NodeTruth { x_px: 0.0, y_px: 0.0, mean_x_px: 0.0, mean_y_px: 0.0, visible: 0.0 };
-            scene.markers.len()
-        ];
-        let (mut quads, mut discs) = (Vec::new(), Vec::new());
-        for k in 0..n {
-            self.mechanism.poses(time_s + render::instant_s(scene.camera.exposure_s, k, n), &mut poses);
-            for (j, m) in scene.markers.iter().enumerate() {
-                let link = self.marker_links[j];
-                let at = poses[link].point(m.at_px);
-                nodes[j].mean_x_px += at[0] / n as f64;
-                nodes[j].mean_y_px += at[1] / n as f64;
-                if black || hidden_links[link] || hidden_markers[j] {
-                    continue;
-                }
-                quads.clear();
-                discs.clear();
-                quads
-                    .extend((0..link).filter(|&i| !hidden_links[i]).filter_map(|i| bar(scene, i, &poses[i])));
-                quads.extend(scene.screens.iter().map(|s| coverage::Quad {
-                    origin: [0.0, 0.0],
-                    along: [1.0, 0.0],
-                    across: [0.0, 1.0],
-                    u: [s.edges_px[0], s.edges_px[2]],
-                    v: [s.edges_px[1], s.edges_px[3]],
-                }));
-                for (o, other) in scene.markers.iter().enumerate() {
-                    let front = self.marker_links[o];
-                    let before = front < link || (front == link && o > j);
-                    if before && !hidden_links[front] && !hidden_markers[o] {
-                        let p = poses[front].point(other.at_px);
-                        discs.push([p[0], p[1], other.radius_px]);
-                    }
-                }
-                nodes[j].visible += truth::visible_part(at, m.radius_px, &quads, &discs, size) / n as f64;
-            }
-        }
-        self.mechanism.poses(time_s, &mut poses);
-        for (j, m) in scene.markers.iter().enumerate() {
-            [nodes[j].x_px, nodes[j].y_px] = poses[self.marker_links[j]].point(m.at_px);
-        }
-        FrameTruth { frame: index, time_s, nodes, phi_rad: poses.iter().map(|p| p.phi_rad).collect() }
     }
 
     /// The rig of the scene as it stands in frame `index`, with its joints: what a perfect `tracker setup` finds.
@@ -273,18 +144,18 @@ impl Film {
         }
     }
 
-    fn hidden_links(&self, index: u64) -> Vec<bool> {
+    pub(super) fn hidden_links(&self, index: u64) -> Vec<bool> {
         let now: Vec<_> = self.scene.hidden.iter().filter(|h| within(index, h.first, h.count)).collect();
         self.scene.links.iter().map(|l| now.iter().any(|h| h.links.contains(&l.name))).collect()
     }
 
-    fn hidden_markers(&self, index: u64) -> Vec<bool> {
+    pub(super) fn hidden_markers(&self, index: u64) -> Vec<bool> {
         let now: Vec<_> = self.scene.hidden.iter().filter(|h| within(index, h.first, h.count)).collect();
         self.scene.markers.iter().map(|m| now.iter().any(|h| h.markers.contains(&m.name))).collect()
     }
 
     /// Glints that shine in a frame.
-    fn glints_at(&self, index: u64) -> impl Iterator<Item = &Glint> {
+    pub(super) fn glints_at(&self, index: u64) -> impl Iterator<Item = &Glint> {
         let earliest = (index + 1).saturating_sub(self.longest_glint);
         let from = self.glints.partition_point(|g| g.first < earliest);
         let to = self.glints.partition_point(|g| g.first <= index);
@@ -320,6 +191,3 @@ fn glints(scene: &Scene) -> Vec<Glint> {
     all.sort_by_key(|g| g.first);
     all
 }
-
-#[cfg(test)]
-mod tests;

@@ -1,0 +1,140 @@
+//! Reads one picture file as brightness of 8 or 16 bits, whatever it was stored as.
+//!
+//! Owns: [`read`], [`decode`]. Must not: scale values; 16 bit stay 16 bit.
+
+use std::fs::File;
+use std::io::{BufReader, Read, Seek, SeekFrom};
+use std::path::Path;
+
+use opencv::core::{CV_8U, CV_16U, Vector};
+use opencv::imgcodecs;
+use opencv::prelude::{MatTraitConst, MatTraitConstManual};
+use tiff::decoder::Decoder;
+
+use super::picture::Picture;
+use super::planes::are_behind;
+use super::tiff_layout::is_reduced;
+use super::tiff_page;
+
+/// Reads a picture file; an error is a clause without a full stop.
+pub fn read(path: &Path) -> Result<Picture, String> {
+    let mut file = File::open(path).map_err(|e| format!("it cannot be read ({e})"))?;
+    let mut head = [0u8; 32];
+    let got = file.read(&mut head).map_err(|e| format!("it cannot be read ({e})"))?;
+    let head = &head[..got];
+    if head.is_empty() {
+        return Err("it is empty".to_owned());
+    }
+    if head.starts_with(b"II") || head.starts_with(b"MM") {
+        file.seek(SeekFrom::Start(0)).map_err(|e| e.to_string())?;
+        let size = file.metadata().map_err(|e| e.to_string())?.len();
+        let mut decoder = Decoder::new(BufReader::new(file)).map_err(|e| e.to_string())?;
+        let picture = tiff_page::read(&mut decoder)?;
+        let several = || "it holds several pictures, and in a folder each file is one".to_owned();
+        if !decoder.more_images() && are_behind(&mut decoder, size) {
+            return Err(several());
+        }
+        while decoder.more_images() {
+            decoder.next_image().map_err(|e| e.to_string())?;
+            if !is_reduced(&mut decoder) {
+                return Err(several());
+            }
+        }
+        return Ok(picture);
+    }
+    believable(head, &mut file)?;
+    // From memory: a name for OpenCV would have to be UTF-8.
+    let bytes = std::fs::read(path).map_err(|e| format!("it cannot be read ({e})"))?;
+    let bytes = Vector::<u8>::from_slice(&bytes);
+    gray(imgcodecs::imdecode(&bytes, imgcodecs::IMREAD_UNCHANGED).map_err(|e| short(&e.message))?)
+}
+
+/// Decodes a JPEG picture that lies in memory; an error is a clause without a full stop.
+pub fn decode(jpeg: &[u8]) -> Result<Picture, String> {
+    if !jpeg.starts_with(b"\xff\xd8")
+        || !jpeg[jpeg.len().saturating_sub(64)..].windows(2).any(|w| w == [0xff, 0xd9])
+    {
+        return Err("it is no whole JPEG picture".to_owned());
+    }
+    let bytes = Vector::<u8>::from_slice(jpeg);
+    gray(imgcodecs::imdecode(&bytes, imgcodecs::IMREAD_UNCHANGED).map_err(|e| short(&e.message))?)
+}
+
+/// The brightness of a picture as OpenCV reads it.
+fn gray(color: opencv::core::Mat) -> Result<Picture, String> {
+    if color.empty() {
+        return Err("it is not a picture that can be read, or it is cut".to_owned());
+    }
+    let channels = color.channels();
+    let (gray, converted_from) = if channels == 1 {
+        (color, None)
+    } else {
+        let code = match channels {
+            3 => opencv::imgproc::COLOR_BGR2GRAY,
+            4 => opencv::imgproc::COLOR_BGRA2GRAY,
+            n => return Err(format!("it has {n} channels")),
+        };
+        let mut gray = opencv::core::Mat::default();
+        opencv::imgproc::cvt_color_def(&color, &mut gray, code).map_err(|e| short(&e.message))?;
+        (gray, Some(format!("{channels} channels")))
+    };
+    let depth_bits = match gray.depth() {
+        CV_8U => 8,
+        CV_16U => 16,
+        other => return Err(format!("its samples are of OpenCV's kind {other}, not 8 or 16 bit")),
+    };
+    let size = |n: i32| u32::try_from(n).map_err(|e| e.to_string());
+    // OpenCV's 16-bit samples are in this machine's order; all machines that we are built for are little-endian.
+    let samples = gray.data_bytes().map_err(|e| short(&e.message))?.to_vec();
+    Ok(Picture { width: size(gray.cols())?, height: size(gray.rows())?, depth_bits, samples, converted_from })
+}
+
+/// Refuses a header that promises more pixels than the file can hold, before anything is allocated.
+fn believable(head: &[u8], file: &mut File) -> Result<(), String> {
+    let number = |at: usize, big: bool| {
+        let four: Option<[u8; 4]> = head.get(at..at + 4).and_then(|b| b.try_into().ok());
+        four.map(|b| u64::from(if big { u32::from_be_bytes(b) } else { u32::from_le_bytes(b) }))
+    };
+    // Deflate's best is 1032 to 1, and a PNG pixel takes a bit or more; BMP's run lengths do 127 to 1.
+    let (size, pixels_per_byte) = if head.starts_with(b"\x89PNG\r\n\x1a\n") {
+        (number(16, true).zip(number(20, true)), 8 * 1032)
+    } else if head.starts_with(b"BM") {
+        (number(18, false).zip(number(22, false).map(|h| u64::from((h as u32 as i32).unsigned_abs()))), 128)
+    } else {
+        return match head.starts_with(b"\xff\xd8") {
+            true => whole_jpeg(file),
+            false => Ok(()),
+        };
+    };
+    let length = file.metadata().map_err(|e| e.to_string())?.len();
+    match size {
+        Some((w, h)) if u128::from(w) * u128::from(h) <= u128::from(length) * pixels_per_byte => {
+            // libpng would complain on standard error.
+            match head.starts_with(b"\x89PNG") && !tail(file, 64)?.windows(4).any(|w| w == b"IEND") {
+                true => Err("it is cut".to_owned()),
+                false => Ok(()),
+            }
+        }
+        Some((w, h)) => Err(format!("{w} x {h} px do not fit into its {length} bytes")),
+        None => Err("it is cut".to_owned()),
+    }
+}
+
+/// A JPEG that is cut would be filled up with gray.
+fn whole_jpeg(file: &mut File) -> Result<(), String> {
+    if tail(file, 1024)?.windows(2).any(|w| w == [0xff, 0xd9]) { Ok(()) } else { Err("it is cut".to_owned()) }
+}
+
+/// The last `count` bytes of a file.
+fn tail(file: &mut File, count: u64) -> Result<Vec<u8>, String> {
+    let mut bytes = Vec::new();
+    let length = file.metadata().map_err(|e| e.to_string())?.len();
+    file.seek(SeekFrom::Start(length.saturating_sub(count)))
+        .and_then(|_| file.read_to_end(&mut bytes))
+        .map_err(|e| e.to_string())?;
+    Ok(bytes)
+}
+
+fn short(message: &str) -> String {
+    message.lines().next().unwrap_or("it cannot be decoded").trim().to_owned()
+}

@@ -1,0 +1,197 @@
+//! Reads a folder of pictures, or those that a pattern fits, as frames.
+//!
+//! Owns: [`SequenceSource`].
+
+use std::collections::VecDeque;
+use std::path::PathBuf;
+
+use rayon::prelude::*;
+
+use super::picture::{Picture, format, frame, rate};
+use super::{names, picture_file, pixel_size};
+use crate::error::{Error, Fault, Result};
+use crate::frame::{Ending, Frame, FrameSource, RateClaims, SourceInfo};
+use crate::message::Message;
+use crate::source::OpenOptions;
+
+/// Bytes of pictures decoded ahead at most.
+const AHEAD_BYTES: usize = 48 << 20;
+/// Pictures, spread over the sequence, of which most must agree on a size.
+const LOOKED_AT: usize = 9;
+/// Pictures looked at, from the first on, if none of those can be read.
+const LOOKED_FOR: usize = 16;
+
+/// Picture files in the order of their numbers.
+pub struct SequenceSource {
+    info: SourceInfo,
+    files: Vec<Option<PathBuf>>,
+    next_file: usize,
+    batch: usize,
+    ready: VecDeque<Frame>,
+    damaged: Vec<String>,
+    ending: Ending,
+}
+
+/// A picture of the size and depth that most pictures have, and its file. The first one may be a small copy, which is said.
+fn size_of_most<'a>(
+    there: &[(usize, &'a PathBuf)],
+    warnings: &mut Vec<Message>,
+) -> Result<(Picture, &'a PathBuf)> {
+    let n = there.len().min(LOOKED_AT);
+    // The first and the last are among them.
+    let spread = (0..n).map(|k| there[k * (there.len() - 1) / (n - 1).max(1)]);
+    let mut problem = None;
+    let mut readable = |(index, path): (usize, &'a PathBuf)| match picture_file::read(path) {
+        Ok(picture) => Some((index, path, picture)),
+        Err(e) => {
+            problem.get_or_insert((path, e));
+            None
+        }
+    };
+    let mut pictures: Vec<_> = spread.filter_map(&mut readable).collect();
+    if pictures.is_empty() {
+        pictures.extend(there.iter().copied().take(LOOKED_FOR).find_map(readable));
+    }
+    let kind = |p: &Picture| (p.width, p.height, p.depth_bits);
+    let like = |p: &Picture| pictures.iter().filter(|(.., other)| kind(other) == kind(p)).count();
+    // Of several as many, the first.
+    let Some(best) = (0..pictures.len()).rev().max_by_key(|i| like(&pictures[*i].2)) else {
+        let (path, problem) = problem.map_or_else(Default::default, |(p, e)| (p.display().to_string(), e));
+        return Err(Error::Source(Fault::new(path, problem).advice(
+            "Check that the pictures were copied whole; a file with several pictures is given by itself, without its folder",
+        )));
+    };
+    for (index, path, odd) in pictures.iter().filter(|(.., p)| kind(p) != kind(&pictures[best].2)) {
+        let (name, usual) = (path.file_name().unwrap_or_default().to_string_lossy(), &pictures[best].2);
+        warnings.push(format!(
+            "picture {index} ({name}) is {} x {} px of {} bits, most are {} x {} px of {}: such a frame stays empty",
+            odd.width, odd.height, odd.depth_bits, usual.width, usual.height, usual.depth_bits
+        ).into());
+    }
+    let (_, path, picture) = pictures.swap_remove(best);
+    Ok((picture, path))
+}
+
+impl SequenceSource {
+    /// Opens a folder or a pattern.
+    ///
+    /// # Errors
+    /// [`Error::Source`] if there are no pictures or none can be read.
+    pub fn open(name: &str, options: &OpenOptions) -> Result<Self> {
+        Self::over(name, names::list(name)?, options)
+    }
+
+    fn over(name: &str, numbered: names::Numbered, options: &OpenOptions) -> Result<Self> {
+        let mut warnings = numbered.warnings;
+        let files = numbered.files;
+        let there: Vec<(usize, &PathBuf)> =
+            files.iter().enumerate().filter_map(|(i, f)| f.as_ref().map(|p| (i, p))).collect();
+        let (first, path) = size_of_most(&there, &mut warnings)?;
+        let (time_base, rate_hz, rate_origin) = rate(options, &mut warnings)?;
+        let ending = path.extension().map_or(String::new(), |e| e.to_string_lossy().to_lowercase());
+        let size_bytes = files.iter().flatten().map(|f| std::fs::metadata(f).map_or(0, |m| m.len())).sum();
+        let (pixel_aspect, pixel_aspect_origin) =
+            options.aspect(pixel_size::aspect(pixel_size::of_file(path), &mut warnings));
+        let info = SourceInfo {
+            name: name.to_owned(),
+            container: "pictures".into(),
+            codec: ending,
+            width: first.width,
+            height: first.height,
+            pixel_aspect,
+            pixel_aspect_origin,
+            format: format(first.depth_bits),
+            depth_bits: first.depth_bits,
+            declared_frames: Some(files.len() as u64),
+            time_base,
+            rate_hz,
+            rate_origin,
+            claims: RateClaims::default(),
+            converted_from: first.converted_from,
+            size_bytes: Some(size_bytes),
+            details: Vec::new(),
+            warnings,
+        };
+        let batch = (AHEAD_BYTES / first.samples.len().max(1)).clamp(1, 2 * threads::count());
+        Ok(Self {
+            info,
+            files,
+            next_file: 0,
+            batch,
+            ready: VecDeque::new(),
+            damaged: Vec::new(),
+            ending: Ending::Complete,
+        })
+    }
+
+    /// A picture file alone.
+    ///
+    /// # Errors
+    /// As for [`SequenceSource::open`].
+    pub fn open_one(name: &str, options: &OpenOptions) -> Result<Self> {
+        Self::over(
+            name,
+            names::Numbered { files: vec![Some(PathBuf::from(name))], warnings: Vec::new() },
+            options,
+        )
+    }
+
+    /// Decodes the next few pictures side by side.
+    fn read_batch(&mut self) {
+        let end = (self.next_file + self.batch).min(self.files.len());
+        let range = self.next_file..end;
+        let read = |path: &Option<PathBuf>| path.as_ref().map(|p| picture_file::read(p));
+        let files = &self.files[range.clone()];
+        let pictures: Vec<_> = threads::install(|| files.par_iter().map(read).collect());
+        for (index, picture) in range.zip(pictures) {
+            let picture =
+                picture.and_then(|p| p.map_err(|e| self.damaged.push(format!("picture {index}: {e}"))).ok());
+            self.ready.push_back(frame(&self.info, index as u64, picture));
+        }
+        self.next_file = end;
+    }
+
+    /// At the end: if the last pictures cannot be read, the recording ended before them.
+    fn trim(&mut self) {
+        let whole = self.files.len();
+        let lost = self.ready.iter().rev().take_while(|f| f.plane.is_none()).count();
+        if self.next_file == whole && lost > 0 {
+            self.ready.truncate(self.ready.len() - lost);
+            let frames = (whole - lost) as u64;
+            let reason =
+                self.damaged.last().cloned().unwrap_or_else(|| "the last pictures do not fit".to_owned());
+            self.ending = Ending::Early { frames, byte: None, reason };
+        }
+    }
+}
+
+impl FrameSource for SequenceSource {
+    fn info(&self) -> &SourceInfo {
+        &self.info
+    }
+
+    fn next_frame(&mut self) -> Result<Option<Frame>> {
+        // A frame without pixels waits until it is known whether a good one follows.
+        while self.next_file < self.files.len() && self.ready.iter().all(|f| f.plane.is_none()) {
+            self.read_batch();
+            if self.next_file == self.files.len() {
+                self.trim();
+            }
+        }
+        Ok(self.ready.pop_front())
+    }
+
+    fn ending(&self) -> Ending {
+        self.ending.clone()
+    }
+
+    fn sample(&mut self, count: usize) -> Result<Vec<Frame>> {
+        let there: Vec<&PathBuf> = self.files.iter().flatten().collect();
+        let n = count.min(there.len());
+        let spread: Vec<&PathBuf> = (0..n).map(|k| there[(2 * k + 1) * there.len() / (2 * n)]).collect();
+        let pictures: Vec<_> =
+            threads::install(|| spread.par_iter().map(|p| picture_file::read(p).ok()).collect());
+        let frames = pictures.into_iter().enumerate().map(|(i, p)| frame(&self.info, i as u64, p));
+        Ok(frames.filter(|f| f.plane.is_some()).collect())
+    }
+}

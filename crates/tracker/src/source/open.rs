@@ -1,0 +1,113 @@
+//! Opens a recording with the reader that its first bytes ask for.
+//!
+//! Owns: [`open`], [`files`].
+
+use std::fs::File;
+use std::io::Read;
+use std::path::PathBuf;
+
+use super::input::Input;
+use super::{Decoder, OpenOptions, cine, ffmpeg, images, mraw, norpix, opencv};
+use crate::error::{Error, Fault, Result};
+use crate::frame::FrameSource;
+use crate::kind::{self, Kind};
+use crate::message::Setting;
+use crate::name::path;
+
+/// Whether a name stands for pictures of a folder.
+fn is_sequence(name: &str) -> bool {
+    path(name).is_dir() || images::names::is_pattern(name) && !path(name).exists()
+}
+
+/// The files that a recording is read from: all pictures of a folder, both files of a Photron pair. None for what can
+/// be read once only, a pipe or an address.
+///
+/// # Errors
+/// [`Error::Source`] if a file of it is not there.
+pub fn files(name: &str) -> Result<Vec<PathBuf>> {
+    if is_sequence(name) {
+        return Ok(images::names::list(name)?.files.into_iter().flatten().collect());
+    }
+    if !path(name).is_file() {
+        return Ok(Vec::new());
+    }
+    if mraw::is_photron(name, &first_bytes(name).unwrap_or_default()) {
+        return mraw::pair(name).map(|pair| vec![pair.header, pair.pixels]);
+    }
+    Ok(vec![path(name)])
+}
+
+/// Opens a recording by what its first bytes say it is, whatever its name; `-` is standard input. A name that is not
+/// UTF-8 is given as [`crate::name::text`] makes it.
+///
+/// # Errors
+/// [`Error::Source`] if there is no such file or nothing here reads it; [`Error::Argument`] for options that
+/// make no sense.
+pub fn open(name: &str, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
+    kind::expect(&path(name), &[Kind::Film, Kind::Pictures], Error::Source)?;
+    if is_sequence(name) {
+        if options.decoder == Decoder::Opencv {
+            return Err(Error::Source(
+                Fault::new(name, "pictures are read without OpenCV's decoder")
+                    .advice("Leave out " + Setting::Decoder.set_to("opencv")),
+            ));
+        }
+        return Ok(Box::new(images::SequenceSource::open(name, options)?));
+    }
+    let input = Input::of(name, options)?;
+    // FFmpeg would take its name for a pattern of others.
+    if matches!(input, Input::File(_)) && images::names::is_pattern(name) && images::names::is_picture(name) {
+        return Ok(Box::new(images::SequenceSource::open_one(name, options)?));
+    }
+    if let Input::File(_) = &input {
+        let first = first_bytes(name)?;
+        let by_camera: Option<Box<dyn FrameSource>> = match &first[..] {
+            b if mraw::is_photron(name, b) => Some(Box::new(mraw::MrawSource::open(name, options)?)),
+            [b'C', b'I', ..] if first.get(2..4) == Some(&[44, 0]) => {
+                Some(Box::new(cine::CineSource::open(name, &input, options)?))
+            }
+            b if norpix::is_norpix(b) => Some(Box::new(norpix::NorpixSource::open(name, options)?)),
+            [b'I', b'I', 42 | 43, 0, ..] | [b'M', b'M', 0, 42 | 43, ..] => {
+                Some(Box::new(images::StackSource::open(name, options)?))
+            }
+            _ => None,
+        };
+        if let Some(source) = by_camera {
+            return match options.decoder {
+                Decoder::Opencv => Err(Error::Source(
+                    Fault::new(name, format!("OpenCV does not read {}", source.info().container))
+                        .advice("Leave out " + Setting::Decoder.set_to("opencv")),
+                )),
+                _ => Ok(source),
+            };
+        }
+    }
+    let source = ffmpeg::FfmpegSource::open(name, &input, options)?;
+    if options.decoder != Decoder::Opencv {
+        return Ok(Box::new(source));
+    }
+    match input {
+        Input::File(_) => Ok(Box::new(opencv::OpencvSource::open(name, &input, &source, options)?)),
+        _ => Err(Error::Source(
+            Fault::new(name, "OpenCV's decoder reads files only")
+                .advice("Leave out " + Setting::Decoder.set_to("opencv")),
+        )),
+    }
+}
+
+/// The first bytes of a file, up to 4096.
+fn first_bytes(name: &str) -> Result<Vec<u8>> {
+    let unreadable = |e: std::io::Error| {
+        Error::Source(
+            Fault::new(name, format!("the file cannot be read ({e})")).advice("Check its permissions"),
+        )
+    };
+    let mut bytes = Vec::new();
+    File::open(path(name)).map_err(unreadable)?.take(4096).read_to_end(&mut bytes).map_err(unreadable)?;
+    if bytes.is_empty() {
+        return Err(Error::Source(
+            Fault::new(name, "the file is empty").advice("Check that it was copied whole"),
+        ));
+    }
+    Ok(bytes)
+}
