@@ -14,6 +14,7 @@ GROUPS: tuple[tuple[str, ...], ...] = (
     (
         "terminal",
         "output",
+        "number_words",
         "errors",
         "crossing",
         "_tracker",
@@ -27,7 +28,7 @@ GROUPS: tuple[tuple[str, ...], ...] = (
         "series",
     ),
     ("nodes", "tracking", "filming", "scoring", "export", "components", "bearings"),
-    ("coefficients", "model", "fit_options"),
+    ("coefficients", "model", "fit_options", "information"),
     ("angles",),
     ("encoder",),
     ("simulate", "linear", "states"),

@@ -113,7 +113,7 @@ def test_completions_end_quietly_when_nobody_reads_them() -> None:
         ("analyse MOTION -o OUT --zero nonsense", "--zero"),
         ("analyse MOTION -o OUT --columns nonsense", "--columns"),
         ("fit MOTION -o OUT --columns nonsense", "--columns"),
-        ("predict MOTION --fit OUT --windows x -o OUT", "OUT"),
+        ("predict MOTION --fit OUT --windows x -o OUT", "--windows"),
         ("calibrate CALIBRATION -o OUT.json --angles-deg x", "--angles-deg"),
         ("calibrate CALIBRATION -o OUT.json --range-v 5,1", "--range-v"),
     ],

@@ -127,7 +127,7 @@ def test_a_hold_is_refused_with_the_flag_that_helps_and_the_vertical_is_stored_w
     assert "vertical=0.5" in capsys.readouterr().err
     # Three markers on no straight line say to 2.8 deg which way their link points.
     for zero, sigma in (("vertical", 3.0), ("vertical=3", 4.2)):
-        assert main([*line, "--zero", zero]) == 0
+        assert main([*line, "--zero", zero, "--force"]) == 0
         assert f"zero from the picture's vertical (+- {sigma:.2g} deg)" in capsys.readouterr().out
         stored = read_angles(tmp_path / "a.parquet").meta["zero"]
         assert np.degrees(stored["sigma_rad"]) == pytest.approx([sigma], abs=0.06)
@@ -336,7 +336,9 @@ def test_the_program_itself(lab: Path, tmp_path: Path) -> None:
     assert json.loads(done.stdout)["frames"] == 1500
     assert read_angles(out).phi_rad.shape == (1500, 2)
     failed = subprocess.run(
-        [*program, "angles", str(lab / "never.parquet"), "-o", str(out)], capture_output=True, check=False
+        [*program, "angles", str(lab / "never.parquet"), "-o", str(out), "--force"],
+        capture_output=True,
+        check=False,
     )
     assert failed.returncode == 2
     assert failed.stderr.startswith(b"pydpend: nodes: no node of the body lower is ever seen")

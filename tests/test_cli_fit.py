@@ -11,8 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from pydpend.angles import LinkAngles
+from pydpend.cli import main
 from pydpend.energy import Motion
 from pydpend.model import Damping, Model
+from pydpend.report import damping as report_damping
+from pydpend.report.page import Heading
 from pydpend.simulate import simulate
 
 from tests.free_decays import measured, released
@@ -89,6 +92,29 @@ def test_trials_agree_and_their_mean_lies_between(folder: Path) -> None:
     for spread in trials["coefficients"].values():
         assert min(spread["values"]) <= spread["mean"] <= max(spread["values"])
         assert 0.001 < spread["p_value"] <= 1
+
+
+def test_each_file_of_a_fit_or_a_prediction_stops_the_next(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Two recordings with figures; what is there is asked before anything is fitted."""
+    two = ["fit", str(folder / "21.csv"), str(folder / "22.csv"), "--laws", "paper", "-o", str(tmp_path)]
+    one = ["predict", str(folder / "21.csv"), "--fit", str(folder / "out"), "-o", str(tmp_path)]
+    made = {p.name for p in (folder / "out").iterdir()}
+    assert len(made) == 11
+    for words, names in ((two, made), (one, {"predict.json", "windows.csv", "windows.png"})):
+        for name in names:
+            (tmp_path / name).write_text("mine")
+            assert main([*words, "--quiet"]) == 2
+            assert (
+                f"{tmp_path / name}: it is there already. Choose another name, or replace it with --force"
+                in (capsys.readouterr().err)
+            )
+            assert (tmp_path / name).read_text() == "mine"
+            (tmp_path / name).unlink()
+    (tmp_path / "windows.csv").write_text("mine")
+    assert main([*one, "--quiet", "--windows", "1", "--force"]) == 0
+    assert (tmp_path / "windows.csv").read_text().startswith("window_s,")
 
 
 def test_prediction_of_an_unseen_recording_is_its_noise(folder: Path) -> None:
@@ -202,6 +228,13 @@ def test_the_papers_ten_coefficients_come_with_a_warning(tmp_path: Path) -> None
         added = zip(ten["weights"][name], (1, 2, 3), strict=True)
         total = sum(w * ten["values"][f"mu_c{i}_{name[-1]}"]["value"] for w, i in added)
         assert total == pytest.approx(found["value"], rel=1e-9)
+    headings = [
+        block.text
+        for section in report_damping.sections(tmp_path, fit, None)
+        for block in section.blocks
+        if isinstance(block, Heading)
+    ]
+    assert headings == ["Constants of the motion", "The paper's ten coefficients"]
     refused = command("fit", angles, *options)
     assert refused.returncode == 2
     assert "--laws paper" in refused.stderr

@@ -151,6 +151,8 @@ CUT = {
     "a note in one row": "time_s,voltage_v,note\n0,5,begin\n1,4,35\n",
     "both cut": "a,time_s,voltage_v,flag\n0,0020,5,3219\n0,0040,5,3301\n",
     "a flag": "time_s,voltage_v,flag\n1,5,32\n2,5,33\n",
+    "whole seconds cut": "time_s,voltage_v,flag\n0,125,5\n1,125,5\n",
+    "seconds cut that rise within": "time_s,voltage_v,x\n0,125,5\n0,250,6\n0,375,5\n",
     "times cut": "time_s,voltage_v,note\n0,002,5\n1,004,5\n",
     "leading zeros": "time_s,voltage_v,temperature\n1,5,02\n2,5,13\n",
     "many decimals": "time_s,voltage_v,x\n1,-5,6432\n2,+4,643\n3,5,64\n",
@@ -188,6 +190,22 @@ WHOLE = {
 def test_tables_of_whole_numbers_are_read(tmp_path: Path, kind: str) -> None:
     text, volts = WHOLE[kind]
     assert read(tmp_path, text).values["voltage_v"].tolist() == volts
+
+
+def test_times_of_whole_seconds_are_not_cut_of_their_decimals(tmp_path: Path) -> None:
+    """``0,125,5`` under ``t (s),voltage_v,flag``: 0.125 s and 5 V, or 0 s and 125 V. Milliseconds are whole often."""
+    path = tmp_path / "t.csv"
+    for time in ("t (s)", "Time [s]", "time", "t"):
+        path.write_text(f"a,{time},voltage_v,temperature\n9,0,125,21\n9,1,250,22\n")
+        with pytest.raises(
+            EncoderError, match="line 2: the commas may be decimal marks: 0,125 may be one number"
+        ):
+            read_encoder(path, column="voltage_v", time_column=time)
+    for time, milli in (("time_ms", 1e-3), ("t (us)", 1e-6)):
+        path.write_text(f"{time},voltage_v,flag\n0,125,5\n1,126,5\n")
+        found = read_encoder(path, column="voltage_v", time_column=time)
+        assert found.t_s == pytest.approx([0.0, milli])
+        assert found.value.tolist() == [125.0, 126.0]
 
 
 UNITS = {

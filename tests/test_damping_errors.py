@@ -5,11 +5,15 @@ from __future__ import annotations
 from dataclasses import asdict
 
 import numpy as np
+import pytest
+from pydpend.angles import LinkAngles
 from pydpend.coefficients import parameters
-from pydpend.damping import shooting
+from pydpend.damping import fit_damping, shooting
 from pydpend.damping.shooting import Solution, Track
-from pydpend.damping.uncertainty import covariance, invert
-from pydpend.model import derived
+from pydpend.damping.uncertainty import covariance
+from pydpend.errors import FitError
+from pydpend.information import check_errors, invert
+from pydpend.model import Damping, derived
 from pydpend.simulate import simulate
 
 from tests.free_decays import TRUTH, released
@@ -92,3 +96,48 @@ def test_jumps_that_are_there_are_counted_as_large_as_they_are() -> None:
     # About half of the 320 jumps' components is free: their variance scatters by sqrt(2/160) = 0.11; three of these.
     assert shown[0] < 0.33
     assert abs(shown[1] - 1) < 0.33
+
+
+@pytest.mark.parametrize(
+    ("mu_n_m_s", "seconds", "method", "laws", "message"),
+    [
+        (0.6, 3.0, "trajectory", "full", "has no standard error"),
+        (0.6, 3.0, "energy", "mu_v1", "no motion of this pendulum comes near the angles"),
+        (2.0, 3.0, "trajectory", "mu_v1,mu_v2", "the motion is not determined by these angles"),
+        (100.0, 20.0, "trajectory", "mu_v1", "Check the units"),
+    ],
+)
+def test_damping_that_lets_nothing_swing_is_refused(
+    mu_n_m_s: float, seconds: float, method: str, laws: str, message: str
+) -> None:
+    """A pendulum that creeps back says little of its laws: no standard error is 0, none is not a number."""
+    t = np.arange(0.0, seconds, 2e-3)
+    motion = simulate(derived("A"), Damping(mu_v1=mu_n_m_s, mu_v2=mu_n_m_s / 5), [1.5, 1.2, 0.0, 0.0], t)
+    noise = np.random.default_rng(1).normal(0.0, 3e-4, motion.phi_rad.shape)
+    angles = LinkAngles(t, motion.phi_rad + noise, np.full_like(noise, 3e-4), name="creeping")
+    with pytest.raises(FitError, match=message):
+        fit_damping(angles, derived("A"), method, laws, start_s=0.0, stop_s=seconds - 0.1)
+
+
+def test_strong_damping_that_is_determined_is_fitted() -> None:
+    """0.3 N m s for 3 s: the links creep, and their creeping tells the two coefficients; the errors are true to 4."""
+    t = np.arange(0.0, 3.0, 2e-3)
+    motion = simulate(derived("A"), Damping(mu_v1=0.3, mu_v2=0.06), [1.5, 1.2, 0.0, 0.0], t)
+    noise = np.random.default_rng(1).normal(0.0, 3e-4, motion.phi_rad.shape)
+    angles = LinkAngles(t, motion.phi_rad + noise, np.full_like(noise, 3e-4))
+    fit = fit_damping(angles, derived("A"), laws="mu_v1,mu_v2", start_s=0.0, stop_s=2.9)
+    for name, truth in (("mu_v1", 0.3), ("mu_v2", 0.06)):
+        found = fit.coefficients[name]
+        assert abs(found.value - truth) < 4 * found.sigma
+        assert 0 < found.sigma < 0.02 * truth
+
+
+def test_an_inverse_is_huge_where_nothing_is_known() -> None:
+    """The third unknown is the sum of the others: its direction has a huge variance, where a pseudo-inverse has 0."""
+    rows = np.random.default_rng(3).normal(size=(50, 2))
+    design = np.column_stack([rows, rows.sum(axis=1)])
+    assert (np.diag(invert(design.T @ design)) > 1e9).all()
+    with pytest.raises(FitError, match="do not determine the coefficients"):
+        invert(np.array([[1.0, np.inf], [np.inf, 1.0]]))
+    with pytest.raises(FitError, match="b has no standard error"):
+        check_errors(["a", "b"], np.diag([1.0, 0.0]))

@@ -106,7 +106,7 @@ def test_what_is_read_is_never_replaced(tmp_path: Path, monkeypatch: pytest.Monk
         )
         refused(["export", "nodes.parquet", "-o", f"{prefix}hard.mat", "--force"], "it is read")
     refused(["angles", "nodes.parquet", "-o", "nodes.parquet", *zero], "nodes.parquet: it is read")
-    refused(["export", "nodes.parquet", "-o", "hard.csv"], "it is there already")
+    refused(["export", "nodes.parquet", "-o", "hard.csv"], "it is read")
     with keeping(["angles.parquet"]), pytest.raises(ArgumentError, match="it is read"):
         write_text("out/fit.json", "")
     assert before == (Path("nodes.parquet").read_bytes(), Path("angles.parquet").read_bytes())

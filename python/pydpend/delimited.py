@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pydpend.errors import Message, PydpendError, Setting, fault
+from pydpend.units import unit_at_end
 
 _EMPTY = frozenset({"", "nan", "na", "n/a", "null", "none"})
 """Fields (lower case, stripped) that mean "no value"."""
@@ -109,6 +110,8 @@ class Cells:
             row = self._row_of_decimals(
                 fields[left], fields[right], right, left in wanted and right not in wanted
             )
+            if row is None and left in wanted and right in wanted:
+                row = self._row_of_time_decimals(fields, left, wanted)
             if row is not None and not self._has_points():
                 self.refuse(
                     f"the commas may be decimal marks: {fields[left][row]},{fields[right][row]} may be one number, or "
@@ -117,6 +120,18 @@ class Cells:
                     "Write decimal points (5.0 for whole numbers too), or semicolons between the fields",
                     f"line {lines[row]}",
                 )
+
+    def _row_of_time_decimals(self, fields: dict[int, list[str]], time: int, wanted: set[int]) -> int | None:
+        """The first row in which whole seconds and the value beside them may be one time, 0,125, and the column behind
+        them, which nobody asked for, the value; ``None`` where it is not so."""
+        value, behind = time + 1, time + 2
+        if behind not in fields or behind in wanted or not _is_in_seconds(self.header[time]):
+            return None
+        given = [row for row, f in enumerate(fields[value]) if f]
+        if not all(_DIGITS.fullmatch(f) for column in (value, behind) for f in fields[column] if f):
+            return None
+        long = [row for row in given if len(fields[value][row]) >= _MANY_DECIMALS and fields[behind][row]]
+        return long[0] if long and 2 * len(long) >= len(given) else None
 
     def _has_points(self) -> bool:
         """Whether any row has a number with a decimal point, so that commas only part fields."""
@@ -312,6 +327,12 @@ def _names(line: str, delimiter: str) -> list[str]:
     while names and not names[-1]:
         names.pop()
     return names
+
+
+def _is_in_seconds(name: str) -> bool:
+    """Whether a column's name says that it holds times in seconds."""
+    unit = unit_at_end(name)[1]
+    return name.strip().lower() in ("t", "time") if unit is None else unit.name == "s"
 
 
 def _is_word(field: str) -> bool:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from pydpend import _tracker
 from pydpend.coefficients import coefficients, parameters
 from pydpend.errors import FitError, Setting, fault
+from pydpend.information import check_errors, invert, undetermined
 from pydpend.model import Model
 
 Floats = NDArray[np.float64]
@@ -135,7 +136,7 @@ def fit_profiles(profiles: Sequence[EnergyProfile], *, bounded: bool = True) -> 
     nearest to the energies. The covariance takes the residuals' autocorrelation from their integrated
     correlation time.
 
-    Raises FitError when the profiles do not have the same laws.
+    Raises FitError when the profiles do not have the same laws, or do not determine them.
     """
     names = profiles[0].names
     if any(p.names != names for p in profiles):
@@ -160,6 +161,10 @@ def fit_profiles(profiles: Sequence[EnergyProfile], *, bounded: bool = True) -> 
     low = np.concatenate([np.zeros(laws), np.full(len(profiles), -np.inf)]) if bounded else -np.inf
     weighted = design / sigma[:, None]
     size = np.linalg.norm(weighted, axis=0)
+    if not np.isfinite(size).all() or not (size > 0).all():
+        at = int(np.flatnonzero(~(np.isfinite(size) & (size > 0)))[0])
+        column = (*names, "the energy at the start")[min(at, laws)]
+        raise FitError(undetermined(f"what {column} does to the energies is {size[at]:g}"))
     result = scipy.optimize.lsq_linear(
         weighted / size, energy / sigma, bounds=(low, np.inf), method="bvls", tol=1e-14, max_iter=100
     )
@@ -170,8 +175,9 @@ def fit_profiles(profiles: Sequence[EnergyProfile], *, bounded: bool = True) -> 
     if not known:
         edges = np.cumsum([q.t_s.size for q in profiles])[:-1]
         growth = chi2 * max(correlation_time(r) for r in np.split(residual, edges))
-    covariance = growth * np.linalg.pinv(weighted.T @ weighted / np.outer(size, size)) / np.outer(size, size)
+    covariance = growth * invert(weighted.T @ weighted / np.outer(size, size)) / np.outer(size, size)
     covariance = covariance / np.outer(scale, scale)
+    check_errors(list(names), covariance[:laws, :laws])
     held = [name for name, v in zip(names, x, strict=False) if bounded and v <= 0]
     return EnergyFit(
         names,

@@ -15,6 +15,7 @@ from contextvars import ContextVar
 from pathlib import Path
 from typing import TypeAlias
 
+from pydpend._tracker import check_outputs
 from pydpend.errors import ArgumentError, fault
 
 AnyPath: TypeAlias = str | bytes | os.PathLike[str] | os.PathLike[bytes]
@@ -60,6 +61,18 @@ def check_kept(target: Path) -> None:
         raise ArgumentError(
             fault(str(target), "it is read, and writing it would destroy it", "Choose another name")
         )
+
+
+def check_new(paths: Iterable[AnyPath | None], *, replace: bool) -> None:
+    """Whether the files ``paths`` may be written: asked before the work that gives their content begins.
+
+    Raises:
+        ArgumentError: if one is read (see `keeping`), two are the same, or, unless ``replace``, one is there already.
+    """
+    files = [path_of(path) for path in paths if path is not None]
+    for file in files:
+        check_kept(file)
+    check_outputs([os.fspath(file) for file in files], [], replace)
 
 
 @contextmanager

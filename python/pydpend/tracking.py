@@ -196,7 +196,7 @@ def track(
         RigError: if the rig is wrong, does not fit the recording, or none can be found.
         TableError: if `output` is there already or cannot be written.
         ArgumentError: if an argument makes no sense.
-        KeyboardInterrupt: on Ctrl-C, within a second. What was done until then is the exception's `nodes`, and with
+        KeyboardInterrupt: on Ctrl-C, within two seconds. What was done until then is the exception's `nodes`, and with
             `output` it is kept there, to go on with `resume=True`.
     """
     existing = "resume" if resume else "replace" if force else "refuse"
@@ -268,7 +268,7 @@ def setup(
     Raises:
         SourceError, DetectError, RigError, ArgumentError: as `track`.
         RigError, FilmError: also if `output` or `picture` is there already, is the recording, or cannot be written.
-        KeyboardInterrupt: on Ctrl-C, within a second; nothing is written then.
+        KeyboardInterrupt: on Ctrl-C, within two seconds; nothing is written then.
     """
     callback, close = _callback(progress)
     try:
@@ -340,7 +340,7 @@ def overlay(
         TableError: if the nodes are not valid or not of this recording.
         FilmError: if `output` is there already or cannot be written.
         ArgumentError: if an argument makes no sense.
-        KeyboardInterrupt: on Ctrl-C, within a second; what was drawn is a whole film.
+        KeyboardInterrupt: on Ctrl-C, within two seconds; what was drawn is a whole film.
     """
     table = [] if isinstance(nodes, Nodes) else [os.fsdecode(nodes)]
     if not isinstance(nodes, Nodes):

@@ -9,7 +9,7 @@ that calls them.
 from __future__ import annotations
 
 from pydpend.angles.estimate import angles, find_linkage
-from pydpend.angles.files import read_angles, write_angles
+from pydpend.angles.files import read_angles, write_angles, written_files
 from pydpend.angles.hanging import parse_zero, roll_sigma
 from pydpend.angles.linkage import Linkage, Shape
 from pydpend.angles.misfit import misfits
@@ -38,4 +38,5 @@ __all__ = [
     "read_angles",
     "roll_sigma",
     "write_angles",
+    "written_files",
 ]

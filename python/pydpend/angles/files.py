@@ -250,6 +250,12 @@ def _read_pair(path: Path) -> tuple[Floats, Floats]:
     return array[0].astype(np.float64), array[1].astype(np.float64)
 
 
+def written_files(path: AnyPath) -> tuple[Path, ...]:
+    """The files that `write_angles` writes for the name of one."""
+    table = path_of(path)
+    return (table, table.with_name(table.name + ".json")) if table.suffix == ".csv" else (table,)
+
+
 def write_angles(angles: LinkAngles, path: AnyPath) -> None:
     """Writes the table as Parquet or CSV, by the ending; empty (null) where a link was not seen.
 
@@ -280,7 +286,7 @@ def write_angles(angles: LinkAngles, path: AnyPath) -> None:
                     for row in zip(*(v.tolist() for v in columns.values()), strict=True):
                         text.write(",".join("" if v != v else repr(v) for v in row) + "\n")
                 # Where the CSV is, its metadata are too.
-                write_text(path.with_name(path.name + ".json"), meta + "\n")
+                write_text(written_files(path)[1], meta + "\n")
     except OSError as problem:
         raise AnglesError(
             fault(str(path), f"the file cannot be written ({problem.strerror})", "Check the folder")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -27,6 +28,7 @@ from pydpend.angles.vertical import ROLL_SIGMA_DEG, picture_down, vertical_zero
 from pydpend.angles.zero import find_rest, zero_of
 from pydpend.errors import AnglesError, Setting, fault
 from pydpend.nodes import Nodes
+from pydpend.number_words import numbers
 from pydpend.series import highpass_noise
 
 VERTICAL = "vertical"
@@ -47,13 +49,14 @@ class Raw:
 def parse_zero(text: str) -> str | list[float] | None:
     """What a text says of the zero: a word that `angles` knows, or angles in degrees (``12.5,-3``) as rad; ``None`` if
     it can only be a file.
+
+    Raises OptionError for degrees that may be read in two ways.
     """
     if text in ("rest", "reference_frame") or text.partition("=")[0] == VERTICAL:
         return text
-    try:
-        return [float(np.radians(float(word))) for word in text.split(",")]
-    except ValueError:
+    if not re.fullmatch(r"[-+.,\deE]*\d[-+.,\deE]*", text):
         return None
+    return [float(np.radians(degrees)) for degrees in numbers(text, "zero")]
 
 
 def roll_sigma(zero: str) -> float:

@@ -19,6 +19,7 @@ from typing import Any
 from pydpend.cli.reads import read_by
 from pydpend.cli.words import RENAMED, CommandLine, unknown_command, unknown_option
 from pydpend.errors import PydpendError, listed, speaking
+from pydpend.number_words import number
 from pydpend.output import keeping
 from pydpend.terminal import Shown
 
@@ -42,11 +43,27 @@ def _version() -> str:
     return _tracker.VERSION
 
 
+def _number(word: str) -> float:
+    try:
+        return number(word)
+    except ValueError as problem:
+        raise argparse.ArgumentTypeError(str(problem)) from None
+
+
+def _whole_number(word: str) -> int:
+    try:
+        return int(word)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{word!r} is not a whole number") from None
+
+
 class Parser(argparse.ArgumentParser):
     """argparse's, saying what is wrong in one line and taking no option by half its name."""
 
     def __init__(self, **given: Any) -> None:
         super().__init__(**given, allow_abbrev=False, exit_on_error=False)
+        self.register("type", float, _number)
+        self.register("type", int, _whole_number)
 
     def error(self, message: str) -> Any:
         """Ends the program with one line."""

@@ -15,6 +15,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from pydpend.cli.writes import add_force, check_files
+
 HELP = "node table in, link angles with uncertainties out"
 
 
@@ -51,6 +53,7 @@ def add_arguments(p: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="draw methods 1 and 2 of the paper's Section 8.2.1 on the first link, with their errors",
     )
+    add_force(p)
     p.add_argument("--json", action="store_true", help="what was done, as JSON on stdout")
 
 
@@ -58,9 +61,10 @@ def run(args: argparse.Namespace) -> int:
     """Runs the command; 1 if something was left out and said."""
     import numpy as np
 
-    from pydpend.angles import angles, write_angles
+    from pydpend.angles import angles, write_angles, written_files
     from pydpend.nodes import read_nodes
 
+    check_files(args, *written_files(args.output), args.figure, args.methods_figure)
     nodes = read_nodes(args.nodes)
     found = angles(
         nodes,

@@ -12,6 +12,8 @@ from __future__ import annotations
 
 import argparse
 
+from pydpend.cli.writes import add_force, check_files
+
 HELP = "film of a recording beside its simulation"
 
 
@@ -19,7 +21,7 @@ def add_arguments(p: argparse.ArgumentParser) -> None:
     """The command's arguments."""
     p.add_argument("run_folder", metavar="RUN", help="a folder made by pydpend analyse, with a damping fit")
     p.add_argument("-o", "--output", required=True, metavar="FILM", help=".mp4 or .gif")
-    p.add_argument("--force", action="store_true", help="replace the film if it is there already")
+    add_force(p)
     p.add_argument("--recording", metavar="NAME", help="which recording, where there are several")
     p.add_argument(
         "--start",
@@ -45,7 +47,6 @@ def run(args: argparse.Namespace) -> int:
 
     import numpy as np
 
-    from pydpend._tracker import check_outputs
     from pydpend.angles import read_angles
     from pydpend.damping.stored import load_fit
     from pydpend.documents import read_json
@@ -55,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
     from pydpend.plots.folder import AGAIN, FigureError, chosen
     from pydpend.simulate import simulate
 
-    check_outputs([args.output], [], args.force)
+    check_files(args, args.output)
     r = chosen(args.run_folder, args.recording)
     stored = load_fit(r.run / "fit")
     model = stored.model()

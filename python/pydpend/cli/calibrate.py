@@ -13,6 +13,8 @@ import argparse
 import sys
 from pathlib import Path
 
+from pydpend.cli.writes import add_force, check_files
+
 HELP = "hold recordings in, the encoder's volts-to-angle line out"
 
 
@@ -27,6 +29,7 @@ def add_arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument("--range-v", default="0,10", metavar="LOW,HIGH", help="rails of the output (default 0,10)")
     p.add_argument("--wraps", action="store_true", help="single-turn encoder: it jumps from rail to rail")
     p.add_argument("--figure", metavar="FILE", help="draw line and residuals (.png, .svg, .pdf)")
+    add_force(p)
     p.add_argument("--json", action="store_true", help="the calibration on stdout too")
 
 
@@ -44,35 +47,25 @@ def add_signal_arguments(p: argparse.ArgumentParser) -> None:
     )
 
 
-def numbers(text: str, option: str) -> list[float]:
-    """Comma-separated numbers of an option. Raises :class:`~pydpend.errors.EncoderError` if they are not."""
-    from pydpend.errors import EncoderError, fault
-
-    try:
-        return [float(v) for v in text.split(",")]
-    except ValueError as problem:
-        raise EncoderError(
-            fault(option, f"{text!r} is not a list of numbers", "Use commas: 0,360,720")
-        ) from problem
-
-
 def run(args: argparse.Namespace) -> int:
     """Runs the command."""
     import numpy as np
 
     from pydpend.encoder import calibrate, read_holds
-    from pydpend.errors import EncoderError, fault
+    from pydpend.errors import EncoderError, Setting, fault
+    from pydpend.number_words import numbers
 
     if Path(args.output).suffix.lower() != ".json":
         raise EncoderError(
             fault(f"-o {args.output}", "a calibration is a .json", "Give a name that ends in .json")
         )
-    rails = numbers(args.range_v, "--range-v")
+    check_files(args, args.output, args.figure)
+    rails = numbers(args.range_v, "range_v")
     if len(rails) != 2 or rails[0] >= rails[1]:
-        raise EncoderError(fault("--range-v", f"{args.range_v!r} is not a range", "Give LOW,HIGH"))
+        raise EncoderError(fault(Setting("range_v"), f"{args.range_v!r} is not a range", "Give LOW,HIGH"))
     holds = read_holds(
         args.holds,
-        numbers(args.angles_deg, "--angles-deg") if args.angles_deg else None,
+        numbers(args.angles_deg, "angles_deg") if args.angles_deg else None,
         column=args.column,
         time_column=args.time_column,
         rate_hz=args.rate_hz,

@@ -15,6 +15,7 @@ from pathlib import Path
 
 from pydpend.cli.calibrate import add_signal_arguments
 from pydpend.cli.fit import add_table_arguments, read
+from pydpend.cli.writes import add_force, check_files
 
 HELP = "link angles and encoder in, their comparison out"
 
@@ -44,6 +45,7 @@ def add_arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument("--format", choices=("png", "svg", "pdf"), default="png", help="of the figures")
     add_signal_arguments(p)
     add_table_arguments(p)
+    add_force(p)
     p.add_argument("--json", action="store_true", help="compare.json on stdout too")
 
 
@@ -67,7 +69,10 @@ def run(args: argparse.Namespace) -> int:
     from pydpend.plots.encoder import calibration_figure, comparison_figure
     from pydpend.plots.style import save
 
-    check_folder(args.output)
+    folder = check_folder(args.output)
+    drawn = ("compare", "angles", "calibration") if args.calibration else ("compare", "angles")
+    names = ("compare.json", "residuals.parquet", *(f"{figure}.{args.format}" for figure in drawn))
+    check_files(args, *(folder / name for name in names))
     video = read(args.angles, args)
     signal = read_encoder(
         args.encoder, column=args.column, time_column=args.time_column, rate_hz=args.rate_hz, unit=args.unit
@@ -77,7 +82,7 @@ def run(args: argparse.Namespace) -> int:
         path = Path(args.calibration)
         line = calibrate(read_holds([path])) if path.is_dir() else read_calibration(path)
     found = compare(video, encoder_angles(signal, line), args.link - 1, clocks=args.clocks)
-    folder = results_folder(args.output)
+    results_folder(folder)
     try:
         write_text(folder / "compare.json", found.to_json())
         with whole(folder / "residuals.parquet") as new, new.open("wb") as file:

@@ -12,6 +12,7 @@ import argparse
 import json
 from pathlib import Path
 
+from pydpend.cli.writes import add_force, check_files
 from pydpend.errors import ArgumentError, Setting, fault
 
 HELP = "write a node table as C3D, TRC, DLTdv CSV or MAT"
@@ -22,17 +23,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("nodes", help="a node table, Parquet or CSV")
     parser.add_argument("-o", "--output", required=True, help="the file: .c3d, .trc, .csv or .mat")
     parser.add_argument("--px-per-m", type=float, help="scale of the image; C3D and TRC are then in mm")
-    parser.add_argument("--force", action="store_true", help="replace the file if it is there already")
+    add_force(parser)
     parser.add_argument("--json", action="store_true", help="print what was written as JSON")
 
 
 def run(args: argparse.Namespace) -> int:
     """Writes it."""
-    from pydpend._tracker import check_outputs
     from pydpend.export import SCALED, WRITERS, export
     from pydpend.nodes import read_nodes
 
-    check_outputs([args.output], [], args.force)
+    check_files(args, args.output)
     ending = Path(args.output).suffix.lower()
     if args.px_per_m is not None and ending in WRITERS and ending not in SCALED:
         raise ArgumentError(

@@ -19,6 +19,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from pydpend.cli.writes import add_force, check_files
 from pydpend.fit_options import FREE, INTERVALS, METHODS, RATIOS, check_fit, free_names
 from pydpend.terminal import below
 
@@ -129,7 +130,8 @@ def add_table_arguments(p: argparse.ArgumentParser) -> None:
 
 def add_output_arguments(p: argparse.ArgumentParser) -> None:
     """Where results go and how much is said."""
-    p.add_argument("-o", "--output", required=True, metavar="DIR", type=Path)
+    p.add_argument("-o", "--output", required=True, metavar="DIR", type=Path, help="folder for the results")
+    add_force(p)
     p.add_argument("--json", action="store_true", help="the result as JSON on stdout")
     p.add_argument("--quiet", action="store_true", help="no progress")
 
@@ -190,11 +192,13 @@ def run(args: argparse.Namespace) -> int:
     import warnings
 
     from pydpend.damping import fit_damping
-    from pydpend.damping.stored import write_fit, write_json
+    from pydpend.damping.stored import files_of_fit, write_fit, write_json
     from pydpend.output import check_folder, results_folder
 
-    check_folder(args.output)
     check_fit(args.method, args.laws, vars(args), single=args.pinned)
+    check_folder(args.output)
+    names = files_of_fit(len(args.angles), figures=not args.no_figures, maps=args.angle_maps)
+    check_files(args, *(args.output / name for name in names))
     recordings = [read(path, args) for path in args.angles]
     with warnings.catch_warnings():
         # The published constants' warning is one of the reasons in the refusal that follows.

@@ -10,6 +10,8 @@ from __future__ import annotations
 
 import argparse
 
+from pydpend.cli.writes import add_force, check_files
+
 HELP = "one figure of a run folder as PNG, SVG or PDF"
 
 
@@ -19,6 +21,7 @@ def add_arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument("run_folder", metavar="RUN", help="a folder made by pydpend analyse")
     p.add_argument("-o", "--output", required=True, metavar="FILE", help=".png, .svg or .pdf")
     p.add_argument("--recording", metavar="NAME", help="which recording, where there are several")
+    add_force(p)
 
 
 FIGURES = (
@@ -41,6 +44,7 @@ def run(args: argparse.Namespace) -> int:
     from pydpend.plots.folder import figure_of
     from pydpend.plots.style import save
 
+    check_files(args, args.output)
     figure = figure_of(args.figure, args.run_folder, args.recording)
     try:
         save(figure, args.output)

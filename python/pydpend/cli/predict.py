@@ -13,6 +13,7 @@ import json
 from pathlib import Path
 
 from pydpend.cli.fit import add_angles_arguments, add_output_arguments, read
+from pydpend.cli.writes import check_files
 from pydpend.output import check_folder, results_folder, write_text
 
 HELP = "predict a recording from a fit to others"
@@ -32,16 +33,16 @@ def run(args: argparse.Namespace) -> int:
     """Predicts and writes."""
     from pydpend.damping.prediction import slashed
     from pydpend.damping.stored import load_fit, write_json
-    from pydpend.errors import FitError, fault
+    from pydpend.errors import OptionError, Setting, fault
+    from pydpend.number_words import numbers
 
     check_folder(args.output)
+    check_files(args, *(args.output / name for name in ("predict.json", "windows.csv", "windows.png")))
+    windows = numbers(args.windows, "windows")
+    if min(windows) <= 0:
+        advice = "Give lengths above 0, decimals with a point: 0.5,1,2"
+        raise OptionError(fault(Setting("windows"), f"{min(windows):g} s is no length of a window", advice))
     stored = load_fit(args.fit)
-    try:
-        windows = [float(w) for w in args.windows.split(",")]
-    except ValueError:
-        windows = []
-    if not windows or min(windows) <= 0:
-        raise FitError(fault("--windows", f"{args.windows!r} is no list of lengths in s", "Write 0.5,1,2"))
     result = stored.predict(read(args.angles, args), windows, start_s=args.start_s, stop_s=args.stop_s)
     results_folder(args.output)
     write_json(args.output / "predict.json", result.to_json())

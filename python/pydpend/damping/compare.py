@@ -19,6 +19,7 @@ from pydpend.damping.result import Term
 from pydpend.damping.shooting import Progress
 from pydpend.damping.trajectory import FLOOR, HUBER, SEGMENT_S, length_of
 from pydpend.damping.uncertainty import covariance
+from pydpend.information import check_errors
 from pydpend.model import Model
 
 Floats = NDArray[np.float64]
@@ -79,6 +80,8 @@ def compare_terms(
         huber=huber,
     )
     cov = covariance(full, model_error=True)
+    rows = [full.names.index(name) for name in wanted]
+    check_errors(wanted, cov[np.ix_(rows, rows)])
     scale = np.sqrt(np.diag(cov))
     related = cov / np.outer(scale, scale)
 

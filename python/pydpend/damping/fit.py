@@ -12,7 +12,7 @@ from pydpend.angles import LinkAngles
 from pydpend.coefficients import RATIOS, parameters, ratios_of
 from pydpend.damping import shooting
 from pydpend.damping.compare import compare_terms
-from pydpend.damping.plausible import modes_hz
+from pydpend.damping.plausible import check_followed, modes_hz
 from pydpend.damping.prediction import held_out
 from pydpend.damping.profile import fit_energy
 from pydpend.damping.recording import Recording, check_distinct, prepare
@@ -134,6 +134,7 @@ def _energy(
         plausible_or_raise(r, model)
     tracks = [r.track for r in recordings]
     fit, few, profiles, smoothed = fit_energy(tracks, [r.span for r in recordings], model, names, progress)
+    check_followed([r.angles.name for r in recordings], smoothed.chi2)
     values = dict(zip(names, fit.values.tolist(), strict=True))
     sigma = dict(zip(names, np.sqrt(np.diag(fit.covariance)).tolist(), strict=True))
     constants = parameters(model) | values

@@ -19,8 +19,8 @@ from pydpend.coefficients import FULL, unit
 from pydpend.damping import shooting
 from pydpend.damping.result import Estimate, Interval
 from pydpend.damping.shooting import Progress, Solution, Track
-from pydpend.damping.uncertainty import invert
 from pydpend.errors import FitError
+from pydpend.information import invert
 
 Floats = NDArray[np.float64]
 

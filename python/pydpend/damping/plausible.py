@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -166,6 +167,24 @@ def check_model(track: Track, span: tuple[float, float], model: Model, name: str
 
 DERIVED = Step("--model derived", "dp.derived('A')")
 """The constants of the paper's pendulum, derived from its parts."""
+
+LOST = 1000.0
+"""Chi-square of loosely tied pieces beyond which nothing was found: wrong constants that are let through give tens."""
+
+
+def check_followed(names: Sequence[str], chi2: float) -> None:
+    """Raises FitError where even pieces of a motion with states of their own do not follow the angles of the recordings
+    ``names``: their chi-square is beyond `LOST`."""
+    if chi2 > LOST:
+        raise FitError(
+            fault(
+                ", ".join(names),
+                f"no motion of this pendulum comes near the angles (chi-square {chi2:.0f} even in pieces that are tied "
+                "loosely)",
+                "Give angles with fewer gaps, or check the model",
+            )
+        )
+
 
 TAIL_S = 8.0
 """Length of the end of the motion in which its small oscillations are looked at, s."""

@@ -121,6 +121,19 @@ def write_json(path: Path, content: dict[str, object]) -> None:
     write_text(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
 
 
+def files_of_fit(recordings: int, *, figures: bool, maps: bool) -> list[str]:
+    """Names of the files that a fit of so many recordings puts into its folder; ``maps``: it learns angle maps."""
+    suffixes = [suffix_of(k, recordings) for k in range(recordings)]
+    names = ["fit.json", "coefficients.csv"]
+    names += [f"{table}{suffix}.csv" for table in ("energy", "residuals") for suffix in suffixes]
+    names += ["trials.json"] if recordings > 1 else []
+    if figures:
+        names += ["shares.png", *(f"energy{suffix}.png" for suffix in suffixes)]
+        names += ["maps.png"] if maps else []
+        names += ["trials.png"] if recordings > 1 else []
+    return names
+
+
 def write_fit(fit: DampingFit, folder: Path) -> None:
     """Writes ``fit.json``, ``coefficients.csv``, and a table of energies and one of residuals per recording."""
     write_json(folder / "fit.json", fit.to_json())
@@ -149,4 +162,9 @@ def _write_table(path: Path, head: Sequence[str], columns: Sequence[Floats]) -> 
 
 def recording_suffix(fit: DampingFit, recording: int) -> str:
     """What tells the files of one recording from another's: nothing if there is one, else ``-1``, ``-2``, ..."""
-    return "" if len(fit.inputs) == 1 else f"-{recording + 1}"
+    return suffix_of(recording, len(fit.inputs))
+
+
+def suffix_of(recording: int, recordings: int) -> str:
+    """The same for one of so many recordings."""
+    return "" if recordings == 1 else f"-{recording + 1}"

@@ -18,6 +18,7 @@ from pydpend.damping.result import Estimate, TenCoefficients
 from pydpend.damping.shares import TERMS
 from pydpend.damping.shooting import Trace, Track
 from pydpend.energy import EnergyFit, EnergyProfile
+from pydpend.information import invert
 from pydpend.model import Model
 
 Floats = NDArray[np.float64]
@@ -119,7 +120,7 @@ def fit_ten(
     u = found.x / size
     norm = np.linalg.norm(design, axis=0)
     scaled = design / norm
-    cov = np.linalg.pinv(scaled.T @ scaled, rcond=1e-14) / np.outer(norm, norm)
+    cov = invert(scaled.T @ scaled) / np.outer(norm, norm)
     spread = np.sqrt(np.diag(cov))
     factor = np.concatenate([np.ones(4), constants(model).ravel()])
     one = scaled[:, :10] - scaled[:, 10:] @ np.linalg.lstsq(scaled[:, 10:], scaled[:, :10], rcond=None)[0]

@@ -17,6 +17,7 @@ from pydpend.damping.shares import energy_curve, shares, unit_works
 from pydpend.damping.shooting import Progress, Solution, Track
 from pydpend.damping.uncertainty import covariance, identifiability
 from pydpend.errors import FitError, fault
+from pydpend.information import check_errors
 from pydpend.model import Model
 
 Floats = NDArray[np.float64]
@@ -28,8 +29,6 @@ FLOOR = 0.05
 """Smallest slack, relative to what a segment's own samples determine its state to: information is then
 shared over 1/0.05 = 20 segments. Tighter, a segment near the upright answers to the rounding of its own integration."""
 HUBER = 3.5
-LOST = 1000.0
-"""Chi-square of loosely tied pieces beyond which nothing was found: wrong constants that are let through give tens."""
 
 
 def fit_trajectory(
@@ -74,15 +73,7 @@ def fit_trajectory(
         progress=progress,
     )
     segments, start, zeros = settled.segments, settled.parameters, settled.zeros_rad
-    if settled.chi2 > LOST:
-        raise FitError(
-            fault(
-                ", ".join(r.angles.name for r in recordings),
-                f"no motion of this pendulum comes near the angles (chi-square {settled.chi2:.0f} even in pieces of "
-                f"{shooting.PIECE_S} s)",
-                "Give angles with fewer gaps, or check the model",
-            )
-        )
+    plausible.check_followed([r.angles.name for r in recordings], settled.chi2)
     if len(segments) < 4:
         raise FitError(
             fault(
@@ -218,6 +209,7 @@ def _judge(
     rows = [i for i, n in enumerate(solution.names) if n in names or n in RATIOS]
     kept = tuple(solution.names[i] for i in rows)
     cov = cov[np.ix_(rows, rows)]
+    check_errors(list(kept), cov)
     psi = solution.parameters["psi"]
     scale = np.array([1 / psi if n in RATIOS else 1.0 for n in kept])
     cov = cov * np.outer(scale, scale)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from pydpend.coefficients import FULL, RATIOS, unit
 from pydpend.damping.result import Identifiability
 from pydpend.damping.shooting import Solution
+from pydpend.information import LEAST, invert, principal_axes
 
 Floats = NDArray[np.float64]
 
@@ -20,38 +21,19 @@ STRONG = 0.95
 """Correlation beyond which two coefficients are named as not told apart."""
 
 
-LEAST = 1e-14
-"""Part of the largest information, each unknown in its own scale, below which a direction is not determined at all."""
-
-
-def _axes(information: Floats) -> tuple[Floats, Floats]:
-    """Principal values (G,) of a symmetric information matrix scaled to a unit diagonal, and what each is of, as
-    columns (G, G) in the unknowns' own units."""
-    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
-    scaled = information / np.outer(scale, scale)
-    values, vectors = np.linalg.eigh((scaled + scaled.T) / 2)
-    return values, vectors / scale[:, None]
-
-
-def invert(information: Floats) -> Floats:
-    """Inverse of a symmetric information matrix, scaled first; directions it lacks get a huge variance."""
-    values, axes = _axes(information)
-    out: Floats = (axes / np.maximum(values, LEAST)) @ axes.T
-    return out
-
-
+@np.errstate(over="ignore", invalid="ignore")
 def covariance(solution: Solution, *, model_error: bool) -> Floats:
     """Covariance (G, G) of the common unknowns.
 
     Each source of error counts with the variance it has, not with the one the fit allowed it: the angles' noise with
     chi-square, the jumps with what they show of the slack (`Solution.jumps_shown`; docs/damping.md has the derivation).
     With model error also the sandwich from the scores of blocks of about a second, and of each standard error the
-    larger one is taken.
+    larger one is taken. Where the angles determine nothing, it is not finite (`information.check_errors`).
     """
     bread = invert(solution.information)
     meat = solution.angle_information * max(1.0, solution.chi2) + solution.jump_information
     # What is not determined has no errors to add up: it keeps its huge variance.
-    values, axes = _axes(solution.information)
+    values, axes = principal_axes(solution.information)
     lost = axes[:, values < LEAST]
     plain: Floats = bread @ meat @ bread + lost @ lost.T / LEAST
     if not model_error:

@@ -1,0 +1,55 @@
+"""Numbers in the words of an option: ``0.5``, or a list of them as ``0.5,1,2``.
+
+Commas part the numbers of a list and points mark decimals. A word that could be read in two ways is refused.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+
+from pydpend.errors import OptionError, Setting, fault
+
+_CUT_DECIMALS = re.compile(r"[+-]?\d+,0\d")
+"""Digits behind a comma that begin with 0, as decimals do and whole numbers do not: ``12,05``."""
+
+
+def number(word: str) -> float:
+    """The number that a word is. Raises ValueError with what is wrong and how to write it."""
+    try:
+        if "_" in word:
+            raise ValueError
+        return float(word)
+    except ValueError:
+        advice = f". Write {word.replace(',', '.')}" if re.fullmatch(r"[+-]?\d*,\d+", word) else ""
+        raise ValueError(f"{word!r} is not a number{advice}") from None
+
+
+def numbers(text: str, setting: str) -> list[float]:
+    """The numbers of a list with commas, the value of the option ``setting``.
+
+    Raises:
+        OptionError: if a part is no number, or the commas may be decimal marks.
+    """
+    cut = _CUT_DECIMALS.search(text)
+    if cut is not None:
+        raise OptionError(
+            fault(
+                Setting(setting),
+                f"the commas of {text!r} may be decimal marks: {cut[0]} may be one number or two",
+                "Write decimals with a point, and commas between the numbers: 0.5,1,2",
+            )
+        )
+    try:
+        out = [number(word) for word in text.split(",")]
+    except ValueError:
+        out = []
+    if not out or not all(map(math.isfinite, out)):
+        raise OptionError(
+            fault(
+                Setting(setting),
+                f"{text!r} is not a list of numbers",
+                "Write decimals with a point, and commas between the numbers: 0.5,1,2",
+            )
+        )
+    return out
