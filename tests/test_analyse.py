@@ -21,7 +21,7 @@ from pydpend.analyse.options import flag_of
 from pydpend.angles import read_angles
 from pydpend.cli import main, parser
 from pydpend.errors import PydpendError
-from pydpend.model import Damping, Model
+from pydpend.model import Damping, read_model
 from pydpend.nodes import read_nodes
 from pydpend.report import report_page
 from pydpend.report.page import Table
@@ -298,7 +298,7 @@ def test_a_single_pendulum(tmp_path: Path) -> None:
     bar = tmp_path / "bar.toml"
     bar.write_text("[constants]\npsi_kg_m2 = 4.38e-3\nsigma_j = 0.47088\nm1_kg = 0.4\n", encoding="utf-8")
     truth = Damping(mu_v1=5e-5, mu_q1=4e-5)
-    made = simulate(Model.from_toml(bar), truth, [np.pi - 0.06, 0.0, 0.0, 0.0], np.arange(6001) / 500)
+    made = simulate(read_model(bar), truth, [np.pi - 0.06, 0.0, 0.0, 0.0], np.arange(6001) / 500)
     phi = made.phi_rad[:, 0] + np.random.default_rng(3).normal(0.0, np.radians(0.02), made.t_s.size)
     for name, rows in (("one", slice(0, 3500)), ("two", slice(2500, 6001))):
         table = np.column_stack([made.t_s[rows], phi[rows]])

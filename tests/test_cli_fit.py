@@ -13,7 +13,7 @@ import pytest
 from pydpend.angles import LinkAngles
 from pydpend.cli import main
 from pydpend.energy import Motion
-from pydpend.model import Damping, Model
+from pydpend.model import Damping, read_model
 from pydpend.report import damping as report_damping
 from pydpend.report.page import Heading
 from pydpend.simulate import simulate
@@ -163,10 +163,10 @@ def test_a_single_pendulum_with_a_model_of_one_link(folder: Path, tmp_path: Path
     bar.write_text('[[part]]\nname = "bar"\nbody = 1\nmass_kg = 0.4\ninertia_kg_m2 = 3e-3\nplace_m = 0.12\n')
     constants = tmp_path / "constants.toml"
     constants.write_text("[constants]\npsi_kg_m2 = 4.38e-3\nsigma_j = 0.47088\nm1_kg = 0.4\n")
-    model = Model.from_toml(bar)
+    model = read_model(bar)
     # 2 psi = 3e-3 + 0.4 * 0.12^2 kg m2 and sigma = 0.4 * 9.81 * 0.12 J
     assert model.links == 1
-    assert Model.from_toml(constants).constants() == pytest.approx(model.constants(), rel=1e-12)
+    assert read_model(constants).constants() == pytest.approx(model.constants(), rel=1e-12)
     truth = Damping(mu_v1=5e-5, mu_q1=4e-5, rmu1=6e-5)
     # What stands for a lower link hangs at rest.
     made = simulate(model, truth, [np.pi - 0.06, 0.0, 0.0, 0.0], np.arange(8001) / 500)

@@ -16,7 +16,7 @@ from pydpend.damping.stored import load_fit
 from pydpend.documents import read_json, read_toml
 from pydpend.encoder import read_calibration, read_encoder
 from pydpend.errors import EncoderError, PydpendError
-from pydpend.model import Model
+from pydpend.model import read_model
 
 DEEP = 5000
 DIGITS = "9" * 5000
@@ -56,7 +56,7 @@ TOML: dict[str, tuple[str | bytes | None, str]] = {
 
 
 @pytest.mark.parametrize("kind", TOML)
-@pytest.mark.parametrize("reader", [Model.from_toml, read_config])
+@pytest.mark.parametrize("reader", [read_model, read_config])
 def test_toml_that_is_none(tmp_path: Path, kind: str, reader: Callable[[Path], Any]) -> None:
     data, message = TOML[kind]
     path = tmp_path / "a.toml"
@@ -73,7 +73,7 @@ def test_toml_that_is_none(tmp_path: Path, kind: str, reader: Callable[[Path], A
 def test_a_byte_order_mark_and_other_line_ends_do_no_harm(tmp_path: Path, encoding: str) -> None:
     path = tmp_path / "m.toml"
     path.write_bytes('name = "bar"\r\n[constants]\rpsi_kg_m2 = 1e-3\nsigma_j = 0.1\n'.encode(encoding))
-    assert Model.from_toml(path).psi_kg_m2 == 1e-3
+    assert read_model(path).psi_kg_m2 == 1e-3
     path.write_bytes("threads = 1\r\n".encode(encoding))
     assert read_config(path).threads == 1
 
@@ -104,7 +104,7 @@ def test_models_that_are_none(tmp_path: Path, kind: str) -> None:
     path = tmp_path / "m.toml"
     path.write_text(text)
     with pytest.raises(PydpendError, match=message) as caught:
-        Model.from_toml(path)
+        read_model(path)
     assert "\n" not in str(caught.value)
 
 

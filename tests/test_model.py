@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from pydpend.errors import ModelError
-from pydpend.model import CONSTANTS, Damping, Model, ModelWarning, derived, published
+from pydpend.model import CONSTANTS, Damping, Model, ModelWarning, derived, published, read_model
 
 # Errata section 0, g mm2 and g mm2/s2, and the rounding they are printed with.
 EXPECTED = {
@@ -89,7 +89,7 @@ place_m = 0.11678
 def test_two_bars_from_a_file_of_parts(tmp_path: Path) -> None:
     path = tmp_path / "bars.toml"
     path.write_text(PARTS)
-    model = Model.from_toml(path)
+    model = read_model(path)
     # The textbook double pendulum, by hand.
     assert 2 * model.psi_kg_m2 == pytest.approx(
         4.375e-4 + 0.09384 * 0.10857**2 + 0.1376 * 0.17272**2, rel=1e-12
@@ -108,13 +108,13 @@ def test_constants_from_a_file(tmp_path: Path) -> None:
     lines = [f"{name} = {getattr(right, name)!r}" for name in CONSTANTS]
     path = tmp_path / "c.toml"
     path.write_text("g_m_s2 = 9.81\n[constants]\n" + "\n".join(lines))
-    model = Model.from_toml(path)
+    model = read_model(path)
     assert np.array_equal(model.constants(), right.constants())
 
 
 def test_table_8_as_a_file_of_parts_gives_the_same_constants() -> None:
     """The example of docs/model.md is configuration A: same numbers through the user's own way."""
-    model = Model.from_toml(Path(__file__).parents[1] / "docs" / "model-a.toml")
+    model = read_model(Path(__file__).parents[1] / "docs" / "model-a.toml")
     right = derived("A")
     np.testing.assert_allclose(model.constants(), right.constants(), rtol=1e-12)
     # The file's numbers are independent where Table 8's identical parts are fully correlated, but the upper
@@ -142,7 +142,7 @@ def test_a_bad_file_says_where(tmp_path: Path, change: tuple[str, str], message:
     path = tmp_path / "bad.toml"
     path.write_text(PARTS.replace(*change))
     with pytest.raises(ModelError, match=message) as error:
-        Model.from_toml(path)
+        read_model(path)
     assert str(path) in str(error.value)
 
 

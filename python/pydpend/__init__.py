@@ -39,7 +39,7 @@ from pydpend.errors import (
 from pydpend.export import export
 from pydpend.filming import Film, Truth, film
 from pydpend.linear import lyapunov, modes, poincare
-from pydpend.model import Damping, Model, derived, published
+from pydpend.model import Damping, Model, derived, published, read_model
 from pydpend.nodes import Nodes, Rig, read_nodes
 from pydpend.scoring import Score, score
 from pydpend.simulate import Simulation, simulate, simulate_many
@@ -102,6 +102,7 @@ __all__ = [
     "read_calibration",
     "read_encoder",
     "read_holds",
+    "read_model",
     "read_nodes",
     "savitzky_golay",
     "score",

@@ -191,7 +191,7 @@ impl Kind {
             ),
             Self::Model => type_this(
                 format!("pydpend fit ANGLES --model {file} -o damping/"),
-                format!("dp.Model.from_toml({name:?})"),
+                format!("dp.read_model({name:?})"),
             ),
             Self::Config => type_this(
                 format!("pydpend analyse --config {file} -o run/"),

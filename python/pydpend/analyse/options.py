@@ -13,6 +13,7 @@ from pydpend.documents import read_toml
 from pydpend.errors import OptionError, Setting, Step, fault, one_of
 from pydpend.fit_options import INTERVALS, METHODS, RATIOS, check_fit
 from pydpend.kinds import Kind, expect
+from pydpend.model import check_model_called
 
 CHOICES = {
     "method": METHODS,
@@ -155,14 +156,7 @@ def check_files(options: Options) -> None:
         expect(name, kinds, OptionError, field)
         if field in ("rig", "encoder", "calibration") and not Path(name).exists():
             raise OptionError(fault(Setting(field), f"there is no file {name}", "Check the name"))
-    if options.model not in ("derived", "published") and not Path(options.model).is_file():
-        raise OptionError(
-            fault(
-                Setting("model"),
-                f"there is no file {options.model}",
-                "Give derived, published or a pendulum's TOML file",
-            )
-        )
+    check_model_called(options.model)
     zero = options.zero
     said = parse_zero(zero)
     if said is None and not Path(zero).exists():

@@ -23,7 +23,6 @@ from pydpend.output import whole
 if TYPE_CHECKING:
     from pydpend.analyse.recordings import Recording
     from pydpend.angles import LinkAngles
-    from pydpend.model import Model
     from pydpend.nodes import Nodes
 
 Tell = Callable[[str], None]
@@ -215,21 +214,6 @@ def _angles(folder: Path, found: tuple[Recording, ...]) -> list[LinkAngles]:
     ]
 
 
-def _model(options: Options) -> Model:
-    import warnings
-
-    from pydpend.model import Model, derived, published
-
-    if options.model == "derived":
-        return derived("A")
-    if options.model == "published":
-        with warnings.catch_warnings():
-            # What is wrong with published constants is said by the fit itself, with numbers.
-            warnings.simplefilter("ignore")
-            return published()
-    return Model.from_toml(options.model)
-
-
 def encoder(r: Recording, options: Options, here: Path, into: Path) -> str:
     """Calibrates the encoder and compares the film's phi1 with it."""
     from pydpend.angles import read_angles
@@ -263,11 +247,11 @@ def fit(found: tuple[Recording, ...], options: Options, folder: Path, into: Path
     """Damping of all recordings together, and of each if there are several."""
     from pydpend.damping import fit_damping
     from pydpend.damping.stored import write_fit
-    from pydpend.model import CONSTANTS
+    from pydpend.model import CONSTANTS, model_called
     from pydpend.plots.damping import save_figures
     from pydpend.trials import summary
 
-    recordings, model, settings = _angles(folder, found), _model(options), _settings(options)
+    recordings, model, settings = _angles(folder, found), model_called(options.model), _settings(options)
     trajectory = options.method == "trajectory"
     fitted = fit_damping(
         recordings,
@@ -330,9 +314,10 @@ def prediction(found: tuple[Recording, ...], options: Options, folder: Path, int
     from pydpend.damping import fit_damping
     from pydpend.damping.single import reduced
     from pydpend.damping.stored import StoredFit
+    from pydpend.model import model_called
     from pydpend.plots.damping import windows_columns
 
-    recordings, model = _angles(folder, found), _model(options)
+    recordings, model = _angles(folder, found), model_called(options.model)
     if options.pinned:
         recordings, model = reduced(recordings, model, True)
     out = {}

@@ -26,7 +26,6 @@ from pydpend.terminal import below
 if TYPE_CHECKING:
     from pydpend.angles import LinkAngles
     from pydpend.damping import DampingFit
-    from pydpend.model import Model
 
 HELP = "damping of each joint from angles of free decays"
 
@@ -155,21 +154,6 @@ def read(path: str, args: argparse.Namespace) -> LinkAngles:
     )
 
 
-def load_model(name: str) -> Model:
-    """``derived``, ``published`` or a TOML file."""
-    from pydpend import model
-    from pydpend.errors import OptionError, Setting, fault
-
-    if name == "derived":
-        return model.derived("A")
-    if name == "published":
-        return model.published()
-    if not Path(name).exists():
-        advice = "Give derived, published or a pendulum's TOML file"
-        raise OptionError(fault(Setting("model"), f"there is no file {name}", advice))
-    return model.Model.from_toml(name)
-
-
 def progress(label: str, quiet: bool) -> Callable[[int, int, float], None] | None:
     """Iteration, chi-square and time left on stderr, when it is a terminal."""
     if quiet or not sys.stderr.isatty():
@@ -189,10 +173,9 @@ def progress(label: str, quiet: bool) -> Callable[[int, int, float], None] | Non
 
 def run(args: argparse.Namespace) -> int:
     """Fits and writes. 1 when the fit did not converge."""
-    import warnings
-
     from pydpend.damping import fit_damping
     from pydpend.damping.stored import files_of_fit, write_fit, write_json
+    from pydpend.model import model_called
     from pydpend.output import check_folder, results_folder
 
     check_fit(args.method, args.laws, vars(args), single=args.pinned)
@@ -200,10 +183,7 @@ def run(args: argparse.Namespace) -> int:
     names = files_of_fit(len(args.angles), figures=not args.no_figures, maps=args.angle_maps)
     check_files(args, *(args.output / name for name in names))
     recordings = [read(path, args) for path in args.angles]
-    with warnings.catch_warnings():
-        # The published constants' warning is one of the reasons in the refusal that follows.
-        warnings.simplefilter("ignore")
-        model = load_model(args.model)
+    model = model_called(args.model)
     options = {
         "method": args.method,
         "laws": args.laws,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pydpend.model.file import check_model_called, model_called, read_model
 from pydpend.model.laws import UNITS, Damping, constants, parameters
 from pydpend.model.pendulum import CONSTANTS, Model, uniform_bar
 from pydpend.model.reduce import (
@@ -23,12 +24,15 @@ __all__ = [
     "Damping",
     "Model",
     "ModelWarning",
+    "check_model_called",
     "constants",
     "derived",
     "from_parts",
     "jacobian",
+    "model_called",
     "parameters",
     "published",
+    "read_model",
     "reduced_constants",
     "uniform_bar",
 ]

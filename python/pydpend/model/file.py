@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+import warnings
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,10 +12,10 @@ import numpy as np
 
 from pydpend.components import Balls, Cage, Configuration, Part, Quantity, Races, Rigid
 from pydpend.documents import Table, read_toml
-from pydpend.errors import ModelError, fault
+from pydpend.errors import ModelError, OptionError, Setting, fault, listed
 from pydpend.kinds import expect
 from pydpend.model.pendulum import CONSTANTS, Model, uniform_bar
-from pydpend.model.reduce import constants_of, from_parts
+from pydpend.model.reduce import ModelWarning, constants_of, derived, from_parts, published
 from pydpend.output import AnyPath, path_of
 
 # Every number may be plain or [value, standard uncertainty]; its key ends in its unit.
@@ -52,7 +53,10 @@ _KIND = {
 
 
 def read_model(path: AnyPath) -> Model:
-    """The model of a TOML file. Raises ModelError naming the file and the key or part."""
+    """A pendulum from a TOML file of parts or of reduced constants (docs/model.md has the form).
+
+    Raises ModelError naming the file and the part or key at fault.
+    """
     path = path_of(path)
     expect(path, ("model",), ModelError)
     data = read_toml(path, ModelError, "docs/model.md has examples")
@@ -63,6 +67,33 @@ def read_model(path: AnyPath) -> Model:
             )
         )
     return _from_constants(data, path) if "constants" in data else _from_parts(data, path)
+
+
+NAMED: Mapping[str, Callable[[], Model]] = {"derived": lambda: derived("A"), "published": published}
+"""Models of the paper's pendulum by the word that an option has for them."""
+
+
+def model_called(word: str) -> Model:
+    """The model that the option ``model`` names: one of `NAMED`, or a TOML file. What is wrong with the published
+    constants is not warned of: whoever uses them says it with numbers.
+
+    Raises:
+        OptionError: if there is no such file.
+        ModelError: as `read_model`.
+    """
+    if word in NAMED:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ModelWarning)
+            return NAMED[word]()
+    check_model_called(word)
+    return read_model(word)
+
+
+def check_model_called(word: str) -> None:
+    """Raises OptionError if the option ``model`` names neither one of `NAMED` nor a file."""
+    if word not in NAMED and not Path(word).is_file():
+        advice = f"Give {listed((*NAMED, 'a pendulum in TOML'))}"
+        raise OptionError(fault(Setting("model"), f"there is no file {word}", advice))
 
 
 def _pair(value: Any, where: str, key: str) -> tuple[float, float]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, fields
-from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
@@ -96,16 +95,6 @@ class Model:
             raise ModelError(
                 fault(self.name, f"covariance of shape {np.shape(self.covariance)}", "It must be (9, 9)")
             )
-
-    @classmethod
-    def from_toml(cls, path: str | Path) -> Model:
-        """A pendulum from a TOML file of parts or of reduced constants (docs/model.md has the form).
-
-        Raises ModelError naming the file and the part or key at fault.
-        """
-        from pydpend.model.file import read_model
-
-        return read_model(path)
 
     @classmethod
     def one_link(
