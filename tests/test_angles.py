@@ -53,7 +53,7 @@ def bounds(phi: Floats, method: Method) -> Floats:
 def test_errors_are_at_the_bound_and_as_stated(method: Method, seed: int) -> None:
     t, phi = tumbling(25_000, seed)
     found = angles(rig.film(t, phi, seed), method, zero="reference_frame")
-    # The rig's places in its reference frame are rough by 0.3 px: that is a turn common to all frames.
+    # The rig's places in its reference picture are rough by 0.3 px: that is a turn common to all frames.
     error = found.phi_rad - phi
     error -= error.mean(axis=0)
     bound = bounds(phi, method)

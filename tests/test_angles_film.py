@@ -82,7 +82,7 @@ def measured(seed: int, folder: Path) -> dict[Method, tuple[Floats, Floats]]:
         found = dp.angles(nodes, method, zero="reference_frame", gaps="stop")
         assert found.meta["notes"] == []
         error = found.phi_rad - truth.phi_rad
-        # Turns of the reference frame and of the first frame are common to all frames.
+        # Turns of the reference picture and of the first frame are common to all frames.
         error -= np.nanmedian(error, axis=0)
         least = bound(places, weight, None if method == "rigid" else lever)
         ratio2 = np.nanmean(error[whole] ** 2, axis=0) / (least**2).mean(axis=0)

@@ -49,7 +49,7 @@ def top_modules() -> list[str]:
 RUST_GROUPS: dict[str, tuple[tuple[str, ...], ...]] = {
     "tracker": (
         ("message", "name", "csv_text", "error", "stop", "output", "kind"),
-        ("pixel_aspect", "gaps", "frame", "observation", "timing", "brightest", "rig"),
+        ("pixel_aspect", "gaps", "frame", "observation", "timing", "peak_level", "rig"),
         ("source",),
         ("detect",),
         ("table", "store"),

@@ -50,7 +50,7 @@ def thrown(deg: tuple[float, ...], w: tuple[float, float], throw_s: float) -> tu
 
 
 def filmed(t: Floats, phi: Floats, roll_deg: float = 0.0, zero: Any = "rest") -> LinkAngles:
-    """The angles of a film whose camera is rolled, the links pointing down in its reference frame."""
+    """The angles of a film whose camera is rolled, the links pointing down in its reference picture."""
     roll = np.radians(roll_deg)
     # Turning the camera about its axis turns everything about the pivot by the same angle.
     return angles(rig.film(t, phi + roll, 41, reference_rad=(roll, roll)), zero=zero)

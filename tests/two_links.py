@@ -52,7 +52,7 @@ def film(
 ) -> Nodes:
     """The node table of a motion (T, L). ``stated`` times the true noise goes into ``sigma_px``.
 
-    ``reference_rad``: the links' angles in the rig's reference frame. ``moved_px`` (T, N, 2) is added to the
+    ``reference_rad``: the links' angles in the rig's reference picture. ``moved_px`` (T, N, 2) is added to the
     centres: faults of the film.
     """
     links = phi_rad.shape[1]

@@ -87,7 +87,7 @@ def setup(
     replace: bool,
     progress: Callback,
 ) -> tuple[str, list[Message], NDArray[np.uint8]]:
-    """The rig as JSON, warnings, and the reference frame with the rig drawn, (H, W, 3), red, green, blue."""
+    """The rig as JSON, warnings, and the reference picture with the rig drawn, (H, W, 3), red, green, blue."""
 
 def overlay_film(
     input: str,

@@ -30,7 +30,7 @@ STATUS_WORDS = ("missing", "seen", "reacquired", "ambiguous", "undecoded")
 
 @dataclass(frozen=True)
 class Node:
-    """One marker: its name, its body's name, its centre in the reference frame (px)."""
+    """One marker: its name, its body's name, its centre in the reference picture (px)."""
 
     name: str
     body: str
@@ -40,7 +40,7 @@ class Node:
 
 @dataclass(frozen=True)
 class Joint:
-    """A point that two bodies share, or with one body the fixed pivot; its place in the reference frame (px)."""
+    """A point that two bodies share, or with one body the fixed pivot; its place in the reference picture (px)."""
 
     name: str
     bodies: tuple[str, ...]
@@ -130,7 +130,7 @@ class Rig:
         return np.array([i for i, n in enumerate(self.nodes) if n.body == body], dtype=np.intp)
 
     def places_px(self) -> NDArray[np.float64]:
-        """Centres in the reference frame, (N, 2), px."""
+        """Centres in the reference picture, (N, 2), px."""
         return np.array([[n.x_px, n.y_px] for n in self.nodes])
 
 

@@ -228,9 +228,9 @@ class Setup(NamedTuple):
     """What `setup` found.
 
     Attributes:
-        rig: nodes, bodies, joints and the reference frame.
+        rig: nodes, bodies, joints and the reference picture.
         warnings: what to know of the rig and the recording, a sentence each.
-        picture: the reference frame with the rig and all other detections drawn, (H, W, 3) uint8, red, green, blue.
+        picture: the reference picture with the rig and all other detections drawn, (H, W, 3) uint8, red, green, blue.
     """
 
     rig: Rig
@@ -260,7 +260,7 @@ def setup(
     Args:
         path: the recording; it is read through.
         output: a rig file to write, to be looked at and edited.
-        picture: an image file to write, for example .png: the reference frame with all that was found.
+        picture: an image file to write, for example .png: the reference picture with all that was found.
         force: replace `output` and `picture` if they are there already.
         fps, frames, threads, progress, threshold, polarity, decoder, interlaced,
             allow_protocol, pixel_aspect: as in `track`.

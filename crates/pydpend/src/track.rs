@@ -88,7 +88,7 @@ pub fn track<'py>(
     }
 }
 
-/// A rig as JSON, warnings, and the reference frame with the rig drawn, (H, W, 3).
+/// A rig as JSON, warnings, and the reference picture with the rig drawn, (H, W, 3).
 type Found<'py> = (String, Messages<'py>, Bound<'py, PyArray3<u8>>);
 
 /// Finds the rig of a recording; rig and picture are also written if files are given.

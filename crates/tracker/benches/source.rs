@@ -16,7 +16,7 @@ use std::time::Instant;
 
 use criterion::{Criterion, Throughput};
 use rayon::prelude::*;
-use tracker::brightest::brightest;
+use tracker::peak_level::peak_level;
 use tracker::frame::Frame;
 use tracker::source::{Decoder, OpenOptions, open};
 
@@ -234,7 +234,7 @@ fn maxima(path: &Path) -> u64 {
         if batch.is_empty() {
             return sum;
         }
-        sum += batch.into_par_iter().map(|f| u64::from(brightest(&f).unwrap().unwrap())).sum::<u64>();
+        sum += batch.into_par_iter().map(|f| u64::from(peak_level(&f).unwrap().unwrap())).sum::<u64>();
     }
 }
 

@@ -10,7 +10,7 @@
 //! Image coordinates: x right, y down, pixel centres at integers, the first pixel is (0, 0). Times are integer
 //! ticks with a time base until they are written.
 
-pub mod brightest;
+
 pub mod csv_text;
 pub mod detect;
 pub mod discover;
@@ -23,6 +23,7 @@ pub mod name;
 pub mod observation;
 pub mod output;
 pub mod overlay;
+pub mod peak_level;
 pub mod pipeline;
 pub mod pixel_aspect;
 pub mod residual;

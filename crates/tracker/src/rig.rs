@@ -1,4 +1,4 @@
-//! The rig: nodes, bodies, joints, reference frame; and its TOML form.
+//! The rig: nodes, bodies, joints, reference picture; and its TOML form.
 //!
 //! Owns: [`Rig`] and what makes one valid. Must not: look at a recording (`discover` does).
 
@@ -24,9 +24,9 @@ pub struct Node {
     pub name: String,
     /// Name of its body.
     pub body: String,
-    /// Centre in the reference frame, px.
+    /// Centre in the reference picture, px.
     pub x_px: f64,
-    /// Centre in the reference frame, px.
+    /// Centre in the reference picture, px.
     pub y_px: f64,
 }
 
@@ -46,9 +46,9 @@ pub struct Joint {
     pub name: String,
     /// The one body that turns about a fixed point, or the two that share the point.
     pub bodies: Vec<String>,
-    /// Place in the reference frame, px.
+    /// Place in the reference picture, px.
     pub x_px: f64,
-    /// Place in the reference frame, px.
+    /// Place in the reference picture, px.
     pub y_px: f64,
 }
 
@@ -171,7 +171,7 @@ impl Rig {
         self.nodes.iter().map(|n| self.body_index(&n.body).unwrap_or(usize::MAX)).collect()
     }
 
-    /// Whether a node can be at this place of the reference frame. The image itself need not hold it: a link may reach
+    /// Whether a node can be at this place of the reference picture. The image itself need not hold it: a link may reach
     /// out of the image there. But a node is seen in some frame, and so is another of its body, so that it is no farther
     /// from the image than the image's diagonal.
     pub fn in_reach(&self, [x_px, y_px]: [f64; 2]) -> bool {
@@ -253,7 +253,7 @@ impl Rig {
                 return fault(
                     format!("node {}", n.name),
                     format!("it is at ({}, {}) px as node {} of its body is", n.x_px, n.y_px, o.name),
-                    "Give its own centre in the reference frame",
+                    "Give its own centre in the reference picture",
                 );
             }
             if !self.in_reach([n.x_px, n.y_px]) {
@@ -263,7 +263,7 @@ impl Rig {
                         "({}, {}) px is farther from the image of {w} x {h} px than its diagonal is long",
                         n.x_px, n.y_px
                     ),
-                    "Give its centre in the reference frame",
+                    "Give its centre in the reference picture",
                 );
             }
         }
@@ -295,7 +295,7 @@ impl Rig {
                 return fault(
                     format!("joint {}", j.name),
                     "its place is not finite".into(),
-                    "Give its place in the reference frame",
+                    "Give its place in the reference picture",
                 );
             }
         }

@@ -19,15 +19,15 @@ use crate::table::RunEnding;
 /// What a recording shows.
 #[derive(Debug)]
 pub struct Setup {
-    /// Nodes, bodies, joints and the reference frame.
+    /// Nodes, bodies, joints and the reference picture.
     pub rig: Rig,
     /// What to know of the rig and the recording, a sentence each.
     pub warnings: Vec<Message>,
-    /// The reference frame with the rig and all other detections drawn, 8-bit blue, green, red.
+    /// The reference picture with the rig and all other detections drawn, 8-bit blue, green, red.
     pub picture: Mat,
 }
 
-/// Finds the rig of a recording, which is read through for it and once more up to the reference frame. The output and
+/// Finds the rig of a recording, which is read through for it and once more up to the reference picture. The output and
 /// the rig of `settings` are not used.
 ///
 /// # Errors
@@ -64,7 +64,7 @@ pub fn find(settings: &RunSettings, observer: &mut dyn Observer) -> Result<Setup
     let saturated = detections.iter().filter(|d| d.flags.has(Flags::SATURATED)).count();
     if saturated > 0 {
         warnings.push(format!(
-            "{saturated} of {} markers are saturated in the reference frame: their centres are less exact. Less \
+            "{saturated} of {} markers are saturated in the reference picture: their centres are less exact. Less \
              light or a shorter exposure helps",
             detections.len()
         ).into());

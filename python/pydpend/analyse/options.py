@@ -79,7 +79,7 @@ class Options:
     """Learn angle-dependent tracking bias with the fit."""
     zero: str = "rest"
     """Where the links hang: ``rest`` (found in the recording), ``vertical`` (the picture's, uncertain by the camera's
-    roll: 1 deg, or ``vertical=0.5``), ``reference_frame``, degrees of each link in the rig's reference frame
+    roll: 1 deg, or ``vertical=0.5``), ``reference_frame``, degrees of each link in the rig's reference picture
     (``180,180``), or a film or node table of the same rig hanging still."""
     bodies: str | None = None
     """Names of the links in node tables from the pivot outwards, with a comma; the rig's order if not given."""

@@ -50,7 +50,7 @@ def angles(
     recording contradicts that (docs/angles.md); ``"vertical"`` is the picture's vertical, with the camera's roll as
     standard uncertainty, 1 deg or as in ``"vertical=0.5"``; the nodes of another recording with the same rig and
     camera take the rest from there; one number per link says at what angles, in rad, the links stand in the rig's
-    reference frame; ``"reference_frame"`` says 0 for both. The turn is such that the first angle lies within
+    reference picture; ``"reference_frame"`` says 0 for both. The turn is such that the first angle lies within
     (-pi, pi].
 
     ``bodies`` names the links from the pivot outwards (the rig's order by default). ``mirrored`` for a film

@@ -37,7 +37,7 @@ VERTICAL = "vertical"
 
 @dataclass(frozen=True, eq=False)
 class Raw:
-    """Turns from the rig's reference frame before unwrapping, (T, L), and what they came from."""
+    """Turns from the rig's reference picture before unwrapping, (T, L), and what they came from."""
 
     theta: Floats
     sigma: Floats
@@ -122,7 +122,7 @@ def zero_for(
         meta = {"from": "rest", "sigma_rad": sigma.tolist(), "rests": [j.to_json() for j in judged]}
         return value, meta | _told(swing, value), notes
     if isinstance(zero, str) and zero == "reference_frame":
-        value, meta = np.zeros(links), {"from": "reference frame"}
+        value, meta = np.zeros(links), {"from": "reference picture"}
     elif isinstance(zero, str):
         value, sigma = vertical_zero(down, roll_sigma(zero), label)
         meta = {
@@ -145,7 +145,7 @@ def zero_for(
 
 
 def _given(zero: object, links: int) -> Floats | None:
-    """The links' angles (L,) in the reference frame that a caller gives, rad; ``None`` if it is a word or a recording.
+    """The links' angles (L,) in the reference picture that a caller gives, rad; ``None`` if it is a word or a recording.
 
     Raises :class:`AnglesError` if it is none of these, or not one finite angle per link.
     """

@@ -31,7 +31,7 @@ _CHUNK = 4096
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """What stays the same in all frames, world directions (y up), px; turned as in the rig's reference frame.
+    """What stays the same in all frames, world directions (y up), px; turned as in the rig's reference picture.
 
     ``pivot_px`` (2,); ``upper_px`` (K1, 2): markers seen from the pivot; ``elbow_px`` (2,): the elbow seen
     from the pivot; ``lower_px`` (K2, 2): markers seen from the elbow. With one link, ``lower_px`` is (0,
@@ -54,7 +54,7 @@ class Linkage:
     """A fitted shape and its uncertainties.
 
     ``covariance_px2``: of (pivot x, y, elbow x, y), px^2; the elbow's part is along and across the upper
-    link as turned in the reference frame. ``length_px``: pivot to elbow, NaN with one link.
+    link as turned in the reference picture. ``length_px``: pivot to elbow, NaN with one link.
     ``sigma_scale``: factor by which the residuals make the stated sigmas larger; it is in every uncertainty
     here.
     """

@@ -41,9 +41,9 @@ TEMPLATE_FRAMES = 10_000
 class Pose:
     """Pose of one body in T frames; NaN where it cannot be had.
 
-    ``theta_rad`` (T,): turn from the rig's reference frame, counter-clockwise positive, within (-pi, pi].
+    ``theta_rad`` (T,): turn from the rig's reference picture, counter-clockwise positive, within (-pi, pi].
     ``centre_px`` (T, 2): the template's origin, world directions. ``sigma_rad`` (T,): standard uncertainty.
-    ``template_px`` (K, 2): the body's shape, turned as in the rig's reference frame, its mean at the origin.
+    ``template_px`` (K, 2): the body's shape, turned as in the rig's reference picture, its mean at the origin.
     ``used`` (T, K): markers used. ``chi2``, ``dof`` (T,): of the residuals with the stated sigmas.
     ``sigma_scale``: factor by which the residuals make the stated sigmas larger; it is in ``sigma_rad``.
     ``covered_factor``: by how much more the sigmas of markers were raised that may be covered at their edge.

@@ -26,7 +26,7 @@ distance."""
 
 @dataclass(frozen=True, eq=False)
 class Down:
-    """For each link the turn from the reference frame at which it points down in the picture.
+    """For each link the turn from the reference picture at which it points down in the picture.
 
     ``turn_rad`` (L,): within (-pi, pi], NaN where the link's joint is not known. ``sigma_rad`` (L,): how uncertain the
     link's own direction is. That of a link with two joints is the line through them; that of the last one leads from
@@ -60,7 +60,7 @@ def vertical_zero(down: Down, roll_sigma_rad: float, label: str) -> tuple[Floats
                 f"the joint of link {unknown[0] + 1} is not known, so the picture does not say when it hangs",
                 "Put the joint into the rig, or give "
                 + Setting("zero")
-                + " with the links' angles in the rig's reference frame or a recording in which they hang at rest",
+                + " with the links' angles in the rig's reference picture or a recording in which they hang at rest",
             )
         )
     return down.turn_rad, np.hypot(roll_sigma_rad, down.sigma_rad)
@@ -83,7 +83,7 @@ def _direction(places: Floats | None) -> tuple[float, float]:
 def _vectors(
     shape: Shape | None, nodes: Nodes, markers: list[BodyMarkers], mirrored: bool
 ) -> list[Floats | None]:
-    """For each link the places (K, 2) that say where it points, seen from its upper joint, in the reference frame."""
+    """For each link the places (K, 2) that say where it points, seen from its upper joint, in the reference picture."""
     if shape is not None:
         return [shape.upper_px] if shape.links == 1 else [shape.elbow_px[None], shape.lower_px]
     rig = nodes.rig

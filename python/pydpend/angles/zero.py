@@ -31,7 +31,7 @@ GIVE_ZERO = (
     + Setting("zero", "vertical")
     + " for the picture's vertical, or "
     + Setting("zero")
-    + " with the links' angles in the rig's reference frame or a recording in which they hang at rest"
+    + " with the links' angles in the rig's reference picture or a recording in which they hang at rest"
 )
 """What can be done where a recording has no zero of its own."""
 

@@ -35,7 +35,7 @@ def add_arguments(p: argparse.ArgumentParser) -> None:
         default="rest",
         metavar="WHERE",
         help="rest (found in the recording, default), vertical (the picture's, uncertain by the camera's roll: 1 deg, "
-        "or vertical=0.5), reference_frame, the links' angles in the rig's reference frame in degrees (12.5,-3), or "
+        "or vertical=0.5), reference_frame, the links' angles in the rig's reference picture in degrees (12.5,-3), or "
         "the node table of a recording at rest",
     )
     p.add_argument("--bodies", metavar="A,B", help="names of the links from the pivot outwards")

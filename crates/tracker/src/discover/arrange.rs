@@ -178,7 +178,7 @@ pub fn arrange(
             _ => format!("body{}", k + 1),
         })
         .collect();
-    // A body that the reference frame does not show hangs there from its joint.
+    // A body that the reference picture does not show hangs there from its joint.
     let mut poses: Vec<Isometry2<f64>> = found.iter().map(|f| Isometry2::new(f.link.home, 0.0)).collect();
     for &b in &order {
         poses[b] = match (found[b].poses.get(reference).copied().flatten(), &held[b]) {

@@ -14,9 +14,9 @@ use super::sample::Sample;
 use crate::detect::{Detection, Flags};
 use crate::error::Result;
 use crate::rigid::body::Link;
-use crate::rigid::index::Sky;
+use crate::rigid::index::DetectionIndex;
 use crate::rigid::pose::place;
-use crate::rigid::search::{Search, Sighting};
+use crate::rigid::search::{PoseHypothesis, Search};
 use crate::stop::Stop;
 
 /// Frames from which bodies are sought.
@@ -50,33 +50,38 @@ pub fn link_of(points: Vec<Vector2<f64>>, slack_px: f64) -> Link {
     }
 }
 
-/// Sightings of a free body in a frame, best first.
-pub fn sightings(link: &Link, sky: &Sky<'_>, free: &[bool], pairs: usize) -> Vec<Sighting> {
+/// Hypotheses of a free body in a frame, best first.
+pub fn hypotheses(
+    link: &Link,
+    index: &DetectionIndex<'_>,
+    free: &[bool],
+    pairs: usize,
+) -> Vec<PoseHypothesis> {
     let search = Search {
         link,
         anchors: &[],
-        sky,
+        index,
         free,
         window: None,
         reach_sigma: REACH_SIGMA,
         floor_px: FLOOR_PX,
         pairs,
     };
-    search.run().sightings
+    search.run().hypotheses
 }
 
 /// Pose of each body in each frame of the sample, where at least three of its nodes are seen and no other pose
 /// explains as many; with the detections that are its nodes.
-pub fn poses(links: &[Link], frame: &[Detection]) -> Vec<Option<Sighting>> {
-    let sky = Sky::new(frame);
-    let mut free = vec![true; sky.len()];
+pub fn poses(links: &[Link], frame: &[Detection]) -> Vec<Option<PoseHypothesis>> {
+    let index = DetectionIndex::new(frame);
+    let mut free = vec![true; index.len()];
     let mut out = vec![None; links.len()];
     let mut order: Vec<usize> = (0..links.len()).collect();
     order.sort_by_key(|&b| std::cmp::Reverse(links[b].nodes.len()));
     for b in order {
-        let mut found = sightings(&links[b], &sky, &free, 60).into_iter();
-        let Some(best) = found.next().filter(|s| s.support >= 3) else { continue };
-        let rival = found.take_while(|s| s.support + 1 >= best.support.max(4)).any(|s| {
+        let mut found = hypotheses(&links[b], &index, &free, 60).into_iter();
+        let Some(best) = found.next().filter(|s| s.inliers >= 3) else { continue };
+        let rival = found.take_while(|s| s.inliers + 1 >= best.inliers.max(4)).any(|s| {
             links[b].template.iter().any(|&t| (place(&s.fit.pose, t) - place(&best.fit.pose, t)).norm() > 2.0)
         });
         if rival {
@@ -100,8 +105,9 @@ pub fn alike(links: &[Link], stop: &Stop) -> Result<Option<(usize, usize)>> {
             stop.heed()?;
             let point = |p: &Vector2<f64>| Detection { x_px: p.x, y_px: p.y, ..Default::default() };
             let points: Vec<Detection> = links[b].template.iter().map(point).collect();
-            let found = sightings(&links[a], &Sky::new(&points), &vec![true; points.len()], PAIRS);
-            if found.first().is_some_and(|s| s.support == links[a].nodes.len()) {
+            let found =
+                hypotheses(&links[a], &DetectionIndex::new(&points), &vec![true; points.len()], PAIRS);
+            if found.first().is_some_and(|s| s.inliers == links[a].nodes.len()) {
                 return Ok(Some((a, b)));
             }
         }
@@ -118,10 +124,10 @@ fn groups(base: &[Detection], others: &[&[Detection]], stop: &Stop) -> Result<Ve
     let mut seen = vec![0_u32; n];
     for other in others {
         stop.heed()?;
-        let sky = Sky::new(other);
+        let index = DetectionIndex::new(other);
         let mut used_b = vec![false; other.len()];
         let mut motion: Vec<Option<usize>> = vec![None; n];
-        for (m, s) in sightings(&link, &sky, &vec![true; other.len()], PAIRS).iter().enumerate() {
+        for (m, s) in hypotheses(&link, &index, &vec![true; other.len()], PAIRS).iter().enumerate() {
             let fresh: Vec<(usize, usize)> = s
                 .picks
                 .iter()
@@ -129,7 +135,7 @@ fn groups(base: &[Detection], others: &[&[Detection]], stop: &Stop) -> Result<Ve
                 .filter_map(|(i, d)| d.map(|d| (i, d)))
                 .filter(|&(i, d)| motion[i].is_none() && !used_b[d])
                 .collect();
-            if s.support < 3 {
+            if s.inliers < 3 {
                 break;
             }
             if fresh.len() < 3 {
@@ -289,7 +295,7 @@ fn crowds(points: &[(usize, Vector2<f64>)], least: usize) -> Vec<Vector2<f64>> {
     const NEAR_PX: f64 = 0.8;
     let stars: Vec<Detection> =
         points.iter().map(|p| Detection { x_px: p.1.x, y_px: p.1.y, ..Default::default() }).collect();
-    let sky = Sky::new(&stars);
+    let index = DetectionIndex::new(&stars);
     let mut near = Vec::new();
     let mut taken = vec![false; points.len()];
     let mut out = Vec::new();
@@ -299,12 +305,12 @@ fn crowds(points: &[(usize, Vector2<f64>)], least: usize) -> Vec<Vector2<f64>> {
         if taken[k] {
             continue;
         }
-        sky.within(points[k].1, NEAR_PX, &mut near);
+        index.within(points[k].1, NEAR_PX, &mut near);
         let mut frames: Vec<usize> = near.iter().map(|&i| points[i].0).collect();
         frames.dedup();
         if frames.len() >= least {
             let centre = middle(&near.iter().map(|&i| points[i].1).collect::<Vec<_>>());
-            sky.within(centre, 4.0 * NEAR_PX, &mut near);
+            index.within(centre, 4.0 * NEAR_PX, &mut near);
             for &i in &near {
                 taken[i] = true;
             }

@@ -93,7 +93,7 @@ pub fn discover(store: &DetectionStore, image_px: [u32; 2], stop: &Stop) -> Resu
     if !beyond.is_empty() {
         let beyond = beyond.join(", ");
         warnings.push(
-            format!("outside the image in the reference frame, where their links put them: {beyond}").into(),
+            format!("outside the image in the reference picture, where their links put them: {beyond}").into(),
         );
     }
     rig.check("discovered rig")?;
@@ -170,7 +170,7 @@ fn reference(
     let (mut best, mut index) = ((false, 0), 0);
     for (k, frame) in sample.moving.iter().enumerate() {
         stop.heed()?;
-        let sky = crate::rigid::index::Sky::new(frame);
+        let seen = crate::rigid::index::DetectionIndex::new(frame);
         // A frame is better in which no node is outside the image, and then one in which more are seen.
         let mut rank = (true, 0);
         for f in found {
@@ -178,7 +178,7 @@ fn reference(
             for &t in &f.link.template {
                 let p = place(pose, t);
                 rank.0 &= inside(p);
-                rank.1 += usize::from(sky.nearest(p, 1.5).is_some_and(|(d, _)| sky.whole(d)));
+                rank.1 += usize::from(seen.nearest(p, 1.5).is_some_and(|(d, _)| seen.whole(d)));
             }
         }
         // One that shows nothing is no reference for being inside.

@@ -160,7 +160,7 @@ pub fn find_lone(
         }));
     }
     done.append(&mut open);
-    // Beside bodies that make a rig already, what is seen for a moment is no part of it.
+    // Occluded bodies that make a rig already, what is seen for a moment is no part of it.
     let least = if links.is_empty() { LEAST } else { LEAST.max(linked / 5) };
     done.retain(|p| p.at.len() >= least && p.travelled() > 10.0 && p.is_marker());
     done.sort_by_key(|p| std::cmp::Reverse(p.at.len()));

@@ -7,7 +7,7 @@ use nalgebra::Vector2;
 use super::median::middle;
 use crate::detect::Detection;
 use crate::error::Result;
-use crate::rigid::index::Sky;
+use crate::rigid::index::DetectionIndex;
 use crate::stop::Stop;
 use crate::store::DetectionStore;
 
@@ -57,8 +57,8 @@ impl Sample {
                 continue;
             }
             if let Some((_, last)) = all.last() {
-                let sky = Sky::new(last);
-                let moved = scratch.iter().filter(|d| sky.nearest(at(d), SAME_PLACE_PX).is_none()).count();
+                let index = DetectionIndex::new(last);
+                let moved = scratch.iter().filter(|d| index.nearest(at(d), SAME_PLACE_PX).is_none()).count();
                 // Noise and a glint make no new frame; a single mover among standing points does.
                 if moved == 0 {
                     continue;
@@ -85,11 +85,11 @@ impl Sample {
             .iter()
             .map(|p| Detection { x_px: p.x, y_px: p.y, ..Default::default() })
             .collect();
-        let sky = Sky::new(&still);
+        let index = DetectionIndex::new(&still);
         for (i, detections) in kept {
             sample.frames.push(i);
             sample.moving.push(
-                detections.into_iter().filter(|d| sky.nearest(at(d), SAME_PLACE_PX).is_none()).collect(),
+                detections.into_iter().filter(|d| index.nearest(at(d), SAME_PLACE_PX).is_none()).collect(),
             );
         }
         Ok(sample)
@@ -125,7 +125,7 @@ pub fn still_place(places: &[Vector2<f64>]) -> Option<Vector2<f64>> {
 
 /// Places at which something is seen in most of the frames.
 fn standing(kept: &[(usize, Vec<Detection>)], stop: &Stop) -> Result<Vec<Vector2<f64>>> {
-    let skies: Vec<Sky<'_>> = kept.iter().map(|(_, d)| Sky::new(d)).collect();
+    let skies: Vec<DetectionIndex<'_>> = kept.iter().map(|(_, d)| DetectionIndex::new(d)).collect();
     let mut out: Vec<Vector2<f64>> = Vec::new();
     // A standing point is in most frames, so in one of a few.
     for seed in [0, kept.len() / 4, kept.len() / 2, 3 * kept.len() / 4, kept.len() - 1] {

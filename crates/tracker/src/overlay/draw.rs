@@ -17,7 +17,7 @@ use crate::frame::Frame;
 use crate::observation::{Observation, Status};
 use crate::rig::Rig;
 use crate::rigid::body::{Holder, Mechanism};
-use crate::rigid::forecast::{Motion, Unrest, hung_at};
+use crate::rigid::forecast::{Motion, PredictionError, hung_at};
 use crate::rigid::pose::{Pair, fit_pose, place};
 
 /// Frames that a trail is long.
@@ -83,7 +83,7 @@ impl Overlay {
     fn poses(&mut self, time: f64, row: &[Observation]) -> Vec<Option<Isometry2<f64>>> {
         let n = self.mechanism.links.len();
         let mut out: Vec<Option<Isometry2<f64>>> = vec![None; n];
-        let none = Unrest { angle_rad: 0.0, origin_px: 0.0 };
+        let none = PredictionError { angle_rad: 0.0, origin_px: 0.0 };
         for &b in &self.mechanism.order {
             let link = &self.mechanism.links[b];
             let mut pairs: Vec<Pair> = Vec::new();
@@ -275,7 +275,7 @@ fn scalar(c: [f64; 3]) -> Scalar {
     Scalar::new(c[0], c[1], c[2], 255.0)
 }
 
-/// A still of the reference frame with the rig drawn, and marks on detections that are no node.
+/// A still of the reference picture with the rig drawn, and marks on detections that are no node.
 ///
 /// # Errors
 /// As [`Overlay::draw`].

@@ -16,7 +16,7 @@ pub(crate) const LEAST_PART: f64 = 0.5;
 pub struct Link {
     /// Indices into the rig's nodes.
     pub nodes: Vec<usize>,
-    /// Places in the body's coordinates, px. The origin is the mean of the nodes in the reference frame.
+    /// Places in the body's coordinates, px. The origin is the mean of the nodes in the reference picture.
     pub template: Vec<Vector2<f64>>,
     /// Standard uncertainty of each template place, px: what the detections' own does not explain.
     pub slack_px: Vec<f64>,
@@ -24,7 +24,7 @@ pub struct Link {
     pub whole_px: Vec<f32>,
     /// Usual area of a marker and its scatter, px; 0 where nothing is known of it.
     pub area_px: Vec<(f64, f64)>,
-    /// Origin in the reference frame, px.
+    /// Origin in the reference picture, px.
     pub home: Vector2<f64>,
     /// Standard deviation of what places scatter beyond their stated uncertainty, px.
     pub excess_px: f64,
@@ -139,7 +139,7 @@ impl Mechanism {
         }
     }
 
-    /// Pose in the reference frame.
+    /// Pose in the reference picture.
     pub fn home_pose(&self, body: usize) -> Isometry2<f64> {
         Isometry2::new(self.links[body].home, 0.0)
     }

@@ -1,4 +1,4 @@
-//! Where a body will be: its last poses carried on, and how far they can be trusted.
+//! Predicts a body's pose from its last poses, with the error to expect.
 //!
 //! Owns: [`Motion`], [`Forecast`]. Must not: look at detections.
 
@@ -6,9 +6,15 @@ use nalgebra::{Isometry2, Vector2};
 
 use super::pose::{PoseFit, place, pose_at};
 
-/// A prediction by one frame errs by no more than so many times the greatest error of the last ones: of some twenty
-/// errors that is two standard deviations, so this is four.
-const SETTLED: f64 = 2.0;
+/// Gate of a prediction, in units of the largest of about twenty last one-frame errors. The largest of twenty normal
+/// errors is about 2 sigma, so the gate is about 4 sigma.
+const GATE_ERRORS: f64 = 2.0;
+/// Decay per frame of the largest prediction error: half in 14 frames.
+const ERROR_DECAY: f64 = 0.95;
+/// Gate of a forecast, in units of its standard error: 3 sigma.
+const GATE_SIGMA: f64 = 3.0;
+/// Frames after which earlier poses say nothing of the rates.
+const LONGEST_GAP_FRAMES: f64 = 3.5;
 
 /// A predicted pose and how far the body may be from it.
 #[derive(Debug, Clone, Copy)]
@@ -30,9 +36,9 @@ impl Forecast {
     }
 }
 
-/// How a kind of motion errs when carried on by one frame.
+/// Error of the pose predicted one frame ahead.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Unrest {
+pub struct PredictionError {
     /// Of the angle, rad.
     pub angle_rad: f64,
     /// Of the origin, px.
@@ -45,7 +51,7 @@ pub struct Motion {
     /// Time in frames, unwrapped angle in rad, origin in px.
     past: Vec<(f64, f64, Vector2<f64>)>,
     /// Errors of past predictions by one frame, the greatest with a slow decay.
-    unrest: Option<Unrest>,
+    prediction_error: Option<PredictionError>,
     /// Standard uncertainty of the last pose: angle, origin.
     sigma: (f64, f64),
 }
@@ -117,30 +123,30 @@ impl Motion {
         Some((a0 + va * h + ca * h * (time - t1), o0 + vo * h + co * h * (time - t1)))
     }
 
-    /// The pose at `time` and how far off it may be. `floor` is the unrest to reckon with at least,
+    /// The pose at `time` and how far off it may be. `floor` is the lower bound of the prediction error,
     /// `first` how far a body of which only one pose is known may go in one frame.
-    pub fn forecast(&self, time: f64, floor: Unrest, first: Unrest) -> Option<Forecast> {
+    pub fn forecast(&self, time: f64, floor: PredictionError, first: PredictionError) -> Option<Forecast> {
         let (angle, origin) = self.carried(time)?;
         let m = (time - self.newest()?).abs().max(1.0);
         let (angle_rad, origin_px) = match self.past.len() {
             1 => (first.angle_rad * m, first.origin_px * m),
             2 => {
                 // Only the rate is known: the error grows with the square of the time.
-                let u = self.unrest(floor);
+                let u = self.prediction_error(floor);
                 let grow = m * (m + 1.0) / 2.0;
                 (
-                    (u.angle_rad * 3.0).max(0.5 * first.angle_rad) * grow,
-                    (u.origin_px * 3.0).max(0.5 * first.origin_px) * grow,
+                    (u.angle_rad * GATE_SIGMA).max(0.5 * first.angle_rad) * grow,
+                    (u.origin_px * GATE_SIGMA).max(0.5 * first.origin_px) * grow,
                 )
             }
             _ => {
                 // With the curvature known it grows with the cube; the poses' own noise comes with it.
-                let u = self.unrest(floor);
+                let u = self.prediction_error(floor);
                 let grow = m * (m + 1.0) * (m + 2.0) / 6.0;
-                let noise = 3.0 * (1.0 + 3.0 * m * (m + 1.0) / 2.0);
+                let noise = GATE_SIGMA * (1.0 + 3.0 * m * (m + 1.0) / 2.0);
                 (
-                    3.0 * u.angle_rad * grow + noise * self.sigma.0,
-                    3.0 * u.origin_px * grow + noise * self.sigma.1,
+                    GATE_SIGMA * u.angle_rad * grow + noise * self.sigma.0,
+                    GATE_SIGMA * u.origin_px * grow + noise * self.sigma.1,
                 )
             }
         };
@@ -150,26 +156,26 @@ impl Motion {
 
     /// The pose at `time` with no more room than the last predictions needed; `None` while that is not known.
     pub fn settled_forecast(&self, time: f64) -> Option<Forecast> {
-        let own = self.unrest.filter(|_| self.past.len() == 3)?;
+        let own = self.prediction_error.filter(|_| self.past.len() == 3)?;
         let mut f = self.forecast(time, own, own)?;
         if self.was_just_seen(time) {
             // What predictions by one frame erred by holds the poses' noise already.
-            f.angle_rad = f.angle_rad.min(SETTLED * own.angle_rad);
-            f.origin_px = f.origin_px.min(SETTLED * own.origin_px);
+            f.angle_rad = f.angle_rad.min(GATE_ERRORS * own.angle_rad);
+            f.origin_px = f.origin_px.min(GATE_ERRORS * own.origin_px);
         }
         Some(f)
     }
 
-    fn unrest(&self, floor: Unrest) -> Unrest {
-        let own = self.unrest.unwrap_or(floor);
-        Unrest {
+    fn prediction_error(&self, floor: PredictionError) -> PredictionError {
+        let own = self.prediction_error.unwrap_or(floor);
+        PredictionError {
             angle_rad: own.angle_rad.max(floor.angle_rad),
             origin_px: own.origin_px.max(floor.origin_px),
         }
     }
 
     /// Adds the pose found at `time`. Returns by how much the prediction by one frame failed, if there was one.
-    pub fn add(&mut self, time: f64, fit: &PoseFit) -> Option<Unrest> {
+    pub fn add(&mut self, time: f64, fit: &PoseFit) -> Option<PredictionError> {
         if self.newest() == Some(time) {
             // The same frame again, as where two directions of time meet: the newer pose stands.
             self.past.pop();
@@ -182,17 +188,17 @@ impl Motion {
             angle += std::f64::consts::TAU * ((guess - angle) / std::f64::consts::TAU).round();
             let step = self.newest().map_or(1.0, |t| (time - t).abs());
             if self.past.len() == 3 && step < 1.5 {
-                let now = Unrest { angle_rad: (angle - guess).abs(), origin_px: (origin - place).norm() };
+                let now =
+                    PredictionError { angle_rad: (angle - guess).abs(), origin_px: (origin - place).norm() };
                 missed = Some(now);
-                // Forgotten by half in some 14 frames.
-                self.unrest = Some(self.unrest.map_or(now, |old| Unrest {
-                    angle_rad: now.angle_rad.max(0.95 * old.angle_rad),
-                    origin_px: now.origin_px.max(0.95 * old.origin_px),
+                self.prediction_error = Some(self.prediction_error.map_or(now, |old| PredictionError {
+                    angle_rad: now.angle_rad.max(ERROR_DECAY * old.angle_rad),
+                    origin_px: now.origin_px.max(ERROR_DECAY * old.origin_px),
                 }));
             }
         }
         // Poses before a gap say nothing of the rates after it.
-        if self.newest().is_some_and(|t| (time - t).abs() > 3.5) {
+        if self.newest().is_some_and(|t| (time - t).abs() > LONGEST_GAP_FRAMES) {
             self.past.clear();
         }
         if self.past.len() == 3 {
@@ -230,7 +236,7 @@ mod tests {
             for k in 0..3 {
                 motion.add(direction * f64::from(k), &fit(direction * f64::from(k)));
             }
-            let none = Unrest { angle_rad: 0.0, origin_px: 0.0 };
+            let none = PredictionError { angle_rad: 0.0, origin_px: 0.0 };
             let next = motion.forecast(direction * 3.0, none, none).unwrap();
             let miss =
                 (next.pose.rotation.angle() - angle(direction * 3.0)).rem_euclid(std::f64::consts::TAU);

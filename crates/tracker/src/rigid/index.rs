@@ -1,20 +1,20 @@
-//! Detections of one frame, to be asked for the nearest to a place.
+//! A spatial index over one frame's detections answers which are nearest to a place.
 //!
-//! Owns: [`Sky`]. A k-d tree (kiddo's immutable one, which takes any number of equal coordinates).
+//! Owns: [`DetectionIndex`]. It is a k-d tree (kiddo's immutable one, which takes any number of equal coordinates).
 
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use nalgebra::Vector2;
 
 use crate::detect::{Detection, Flags};
 
-/// The detections of one frame.
-pub struct Sky<'a> {
+/// Spatial index (k-d tree) over one frame's detections.
+pub struct DetectionIndex<'a> {
     detections: &'a [Detection],
     tree: Option<ImmutableKdTree<f64, 2>>,
     widest_px: f64,
 }
 
-impl<'a> Sky<'a> {
+impl<'a> DetectionIndex<'a> {
     /// Below this many the straight search beats building a tree.
     const STRAIGHT: usize = 24;
 
@@ -114,14 +114,14 @@ impl<'a> Sky<'a> {
 /// For each place the detection that is its nearest within the place's gate and whose nearest place it is in
 /// turn (mutual nearest neighbours); `None` for a place without one.
 pub fn mutual(
-    sky: &Sky<'_>,
+    index: &DetectionIndex<'_>,
     places: &[(Vector2<f64>, f64)],
     free: &dyn Fn(usize) -> bool,
 ) -> Vec<Option<usize>> {
     // The place that a detection is nearest to, of those that chose it.
-    let mut owner: Vec<Option<(usize, f64)>> = vec![None; sky.len()];
+    let mut owner: Vec<Option<(usize, f64)>> = vec![None; index.len()];
     for (k, &(place, gate)) in places.iter().enumerate() {
-        if let Some((d, distance)) = sky.nearest(place, gate)
+        if let Some((d, distance)) = index.nearest(place, gate)
             && free(d)
             && owner[d].is_none_or(|(_, best)| distance < best)
         {
@@ -151,8 +151,8 @@ mod tests {
         let many: Vec<Detection> = (0..60)
             .map(|i| if i < 40 { at(7.0, f64::from(i)) } else { at(f64::from(i * 13 % 50), f64::from(i)) })
             .collect();
-        let tree = Sky::new(&many);
-        let straight = Sky { detections: &many, tree: None, widest_px: 0.1 };
+        let tree = DetectionIndex::new(&many);
+        let straight = DetectionIndex { detections: &many, tree: None, widest_px: 0.1 };
         for i in 0..200 {
             let place = Vector2::new(f64::from(i * 17 % 53) + 0.3, f64::from(i * 29 % 61) + 0.1);
             assert_eq!(tree.nearest(place, 9.0), straight.nearest(place, 9.0));
@@ -166,9 +166,9 @@ mod tests {
     #[test]
     fn two_places_do_not_share_a_detection() {
         let seen = [at(10.0, 10.0), at(30.0, 10.0)];
-        let sky = Sky::new(&seen);
+        let index = DetectionIndex::new(&seen);
         let places = [(Vector2::new(11.0, 10.0), 20.0), (Vector2::new(14.0, 10.0), 20.0)];
         // Both are nearest to the first detection; only the nearer of them gets it.
-        assert_eq!(mutual(&sky, &places, &|_| true), [Some(0), None]);
+        assert_eq!(mutual(&index, &places, &|_| true), [Some(0), None]);
     }
 }

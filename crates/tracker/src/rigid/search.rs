@@ -1,6 +1,6 @@
-//! Looking for a body among detections: poses under which its nodes are seen.
+//! Searches a frame's detections for a body: tests every pose under which its nodes would be seen.
 //!
-//! Owns: [`Anchor`], [`Search`], [`Sighting`]. Must not: decide between sightings (`track` does).
+//! Owns: [`Anchor`], [`Search`], [`PoseHypothesis`]. Must not: choose between hypotheses (`track` does).
 //!
 //! A pose follows from two joints, from a joint and one node, or from two nodes. Every pose that follows from
 //! the detections is tested on all nodes of the body and refitted on those that agree.
@@ -11,14 +11,22 @@ use nalgebra::{Isometry2, Vector2};
 
 use super::body::{LEAST_PART, Link};
 use super::forecast::{Forecast, hung_at};
-use super::index::Sky;
+use super::index::DetectionIndex;
 use super::pose::{Pair, PoseFit, fit_pose, place, pose_at};
 
-/// Deviations up to which a detection agrees with its node. With nine nodes and 1e5 frames a true one is lost to
+/// Gate of a detection about its node, in standard uncertainties. With nine nodes and 1e5 frames a true one is lost to
 /// chance in one of 1e4 (Rayleigh: exp(-k^2 / 2) = 2.5e-6 at 5.1).
 pub const REACH_SIGMA: f64 = 5.1;
 /// Pairs of nodes from which a free body is sought.
 pub const PAIRS: usize = 60;
+/// Rounds of picking detections and fitting the pose; most hypotheses repeat their picks after two.
+const REFINE_ROUNDS: usize = 6;
+/// Distance of two anchors that fix the pose alone, in their standard uncertainties: the angle is then known to 1/20 rad.
+const LEAST_BASE_SIGMA: f64 = 20.0;
+/// Least distance of two nodes from which a pose is computed, in gates: a shorter base turns the pose by more than 1/4 rad.
+const LEAST_SPAN_REACHES: f64 = 4.0;
+/// Half width of the angles, rad, below which an arc about the expected place is searched and not the whole circle.
+const NARROW_WINDOW_RAD: f64 = 1.5;
 
 /// A point of the body whose place in the image is known from elsewhere: the pivot, a neighbour's joint.
 #[derive(Debug, Clone, Copy)]
@@ -31,15 +39,15 @@ pub struct Anchor {
     pub sigma_px: f64,
 }
 
-/// A pose under which nodes are seen.
+/// A pose hypothesis: a pose and the detections that agree with it.
 #[derive(Debug, Clone)]
-pub struct Sighting {
+pub struct PoseHypothesis {
     /// The pose, fitted on anchors and whole detections.
     pub fit: PoseFit,
     /// For each node of the body its detection.
     pub picks: Vec<Option<usize>>,
-    /// Nodes seen whole.
-    pub support: usize,
+    /// Number of nodes whose whole detection agrees.
+    pub inliers: usize,
     /// Sum of squared residuals of the nodes over their variances.
     pub chi2: f64,
 }
@@ -47,8 +55,8 @@ pub struct Sighting {
 /// What a search found.
 #[derive(Debug, Default)]
 pub struct Found {
-    /// Sightings with different detections, the best first.
-    pub sightings: Vec<Sighting>,
+    /// Hypotheses with different detections, the best first.
+    pub hypotheses: Vec<PoseHypothesis>,
     /// Poses that the detections allowed and that were tested.
     pub trials: usize,
 }
@@ -60,7 +68,7 @@ pub struct Search<'a> {
     /// Points known from elsewhere.
     pub anchors: &'a [Anchor],
     /// The detections.
-    pub sky: &'a Sky<'a>,
+    pub index: &'a DetectionIndex<'a>,
     /// Detections that no other body has.
     pub free: &'a [bool],
     /// Where the body must be; `None` is anywhere.
@@ -81,10 +89,10 @@ fn turned(a: f64) -> f64 {
 impl Search<'_> {
     /// Standard uncertainty of detection `d` as node `j`, px.
     pub fn sigma(&self, j: usize, d: usize) -> f64 {
-        let own = f64::from(self.sky.get(d).sigma_px).max(1e-3);
-        // A part is compared as it is: it is no support, and one that is cut does not agree.
-        let doubted = !self.sky.whole(d) && self.whole(j, d);
-        let cut = if doubted { self.link.cut_px(j, self.sky.get(d).area_px) } else { 0.0 };
+        let own = f64::from(self.index.get(d).sigma_px).max(1e-3);
+        // A part is compared as it is: it is no inlier, and one that is cut does not agree.
+        let doubted = !self.index.whole(d) && self.whole(j, d);
+        let cut = if doubted { self.link.cut_px(j, self.index.get(d).area_px) } else { 0.0 };
         (own * own + cut * cut + self.link.slack_px[j].powi(2) + self.floor_px.powi(2)).sqrt()
     }
 
@@ -92,18 +100,18 @@ impl Search<'_> {
     /// a blob that the detector calls a part is the whole if nothing of its area lacks.
     pub fn whole(&self, j: usize, d: usize) -> bool {
         let whole_px = self.link.whole_px[j];
-        let area_px = self.sky.get(d).area_px;
-        let one = if whole_px > 0.0 { self.sky.single(d) } else { self.sky.whole(d) };
+        let area_px = self.index.get(d).area_px;
+        let one = if whole_px > 0.0 { self.index.single(d) } else { self.index.whole(d) };
         one && area_px >= whole_px
     }
 
     /// Whether so little is left of node `j` that its centre says nothing.
     fn remnant(&self, j: usize, d: usize) -> bool {
-        f64::from(self.sky.get(d).area_px) < LEAST_PART * self.link.area_px[j].0
+        f64::from(self.index.get(d).area_px) < LEAST_PART * self.link.area_px[j].0
     }
 
     fn usual_sigma(&self, j: usize) -> f64 {
-        let own = self.sky.widest_px();
+        let own = self.index.widest_px();
         (own * own + self.link.slack_px[j].powi(2) + self.floor_px.powi(2)).sqrt()
     }
 
@@ -119,22 +127,27 @@ impl Search<'_> {
                 <= w.origin_px + self.reach_sigma * self.floor_px
     }
 
-    /// The sighting that grows from a pose known to `slack_rad`, if any node is seen.
-    pub fn grow(&self, pose: Isometry2<f64>, about: Vector2<f64>, slack_rad: f64) -> Option<Sighting> {
+    /// The hypothesis refined from a pose known to `slack_rad`, if any node is seen.
+    pub fn refine(
+        &self,
+        pose: Isometry2<f64>,
+        about: Vector2<f64>,
+        slack_rad: f64,
+    ) -> Option<PoseHypothesis> {
         let n = self.link.nodes.len();
         let mut pose = pose;
         let mut slack = slack_rad;
         let mut picks: Vec<Option<usize>> = vec![None; n];
         let mut about = about;
         let mut result = None;
-        for round in 0..6 {
+        for round in 0..REFINE_ROUNDS {
             let mut new: Vec<Option<usize>> = vec![None; n];
             let mut distance = vec![f64::INFINITY; n];
             for j in 0..n {
                 let there = place(&pose, self.link.template[j]);
                 let lever = (self.link.template[j] - about).norm();
                 let wide = self.reach_sigma * (self.usual_sigma(j) + slack * lever);
-                if let Some((d, r)) = self.sky.nearest(there, wide)
+                if let Some((d, r)) = self.index.nearest(there, wide)
                     && self.free[d]
                     && r <= self.reach_sigma * (self.sigma(j, d) + slack * lever)
                 {
@@ -164,15 +177,15 @@ impl Search<'_> {
         let fit = result?;
         // Last test, at the fitted pose and with its own uncertainty no excuse.
         let mut chi2 = 0.0;
-        let mut support = 0;
+        let mut inliers = 0;
         for (j, pick) in picks.iter_mut().enumerate() {
             if let Some(d) = *pick {
-                let r = (place(&fit.pose, self.link.template[j]) - self.sky.place(d)).norm();
+                let r = (place(&fit.pose, self.link.template[j]) - self.index.place(d)).norm();
                 let s = self.sigma(j, d);
                 if r > self.reach_sigma * s || self.remnant(j, d) {
                     *pick = None;
                 } else if self.whole(j, d) {
-                    support += 1;
+                    inliers += 1;
                     chi2 += (r / s).powi(2);
                 }
             }
@@ -183,7 +196,7 @@ impl Search<'_> {
                 return None;
             }
         }
-        (support > 0 && self.allowed(&fit.pose)).then_some(Sighting { fit, picks, support, chi2 })
+        (inliers > 0 && self.allowed(&fit.pose)).then_some(PoseHypothesis { fit, picks, inliers, chi2 })
     }
 
     fn pairs(&self, picks: &[Option<usize>]) -> Vec<Pair> {
@@ -197,7 +210,7 @@ impl Search<'_> {
                 && self.whole(j, d)
             {
                 let sigma_px = self.sigma(j, d);
-                pairs.push(Pair { local: self.link.template[j], place: self.sky.place(d), sigma_px });
+                pairs.push(Pair { local: self.link.template[j], place: self.index.place(d), sigma_px });
             }
         }
         pairs
@@ -219,7 +232,7 @@ impl Search<'_> {
         })
     }
 
-    /// All sightings, the best (most nodes, then least chi-square) first.
+    /// All hypotheses, the best (most nodes, then least chi-square) first.
     pub fn run(&self) -> Found {
         let mut found = Found::default();
         let link = self.link;
@@ -248,14 +261,14 @@ impl Search<'_> {
                     continue;
                 }
                 match &self.window {
-                    Some(w) if w.angle_rad < 1.5 => {
+                    Some(w) if w.angle_rad < NARROW_WINDOW_RAD => {
                         let there = place(&hung_at(&w.pose, a.local, a.place), link.template[j]);
-                        self.sky.within(there, radius * w.angle_rad + reach, &mut near);
+                        self.index.within(there, radius * w.angle_rad + reach, &mut near);
                     }
-                    _ => self.sky.within(a.place, radius + reach, &mut near),
+                    _ => self.index.within(a.place, radius + reach, &mut near),
                 }
                 for &d in &near {
-                    let ray = self.sky.place(d) - a.place;
+                    let ray = self.index.place(d) - a.place;
                     if !self.free[d] || !self.whole(j, d) || (ray.norm() - radius).abs() > reach {
                         continue;
                     }
@@ -266,10 +279,10 @@ impl Search<'_> {
             }
         } else if n == 1 {
             if let Some(w) = &self.window {
-                self.sky.within(w.pose.translation.vector, w.origin_px, &mut near);
+                self.index.within(w.pose.translation.vector, w.origin_px, &mut near);
                 for &d in &near {
                     if self.free[d] {
-                        let pose = hung_at(&w.pose, link.template[0], self.sky.place(d));
+                        let pose = hung_at(&w.pose, link.template[0], self.index.place(d));
                         self.test(pose, link.template[0], 0.0, &mut found);
                     }
                 }
@@ -277,7 +290,7 @@ impl Search<'_> {
         } else {
             self.by_pairs(&mut found);
         }
-        found.sightings.sort_by(|a, b| b.support.cmp(&a.support).then(a.chi2.total_cmp(&b.chi2)));
+        found.hypotheses.sort_by(|a, b| b.inliers.cmp(&a.inliers).then(a.chi2.total_cmp(&b.chi2)));
         found
     }
 
@@ -287,7 +300,7 @@ impl Search<'_> {
             .iter()
             .copied()
             .max_by(|x, y| (x.local - a.local).norm().total_cmp(&(y.local - a.local).norm()))?;
-        ((b.local - a.local).norm() > 20.0 * a.sigma_px.hypot(b.sigma_px)).then_some((a, b))
+        ((b.local - a.local).norm() > LEAST_BASE_SIGMA * a.sigma_px.hypot(b.sigma_px)).then_some((a, b))
     }
 
     /// Poses from two nodes: every pair of detections at the distance of a pair of nodes.
@@ -302,18 +315,19 @@ impl Search<'_> {
         }
         spans.sort_by(|a, b| b.0.total_cmp(&a.0));
         spans.truncate(self.pairs);
-        let stars: Vec<usize> = (0..self.sky.len()).filter(|&d| self.free[d] && self.sky.whole(d)).collect();
+        let stars: Vec<usize> =
+            (0..self.index.len()).filter(|&d| self.free[d] && self.index.whole(d)).collect();
         let mut gaps: Vec<(f64, usize, usize)> = Vec::new();
         for (k, &d) in stars.iter().enumerate() {
             for &e in &stars[k + 1..] {
-                gaps.push(((self.sky.place(d) - self.sky.place(e)).norm(), d, e));
+                gaps.push(((self.index.place(d) - self.index.place(e)).norm(), d, e));
             }
         }
         gaps.sort_by(|a, b| a.0.total_cmp(&b.0));
         for &(span, i, j) in &spans {
             let sigma = self.usual_sigma(i).hypot(self.usual_sigma(j));
             let reach = self.reach_sigma * sigma;
-            if span <= 4.0 * reach {
+            if span <= LEAST_SPAN_REACHES * reach {
                 continue;
             }
             let first = gaps.partition_point(|g| g.0 < span - reach);
@@ -322,7 +336,7 @@ impl Search<'_> {
                 for (d, e) in [(d, e), (e, d)] {
                     let pairs = [(i, d), (j, e)].map(|(j, d)| Pair {
                         local: link.template[j],
-                        place: self.sky.place(d),
+                        place: self.index.place(d),
                         sigma_px: self.sigma(j, d),
                     });
                     if let Some(fit) = fit_pose(&pairs) {
@@ -342,10 +356,10 @@ impl Search<'_> {
             }
         }
         found.trials += 1;
-        if let Some(s) = self.grow(pose, about, slack_rad)
-            && !found.sightings.iter().any(|o| o.picks == s.picks)
+        if let Some(s) = self.refine(pose, about, slack_rad)
+            && !found.hypotheses.iter().any(|o| o.picks == s.picks)
         {
-            found.sightings.push(s);
+            found.hypotheses.push(s);
         }
     }
 }

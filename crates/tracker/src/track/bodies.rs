@@ -1,13 +1,13 @@
-//! The bodies that are followed: their shapes, what was learned of their motion, and their last poses.
+//! Holds the bodies that are followed: shapes, motion priors, last poses; predicts a pose and sets up a search.
 //!
-//! Owns: [`Bodies`]. Must not: look for a body in a frame (`finding` does).
+//! Owns: [`Bodies`]. Must not: look for a body in a frame (`body_search` does).
 
-use super::chance::{likeness, twins};
-use super::habits::Habits;
+use super::false_matches::{indistinguishable, self_symmetry_rad};
+use super::motion_priors::MotionPriors;
 use super::seen::BodySeen;
 use crate::rigid::body::{Holder, Mechanism};
 use crate::rigid::forecast::{Forecast, Motion};
-use crate::rigid::index::Sky;
+use crate::rigid::index::DetectionIndex;
 use crate::rigid::pose::place;
 use crate::rigid::search::{Anchor, PAIRS, REACH_SIGMA, Search};
 
@@ -16,23 +16,24 @@ use crate::rigid::search::{Anchor, PAIRS, REACH_SIGMA, Search};
 pub struct Bodies {
     /// Templates and hinges.
     pub mechanism: Mechanism,
-    /// What to reckon with.
-    pub habits: Habits,
+    /// Motion priors.
+    pub priors: MotionPriors,
     /// The last poses of each body.
     pub motions: Vec<Motion>,
     /// For each body the least turn that maps it on itself as far as two nodes, rad.
-    pub(super) likeness: Vec<f64>,
+    pub(super) self_symmetry_rad: Vec<f64>,
     /// For each body those that look the same.
-    pub(super) twins: Vec<Vec<usize>>,
+    pub(super) indistinguishable: Vec<Vec<usize>>,
 }
 
 impl Bodies {
     /// Bodies of which no pose is known yet.
-    pub fn new(mechanism: Mechanism, habits: Habits) -> Self {
+    pub fn new(mechanism: Mechanism, priors: MotionPriors) -> Self {
         let motions = vec![Motion::default(); mechanism.links.len()];
-        let likeness = (0..mechanism.links.len()).map(|b| likeness(&mechanism, &habits, b)).collect();
-        let twins = twins(&mechanism, &habits);
-        Self { mechanism, habits, motions, likeness, twins }
+        let self_symmetry_rad =
+            (0..mechanism.links.len()).map(|b| self_symmetry_rad(&mechanism, &priors, b)).collect();
+        let indistinguishable = indistinguishable(&mechanism, &priors);
+        Self { mechanism, priors, motions, self_symmetry_rad, indistinguishable }
     }
 
     /// Points of a body known from the ground and from bodies whose pose is known.
@@ -55,14 +56,14 @@ impl Bodies {
 
     /// Where a body is expected at `time`.
     pub fn forecast(&self, body: usize, time: f64, anchors: &[Anchor]) -> Option<Forecast> {
-        let f = self.motions[body].forecast(time, self.habits.floor[body], self.habits.first[body])?;
+        let f = self.motions[body].forecast(time, self.priors.floor[body], self.priors.first[body])?;
         Some(anchors.first().map_or(f, |a| f.hung(a.local, a.place)))
     }
 
     pub(super) fn search<'a>(
         &'a self,
         b: usize,
-        sky: &'a Sky<'a>,
+        index: &'a DetectionIndex<'a>,
         free: &'a [bool],
         anchors: &'a [Anchor],
         window: Option<Forecast>,
@@ -70,11 +71,11 @@ impl Bodies {
         Search {
             link: &self.mechanism.links[b],
             anchors,
-            sky,
+            index,
             free,
             window,
             reach_sigma: REACH_SIGMA,
-            floor_px: self.habits.floor_px,
+            floor_px: self.priors.floor_px,
             pairs: PAIRS,
         }
     }

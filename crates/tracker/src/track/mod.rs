@@ -2,19 +2,19 @@
 //!
 //! Owns: [`Tracker`], [`track_recording`], [`TrackSummary`]. Must not: know of pixels, pendulums or metres.
 
-mod beside;
 mod bodies;
-mod chance;
-mod engine;
-mod finding;
-mod habits;
-mod learn;
-mod partly;
+mod body_search;
+mod false_matches;
+mod frame_tracker;
+mod motion_priors;
+mod occluded;
+mod occlusion_filter;
+mod prior_estimator;
 mod recording;
 mod rows;
 mod seen;
+mod tentative;
 mod tracker;
-mod undecided;
 
 #[cfg(test)]
 pub(crate) mod tests;

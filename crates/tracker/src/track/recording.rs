@@ -1,14 +1,14 @@
-//! A whole recording: what it says of rig and motion first, then every frame, each way of time.
+//! Tracks the nodes of a whole recording: learns rig and motion first, then names every frame, in both directions of time.
 //!
 //! Owns: [`track_recording`], [`TrackSummary`]. Must not: keep more of the recording than what is undecided.
 
 use std::collections::VecDeque;
 
-use super::engine::Engine;
-use super::habits::Habits;
-use super::learn::Lessons;
-use super::partly::Partly;
-use super::rows::{Returns, observations, partly};
+use super::frame_tracker::FrameTracker;
+use super::motion_priors::MotionPriors;
+use super::occlusion_filter::OcclusionFilter;
+use super::prior_estimator::PriorEstimator;
+use super::rows::{Returns, observations, occlusions};
 use super::seen::BodySeen;
 use crate::detect::Detection;
 use crate::error::{Error, Fault, Result};
@@ -17,7 +17,7 @@ use crate::pixel_aspect::PixelAspect;
 use crate::rig::Rig;
 use crate::rigid::body::Mechanism;
 use crate::rigid::forecast::Motion;
-use crate::rigid::index::Sky;
+use crate::rigid::index::DetectionIndex;
 use crate::stop::Stop;
 use crate::store::{DetectionStore, FrameStamp};
 
@@ -66,11 +66,11 @@ pub fn track_recording(
         ));
     }
     let mechanism = Mechanism::new(rig, 0.3);
-    let habits = Habits::unknown(&mechanism, 0.05);
+    let priors = MotionPriors::unknown(&mechanism, 0.05);
     let n = mechanism.nodes;
     let mut out = Output {
         pixel_aspect: rig.pixel_aspect,
-        partly: Partly::default(),
+        occlusion_filter: OcclusionFilter::default(),
         returns: Returns::new(n),
         summary: TrackSummary {
             seen: vec![0; n],
@@ -84,78 +84,78 @@ pub fn track_recording(
         return Ok(out.summary);
     }
     let start = start_frame(store, rig);
-    let (mechanism, habits) = learn(store, rig, start, mechanism, habits, stop)?;
-    let engine = started(rig, start, mechanism, habits);
-    // Backwards from the reference frame, kept; then forwards from it, written as it is decided.
-    let mut before = Pass::new(store, engine.clone(), stop);
+    let (mechanism, priors) = learn(store, rig, start, mechanism, priors, stop)?;
+    let tracker = started(rig, start, mechanism, priors);
+    // Backwards from the reference picture, kept; then forwards from it, written as it is decided.
+    let mut before = Pass::new(store, tracker.clone(), stop);
     for i in (0..start).rev() {
         before.step(i)?;
     }
     before.finish()?;
     while let Some(p) = before.pending.pop_back() {
-        out.write(store, &before.engine.bodies.mechanism, p, sink)?;
+        out.write(store, &before.tracker.bodies.mechanism, p, sink)?;
     }
-    let mut after = Pass::new(store, engine, stop);
+    let mut after = Pass::new(store, tracker, stop);
     for i in start..store.len() {
         after.step(i)?;
         while after.decided() > 0 {
             if let Some(p) = after.pending.pop_front() {
-                out.write(store, &after.engine.bodies.mechanism, p, sink)?;
+                out.write(store, &after.tracker.bodies.mechanism, p, sink)?;
             }
             after.first += 1;
         }
     }
     after.finish()?;
     while let Some(p) = after.pending.pop_front() {
-        out.write(store, &after.engine.bodies.mechanism, p, sink)?;
+        out.write(store, &after.tracker.bodies.mechanism, p, sink)?;
     }
     out.hand_out(true, sink)?;
     Ok(out.summary)
 }
 
 /// Frames that the rig is refined on.
-const LESSON: usize = 4000;
+const LEARNING_FRAMES: usize = 4000;
 
-/// Follows the markers from the reference frame on, only to learn.
+/// Follows the markers from the reference picture on, only to learn.
 fn learn(
     store: &DetectionStore,
     rig: &Rig,
     start: usize,
     mut mechanism: Mechanism,
-    mut habits: Habits,
+    mut priors: MotionPriors,
     stop: &Stop,
-) -> Result<(Mechanism, Habits)> {
+) -> Result<(Mechanism, MotionPriors)> {
     let mut scratch = Vec::new();
-    let mut engine = started(rig, start, mechanism.clone(), habits.clone());
-    let mut lessons = Lessons::new(&mechanism);
+    let mut tracker = started(rig, start, mechanism.clone(), priors.clone());
+    let mut estimator = PriorEstimator::new(&mechanism);
     // The last frames before the reference count too where few come after it.
-    let first = start.min(store.len().saturating_sub(LESSON));
-    for i in (first..start).rev().chain(start..store.len().min(first + LESSON)) {
+    let first = start.min(store.len().saturating_sub(LEARNING_FRAMES));
+    for i in (first..start).rev().chain(start..store.len().min(first + LEARNING_FRAMES)) {
         if i == start {
-            engine = started(rig, start, mechanism.clone(), habits.clone());
+            tracker = started(rig, start, mechanism.clone(), priors.clone());
         }
         stop.heed()?;
         store.read(i, &mut scratch);
-        let sky = Sky::new(&scratch);
-        let seen = engine.step(i as f64, &sky, None);
-        lessons.add(&engine.bodies.mechanism, &seen, &sky);
+        let index = DetectionIndex::new(&scratch);
+        let seen = tracker.step(i as f64, &index, None);
+        estimator.add(&tracker.bodies.mechanism, &seen, &index);
     }
-    lessons.apply(&mut mechanism, &mut habits);
-    Ok((mechanism, habits))
+    estimator.apply(&mut mechanism, &mut priors);
+    Ok((mechanism, priors))
 }
 
-/// A tracker that stands in the reference frame.
-fn started(rig: &Rig, start: usize, mechanism: Mechanism, habits: Habits) -> Engine {
-    let mut engine = Engine::new(mechanism, habits);
+/// A tracker that stands in the reference picture.
+fn started(rig: &Rig, start: usize, mechanism: Mechanism, priors: MotionPriors) -> FrameTracker {
+    let mut tracker = FrameTracker::new(mechanism, priors);
     if rig.reference_frame.is_some() {
-        for b in 0..engine.bodies.mechanism.links.len() {
-            engine.bodies.motions[b] = Motion::at(start as f64, &engine.bodies.mechanism.home_pose(b));
+        for b in 0..tracker.bodies.mechanism.links.len() {
+            tracker.bodies.motions[b] = Motion::at(start as f64, &tracker.bodies.mechanism.home_pose(b));
         }
     }
-    engine
+    tracker
 }
 
-/// Index in the store of the reference frame; 0 where there is none in it.
+/// Index in the store of the reference picture; 0 where there is none in it.
 fn start_frame(store: &DetectionStore, rig: &Rig) -> usize {
     let Some(reference) = rig.reference_frame else { return 0 };
     let first = store.stamp(0).index;
@@ -164,7 +164,7 @@ fn start_frame(store: &DetectionStore, rig: &Rig) -> usize {
 
 struct Output {
     pixel_aspect: PixelAspect,
-    partly: Partly,
+    occlusion_filter: OcclusionFilter,
     returns: Returns,
     summary: TrackSummary,
     scratch: Vec<Detection>,
@@ -181,12 +181,12 @@ impl Output {
         let i = (p.stamp.index - store.stamp(0).index) as usize;
         store.read(i, &mut self.scratch);
         let row = observations(mechanism, &p.seen, &self.scratch);
-        self.partly.push(p.stamp, row, &partly(mechanism, &p.seen));
+        self.occlusion_filter.push(p.stamp, row, &occlusions(mechanism, &p.seen));
         self.hand_out(false, sink)
     }
 
     fn hand_out(&mut self, end: bool, sink: &mut Sink<'_>) -> Result<()> {
-        while let Some((stamp, mut row)) = self.partly.pop(end) {
+        while let Some((stamp, mut row)) = self.occlusion_filter.pop(end) {
             if !stamp.decoded {
                 row.fill(Observation::UNDECODED);
             }
@@ -210,7 +210,7 @@ impl Output {
 struct Pass<'a> {
     store: &'a DetectionStore,
     stop: &'a Stop,
-    engine: Engine,
+    tracker: FrameTracker,
     pending: VecDeque<Pending>,
     /// Steps already taken out of `pending`.
     first: usize,
@@ -222,12 +222,12 @@ struct Pass<'a> {
 }
 
 impl<'a> Pass<'a> {
-    fn new(store: &'a DetectionStore, engine: Engine, stop: &'a Stop) -> Self {
-        let n = engine.bodies.mechanism.links.len();
+    fn new(store: &'a DetectionStore, tracker: FrameTracker, stop: &'a Stop) -> Self {
+        let n = tracker.bodies.mechanism.links.len();
         Self {
             store,
             stop,
-            engine,
+            tracker,
             pending: VecDeque::new(),
             first: 0,
             gap: vec![None; n],
@@ -239,8 +239,8 @@ impl<'a> Pass<'a> {
     fn step(&mut self, i: usize) -> Result<()> {
         self.stop.heed()?;
         self.store.read(i, &mut self.scratch);
-        let sky = Sky::new(&self.scratch);
-        let seen = self.engine.step(i as f64, &sky, None);
+        let index = DetectionIndex::new(&self.scratch);
+        let seen = self.tracker.step(i as f64, &index, None);
         let now = self.first + self.pending.len();
         for (b, s) in seen.iter().enumerate() {
             if s.fit.is_some() {
@@ -271,12 +271,12 @@ impl<'a> Pass<'a> {
         let Some(start) = self.gap[b].take() else { return Ok(()) };
         let from = start.max(self.first) - self.first;
         let end = self.pending.len() - SETTLED;
-        let mut engine = self.engine.clone();
-        engine.bodies.motions[b].forget();
+        let mut tracker = self.tracker.clone();
+        tracker.bodies.motions[b].forget();
         let time = |p: &Pending, store: &DetectionStore| (p.stamp.index - store.stamp(0).index) as f64;
         for p in self.pending.range(end..).rev() {
             if let Some(f) = &p.seen[b].fit {
-                engine.bodies.motions[b].add(time(p, self.store), f);
+                tracker.bodies.motions[b].add(time(p, self.store), f);
             }
         }
         for k in (from..end).rev() {
@@ -286,20 +286,20 @@ impl<'a> Pass<'a> {
             self.store.read(i as usize, &mut self.scratch);
             if self.scratch.is_empty() || p.seen[b].fit.is_some() {
                 if let Some(f) = &p.seen[b].fit {
-                    engine.bodies.motions[b].add(i, f);
+                    tracker.bodies.motions[b].add(i, f);
                 }
                 continue;
             }
-            let sky = Sky::new(&self.scratch);
+            let index = DetectionIndex::new(&self.scratch);
             let mut known = p.seen.clone();
             for (o, s) in known.iter_mut().enumerate() {
                 // Other open bodies are not the question now.
                 if o != b && s.fit.is_none() {
                     s.picks = vec![None; s.picks.len()];
-                    s.beside = vec![None; s.picks.len()];
+                    s.occluded = vec![None; s.picks.len()];
                 }
             }
-            let seen = engine.step_one(b, i, &sky, &known);
+            let seen = tracker.step_one(b, i, &index, &known);
             if seen.fit.is_some() {
                 p.seen[b] = seen;
             }

@@ -1,6 +1,6 @@
-//! A frame's bodies as rows of nodes.
+//! Turns a frame's bodies into rows of nodes.
 //!
-//! Owns: [`observations`], [`partly`], [`Returns`]. Must not: decide anything.
+//! Owns: [`observations`], [`occlusions`], [`Returns`]. Must not: decide anything.
 
 use nalgebra::Vector2;
 
@@ -10,12 +10,12 @@ use crate::observation::{Observation, Status};
 use crate::rigid::body::Mechanism;
 
 /// The observations of one frame, in the order of the rig's nodes.
-pub fn observations(mechanism: &Mechanism, seen: &[BodySeen], sky: &[Detection]) -> Vec<Observation> {
+pub fn observations(mechanism: &Mechanism, seen: &[BodySeen], index: &[Detection]) -> Vec<Observation> {
     let mut out = vec![Observation::MISSING; mechanism.nodes];
     for (link, s) in mechanism.links.iter().zip(seen) {
         for (j, &node) in link.nodes.iter().enumerate() {
             if let Some(Some(d)) = s.picks.get(j) {
-                let d = &sky[*d];
+                let d = &index[*d];
                 // A marker half hidden may agree by chance; its own uncertainty is that of a whole one.
                 let doubt = d.flags.has(Flags::PARTIAL | Flags::MERGED | Flags::BORDER)
                     || d.area_px < link.whole_px[j];
@@ -27,8 +27,8 @@ pub fn observations(mechanism: &Mechanism, seen: &[BodySeen], sky: &[Detection])
                     area_px: d.area_px,
                     status: Status::Seen,
                 };
-            } else if let Some(Some(b)) = s.beside.get(j) {
-                let d = &sky[b.detection];
+            } else if let Some(Some(b)) = s.occluded.get(j) {
+                let d = &index[b.detection];
                 // The blob only shows that the marker is there: its centre is where the body says. What is given
                 // as uncertainty is the blob's whole disagreement, so that no fit gains from it.
                 out[node] = Observation {
@@ -47,10 +47,10 @@ pub fn observations(mechanism: &Mechanism, seen: &[BodySeen], sky: &[Detection])
 }
 
 /// For each node of the rig of which only a part is seen, how far that is from where its body says, px.
-pub fn partly(mechanism: &Mechanism, seen: &[BodySeen]) -> Vec<Option<Vector2<f64>>> {
+pub fn occlusions(mechanism: &Mechanism, seen: &[BodySeen]) -> Vec<Option<Vector2<f64>>> {
     let mut out = vec![None; mechanism.nodes];
     for (link, s) in mechanism.links.iter().zip(seen) {
-        for (&node, b) in link.nodes.iter().zip(&s.beside) {
+        for (&node, b) in link.nodes.iter().zip(&s.occluded) {
             out[node] = b.map(|b| b.off);
         }
     }

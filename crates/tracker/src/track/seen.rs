@@ -1,11 +1,11 @@
-//! What a frame says about one body: its pose, and which detection is which of its nodes.
+//! Holds what a frame says about one body: its pose, and which detection is which of its nodes.
 //!
-//! Owns: [`BodySeen`], [`Beside`]. Must not: decide anything.
+//! Owns: [`BodySeen`], [`Occluded`]. Must not: decide anything.
 
 use nalgebra::Vector2;
 
 use crate::rigid::pose::PoseFit;
-use crate::rigid::search::Sighting;
+use crate::rigid::search::PoseHypothesis;
 
 /// What a frame says about one body.
 #[derive(Debug, Clone, Default)]
@@ -17,19 +17,19 @@ pub struct BodySeen {
     /// For each node of the body whether something seen may be it.
     pub open: Vec<bool>,
     /// For each node of the body a detection beside its place, as a half hidden marker's is. No part of the pose.
-    pub beside: Vec<Option<Beside>>,
+    pub occluded: Vec<Option<Occluded>>,
 }
 
 impl BodySeen {
     /// Detections that are nodes of the body.
     pub fn detections(&self) -> impl Iterator<Item = usize> {
-        self.picks.iter().flatten().copied().chain(self.beside.iter().flatten().map(|b| b.detection))
+        self.picks.iter().flatten().copied().chain(self.occluded.iter().flatten().map(|b| b.detection))
     }
 }
 
 /// The visible part of a half hidden marker, or the blob in which it runs together with others.
 #[derive(Debug, Clone, Copy)]
-pub struct Beside {
+pub struct Occluded {
     /// The detection.
     pub detection: usize,
     /// Where the body says the marker's centre is, px.
@@ -38,7 +38,7 @@ pub struct Beside {
     pub off: Vector2<f64>,
 }
 
-/// What a sighting that stands says of a body of `n` nodes.
-pub(super) fn accepted(s: Sighting, n: usize) -> BodySeen {
-    BodySeen { fit: Some(s.fit), picks: s.picks, open: vec![false; n], beside: vec![None; n] }
+/// What a hypothesis that stands says of a body of `n` nodes.
+pub(super) fn accepted(s: PoseHypothesis, n: usize) -> BodySeen {
+    BodySeen { fit: Some(s.fit), picks: s.picks, open: vec![false; n], occluded: vec![None; n] }
 }

@@ -1,23 +1,23 @@
-//! Nodes frame by frame, live: nothing is filled in later.
+//! Tracks the nodes of a given rig live, frame by frame: nothing is filled in later.
 //!
 //! Owns: [`Tracker`]. Must not: look ahead.
 
-use super::engine::Engine;
-use super::habits::Habits;
-use super::rows::{Returns, observations, partly};
+use super::frame_tracker::FrameTracker;
+use super::motion_priors::MotionPriors;
+use super::rows::{Returns, observations, occlusions};
 use crate::detect::Detection;
 use crate::error::{Error, Fault, Result};
 use crate::observation::Observation;
 use crate::pixel_aspect::PixelAspect;
 use crate::rig::Rig;
 use crate::rigid::body::Mechanism;
-use crate::rigid::index::Sky;
+use crate::rigid::index::DetectionIndex;
 use crate::store::FrameStamp;
 
 /// Follows the nodes of a given rig through a live recording, frame by frame. Nothing is filled in later.
 #[derive(Debug, Clone)]
 pub struct Tracker {
-    engine: Engine,
+    frame_tracker: FrameTracker,
     pixel_aspect: PixelAspect,
     returns: Returns,
     last: Option<FrameStamp>,
@@ -31,10 +31,10 @@ impl Tracker {
     pub fn new(rig: &Rig) -> Result<Self> {
         rig.check("rig")?;
         let mechanism = Mechanism::new(rig, 0.3);
-        let habits = Habits::unknown(&mechanism, 0.05);
+        let priors = MotionPriors::unknown(&mechanism, 0.05);
         let returns = Returns::new(mechanism.nodes);
-        let (engine, pixel_aspect) = (Engine::new(mechanism, habits), rig.pixel_aspect);
-        Ok(Self { engine, pixel_aspect, returns, last: None })
+        let (frame_tracker, pixel_aspect) = (FrameTracker::new(mechanism, priors), rig.pixel_aspect);
+        Ok(Self { frame_tracker, pixel_aspect, returns, last: None })
     }
 
     /// The nodes in the next frame, in the rig's order; detections and nodes are in recorded pixels.
@@ -55,12 +55,12 @@ impl Tracker {
         }
         self.last = Some(*stamp);
         let detections: Vec<Detection> = detections.iter().map(|d| d.to_square(self.pixel_aspect)).collect();
-        let sky = Sky::new(&detections);
-        let seen = self.engine.step(stamp.index as f64, &sky, None);
-        let mut row = observations(&self.engine.bodies.mechanism, &seen, &detections);
-        for (k, partly) in partly(&self.engine.bodies.mechanism, &seen).into_iter().enumerate() {
+        let index = DetectionIndex::new(&detections);
+        let seen = self.frame_tracker.step(stamp.index as f64, &index, None);
+        let mut row = observations(&self.frame_tracker.bodies.mechanism, &seen, &detections);
+        for (k, occluded) in occlusions(&self.frame_tracker.bodies.mechanism, &seen).into_iter().enumerate() {
             // Live, a part is believed only if the marker was seen in the frame before.
-            if partly.is_some() && !self.returns.in_last(k) {
+            if occluded.is_some() && !self.returns.in_last(k) {
                 row[k] = Observation::MISSING;
             }
         }

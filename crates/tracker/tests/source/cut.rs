@@ -3,7 +3,7 @@
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
-use tracker::brightest::brightest;
+use tracker::peak_level::peak_level;
 use tracker::pipeline::{Observer, RunSettings, Stage, run};
 use tracker::source::{OpenOptions, open};
 use tracker::synth::{Film, WriteOptions, preset, write};
@@ -65,11 +65,11 @@ fn a_frame_that_is_held_is_an_error_too_when_it_is_looked_at() {
         frames.push(frame);
     }
     // The first is looked at before the cut and keeps what it has.
-    assert!(brightest(&frames[0]).unwrap().is_some());
+    assert!(peak_level(&frames[0]).unwrap().is_some());
     cut(&path, size / 2);
-    assert!(brightest(&frames[0]).unwrap().is_some());
+    assert!(peak_level(&frames[0]).unwrap().is_some());
     for frame in &frames[1..] {
-        let error = brightest(frame).unwrap_err().to_string();
+        let error = peak_level(frame).unwrap_err().to_string();
         assert!(error.contains(WORDS) && error.contains(&format!("frame {}:", frame.index)), "{error}");
         assert!(frame.bytes().is_err());
     }

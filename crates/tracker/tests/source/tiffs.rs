@@ -4,7 +4,7 @@ use std::fs::File;
 use std::path::Path;
 
 use tiff::encoder::{Compression, DeflateLevel, TiffEncoder, colortype};
-use tracker::brightest::brightest;
+use tracker::peak_level::peak_level;
 use tracker::frame::{Ending, PixelFormat};
 use tracker::source::{OpenOptions, open};
 
@@ -296,8 +296,8 @@ fn a_stack_above_4_gb_is_read_to_its_end() {
     );
     let frames = read_all(&mut *source);
     assert_eq!((frames.len() as u64, source.ending()), (COUNT, Ending::Complete));
-    assert_eq!(brightest(&frames[0]).unwrap(), Some(0));
-    assert_eq!(brightest(&frames[COUNT as usize - 1]).unwrap(), Some(0x1234));
+    assert_eq!(peak_level(&frames[0]).unwrap(), Some(0));
+    assert_eq!(peak_level(&frames[COUNT as usize - 1]).unwrap(), Some(0x1234));
 }
 
 #[test]

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use rayon::prelude::*;
 use serde_json::{Value, json};
-use tracker::brightest::brightest;
+use tracker::peak_level::peak_level;
 use tracker::error::Error;
 use tracker::frame::{Ending, Frame, FrameSource, PixelFormat, SourceInfo};
 use tracker::gaps::Damage;
@@ -129,7 +129,7 @@ fn look(source: &mut dyn FrameSource, count: bool) -> anyhow::Result<Seen> {
         bytes += frame.size_bytes();
         batch.push(frame);
         if bytes >= BATCH_BYTES {
-            seen.brightest = seen.brightest.max(brightest_of(&mut batch)?);
+            seen.brightest = seen.brightest.max(peak_of(&mut batch)?);
             bytes = 0;
         }
     }
@@ -137,14 +137,14 @@ fn look(source: &mut dyn FrameSource, count: bool) -> anyhow::Result<Seen> {
         seen.counted = Some(frames);
         seen.is_whole = true;
         seen.damage.gaps = source.gaps();
-        seen.brightest = seen.brightest.max(brightest_of(&mut batch)?);
+        seen.brightest = seen.brightest.max(peak_of(&mut batch)?);
     }
     Ok(seen)
 }
 
 /// The greatest sample of the frames, each looked at by whichever core is free; empties the vector.
-fn brightest_of(batch: &mut Vec<Frame>) -> Result<Option<u16>, Error> {
-    batch.par_drain(..).map(|frame| brightest(&frame)).try_reduce(|| None, |a, b| Ok(a.max(b)))
+fn peak_of(batch: &mut Vec<Frame>) -> Result<Option<u16>, Error> {
+    batch.par_drain(..).map(|frame| peak_level(&frame)).try_reduce(|| None, |a, b| Ok(a.max(b)))
 }
 
 fn format_name(format: PixelFormat) -> &'static str {

@@ -247,7 +247,7 @@ pub struct Marks {
     /// Nodes given more than 4 px from their place.
     pub wrong: u64,
     /// Nodes given more than 2 px from their place.
-    pub beside: u64,
+    pub occluded: u64,
     /// Nodes left open.
     pub open: u64,
     /// Frames handed out.
@@ -264,7 +264,7 @@ impl Marks {
 }
 
 /// Tracks and compares. `rig` gives the names; nodes are compared by their place in it.
-pub fn judge(film: &Filmed, rig: &Rig) -> Marks {
+pub fn resolve(film: &Filmed, rig: &Rig) -> Marks {
     let mut m = Marks::default();
     let mut next = 0;
     let mut last = vec![false; rig.nodes.len()];
@@ -280,7 +280,7 @@ pub fn judge(film: &Filmed, rig: &Rig) -> Marks {
             // A marker more than half hidden may be seen up to 2.5 px beside its centre: not another's name.
             let off = if given { (Vector2::new(o.x_px, o.y_px) - p).norm() } else { 0.0 };
             m.wrong += u64::from(off > 4.0);
-            m.beside += u64::from(off > 2.0);
+            m.occluded += u64::from(off > 2.0);
             if given && !near && std::env::var("SWING_SHOW").is_ok() {
                 println!(
                     "frame {} node {k} off {:.2} whole {whole} seen {}",
@@ -331,12 +331,12 @@ fn scenes_with_the_rig_given() {
     for (name, scene) in &scenes() {
         for seed in seeds() {
             let film = Swing { seed, ..scene.clone() }.film();
-            let m = judge(&film, &film.rig);
+            let m = resolve(&film, &film.rig);
             println!(
                 "{name:9} {seed:3} coverage {:.5} wrong {} beside {} open {} prompt {}/{}",
                 m.coverage(),
                 m.wrong,
-                m.beside,
+                m.occluded,
                 m.open,
                 m.prompt,
                 m.returns
@@ -355,7 +355,7 @@ fn scenes_with_the_rig_given() {
     assert!(bad.is_empty(), "{bad:#?}");
 }
 
-/// For each node of `rig` the node of the film's rig it is, by where it is in the reference frame.
+/// For each node of `rig` the node of the film's rig it is, by where it is in the reference picture.
 fn identify(film: &Filmed, rig: &Rig) -> Option<Vec<usize>> {
     let truth = &film.truth[rig.reference_frame? as usize];
     rig.nodes
@@ -382,7 +382,7 @@ fn rigs_are_discovered() {
             let right = who.as_deref() == Some(&[0, 1, 2, 3, 4, 5, 6, 7, 8])
                 && found.rig.joints.len() == 2
                 && found.rig.bodies.len() == 2;
-            let m = if right { Some(judge(&film, &found.rig)) } else { None };
+            let m = if right { Some(resolve(&film, &found.rig)) } else { None };
             println!(
                 "{name:9} {seed:3} {who:?} {:?} {:?}",
                 found.warnings,

@@ -1,51 +1,56 @@
-//! One frame's detections to named nodes, given the frames before it.
+//! Names the detections of one frame, given the frames before it.
 //!
-//! Owns: [`Engine`]. Must not: look ahead; it goes either way through time.
+//! Owns: [`FrameTracker`]. Must not: look ahead; it goes either way through time.
 //!
 //! Every body is first looked for where its motion carries it, then anywhere. What is found is accepted when it
 //! is very unlikely to be chance and no other pose explains as much; else the body stays open. Never guessed.
 
-use super::beside::look_beside;
 use super::bodies::Bodies;
-use super::habits::Habits;
+use super::motion_priors::MotionPriors;
+use super::occluded::find_occluded;
 use super::seen::{BodySeen, accepted};
-use super::undecided::{Tentative, follow};
+use super::tentative::{Tentative, follow};
 use crate::rigid::body::Mechanism;
-use crate::rigid::index::Sky;
-use crate::rigid::search::Sighting;
+use crate::rigid::index::DetectionIndex;
+use crate::rigid::search::PoseHypothesis;
 
 /// Follows bodies through frames in either direction of time.
 #[derive(Debug, Clone)]
-pub struct Engine {
+pub struct FrameTracker {
     /// The bodies.
     pub bodies: Bodies,
-    /// For each body sightings that may be it and wait for their motion to decide.
+    /// For each body hypotheses that may be it and wait for their motion to decide.
     tentative: Vec<Vec<Tentative>>,
 }
 
-impl Engine {
-    /// An engine that knows no pose yet.
-    pub fn new(mechanism: Mechanism, habits: Habits) -> Self {
+impl FrameTracker {
+    /// A tracker that knows no pose yet.
+    pub fn new(mechanism: Mechanism, priors: MotionPriors) -> Self {
         let tentative = vec![Vec::new(); mechanism.links.len()];
-        Self { bodies: Bodies::new(mechanism, habits), tentative }
+        Self { bodies: Bodies::new(mechanism, priors), tentative }
     }
 
     /// Names the detections of one frame. `time` in frames may go either way. Bodies that are already known in
     /// this frame are given in `known` and stay as they are.
-    pub fn step(&mut self, time: f64, sky: &Sky<'_>, known: Option<&[BodySeen]>) -> Vec<BodySeen> {
+    pub fn step(
+        &mut self,
+        time: f64,
+        index: &DetectionIndex<'_>,
+        known: Option<&[BodySeen]>,
+    ) -> Vec<BodySeen> {
         let n = self.bodies.mechanism.links.len();
         let mut seen: Vec<BodySeen> = match known {
             Some(k) => k.to_vec(),
             None => vec![BodySeen::default(); n],
         };
-        let mut free = vec![true; sky.len()];
+        let mut free = vec![true; index.len()];
         for s in &seen {
             for d in s.detections() {
                 free[d] = false;
             }
         }
         let given: Vec<bool> = seen.iter().map(|s| s.fit.is_some()).collect();
-        let mut undecided: Vec<Vec<(Sighting, f64)>> = (0..n).map(|_| Vec::new()).collect();
+        let mut undecided: Vec<Vec<(PoseHypothesis, f64)>> = (0..n).map(|_| Vec::new()).collect();
         let mut settled = vec![false; n];
         // Twice: a body that was found can hold its neighbours.
         for round in 0..2 {
@@ -56,10 +61,10 @@ impl Engine {
                 }
                 let anchors = self.bodies.anchors(b, &seen);
                 // What its twin was found to be is no longer open.
-                if round == 1 && anchors.is_empty() && self.bodies.twins[b].is_empty() {
+                if round == 1 && anchors.is_empty() && self.bodies.indistinguishable[b].is_empty() {
                     continue;
                 }
-                let got = self.bodies.find(b, time, sky, &free, &anchors, &seen);
+                let got = self.bodies.find(b, time, index, &free, &anchors, &seen);
                 if got.seen.fit.is_some() || seen[b].picks.is_empty() || round == 1 {
                     seen[b] = got.seen;
                     undecided[b] = got.undecided;
@@ -77,11 +82,11 @@ impl Engine {
             }
             let anchors = self.bodies.anchors(b, &seen);
             let mut waiting = std::mem::take(&mut undecided[b]);
-            // Whatever it does, it may be the other.
-            waiting.retain(|(s, _)| !self.bodies.may_be_twin(b, time, sky, s, &seen));
+            // Drop hypotheses that could be an indistinguishable body not found yet.
+            waiting.retain(|(s, _)| !self.bodies.may_be_twin(b, time, index, s, &seen));
             if let Some(s) =
-                follow(&mut self.bodies, &mut self.tentative[b], b, time, sky, &free, &anchors, waiting)
-                && !self.bodies.may_be_twin(b, time, sky, &s, &seen)
+                follow(&mut self.bodies, &mut self.tentative[b], b, time, index, &free, &anchors, waiting)
+                && !self.bodies.may_be_twin(b, time, index, &s, &seen)
             {
                 for d in s.picks.iter().flatten() {
                     free[*d] = false;
@@ -91,7 +96,7 @@ impl Engine {
             }
         }
         for &b in self.bodies.mechanism.order.iter().filter(|&&b| !given[b]) {
-            look_beside(&self.bodies.mechanism, b, sky, &mut free, &mut seen);
+            find_occluded(&self.bodies.mechanism, b, index, &mut free, &mut seen);
         }
         for b in 0..n {
             if let Some(f) = &seen[b].fit
@@ -105,8 +110,14 @@ impl Engine {
     }
 
     /// Looks for one body with all others as `known` says.
-    pub fn step_one(&mut self, b: usize, time: f64, sky: &Sky<'_>, known: &[BodySeen]) -> BodySeen {
-        let mut free = vec![true; sky.len()];
+    pub fn step_one(
+        &mut self,
+        b: usize,
+        time: f64,
+        index: &DetectionIndex<'_>,
+        known: &[BodySeen],
+    ) -> BodySeen {
+        let mut free = vec![true; index.len()];
         for (o, s) in known.iter().enumerate() {
             if o != b && s.fit.is_some() {
                 for d in s.detections() {
@@ -116,8 +127,8 @@ impl Engine {
         }
         let anchors = self.bodies.anchors(b, known);
         let mut seen = known.to_vec();
-        seen[b] = self.bodies.find(b, time, sky, &free, &anchors, known).seen;
-        look_beside(&self.bodies.mechanism, b, sky, &mut free, &mut seen);
+        seen[b] = self.bodies.find(b, time, index, &free, &anchors, known).seen;
+        find_occluded(&self.bodies.mechanism, b, index, &mut free, &mut seen);
         let got = seen.swap_remove(b);
         if let Some(f) = &got.fit {
             self.bodies.motions[b].add(time, f);

@@ -1,32 +1,34 @@
-//! Sightings between which nothing decides yet, followed until their motion does.
+//! Follows pose hypotheses between which nothing decides yet, until their motion does.
 //!
 //! Owns: [`Tentative`]. Must not: look for a body anew.
 
 use nalgebra::Vector2;
 
 use super::bodies::Bodies;
-use super::chance::CHANCE_ANYWHERE;
+use super::false_matches::CHANCE_ANYWHERE;
 use crate::rigid::forecast::Motion;
-use crate::rigid::index::Sky;
-use crate::rigid::search::{Anchor, Sighting};
+use crate::rigid::index::DetectionIndex;
+use crate::rigid::search::{Anchor, PoseHypothesis};
 
-/// Undecided sightings followed at once.
+/// Number of undecided hypotheses followed at once.
 const TENTATIVE: usize = 8;
-/// How far a sighting must move for its motion to prove anything, px.
+/// Frames in a row without its body after which a hypothesis is dropped.
+const MOST_MISSED_FRAMES: u32 = 3;
+/// Distance that a hypothesis must move for its motion to prove anything, px.
 const PROOF_PX: f64 = 3.0;
 
-/// A sighting that could be chance, followed until it no longer can be.
+/// A hypothesis that could be chance, followed until it no longer can be.
 #[derive(Debug, Clone)]
 pub(super) struct Tentative {
     motion: Motion,
-    /// Expected number of such by chance, so far.
+    /// Expected number of false matches as good, so far.
     chance: f64,
     /// Where its nodes were when that was last lowered: what stands still proves nothing.
     proved: Vec<Vector2<f64>>,
     missed: u32,
 }
 
-/// Carries on the sightings of a body that nothing decided yet, and begins new ones; the one that stands, if
+/// Carries on the hypotheses of a body that nothing decided yet, and begins new ones; the one that stands, if
 /// now one does.
 #[allow(clippy::too_many_arguments, reason = "the bodies, what waits, and one frame's facts")]
 pub(super) fn follow(
@@ -34,22 +36,22 @@ pub(super) fn follow(
     waiting: &mut Vec<Tentative>,
     b: usize,
     time: f64,
-    sky: &Sky<'_>,
+    index: &DetectionIndex<'_>,
     free: &[bool],
     anchors: &[Anchor],
-    undecided: Vec<(Sighting, f64)>,
-) -> Option<Sighting> {
+    undecided: Vec<(PoseHypothesis, f64)>,
+) -> Option<PoseHypothesis> {
     let link = &bodies.mechanism.links[b];
-    let mut now: Vec<Option<Sighting>> = Vec::new();
+    let mut now: Vec<Option<PoseHypothesis>> = Vec::new();
     let mut kept: Vec<Tentative> = Vec::new();
     for mut t in std::mem::take(waiting) {
-        let Some(w) = t.motion.forecast(time, bodies.habits.floor[b], bodies.habits.first[b]) else {
+        let Some(w) = t.motion.forecast(time, bodies.priors.floor[b], bodies.priors.first[b]) else {
             continue;
         };
         let w = anchors.first().map_or(w, |a| w.hung(a.local, a.place));
-        let search = bodies.search(b, sky, free, anchors, Some(w));
+        let search = bodies.search(b, index, free, anchors, Some(w));
         let mut open = vec![false; link.nodes.len()];
-        match bodies.judge(&search, f64::INFINITY, &mut open) {
+        match bodies.resolve(&search, f64::INFINITY, &mut open) {
             Ok((s, chance)) => {
                 let chance = chance.min(1.0);
                 let places = link.places(&s.fit.pose);
@@ -66,7 +68,7 @@ pub(super) fn follow(
             }
             Err(_) => {
                 t.missed += 1;
-                if t.missed <= 3 {
+                if t.missed <= MOST_MISSED_FRAMES {
                     kept.push(t);
                     now.push(None);
                 }
@@ -92,11 +94,15 @@ pub(super) fn follow(
     *waiting = kept;
     None
 }
+
 /// Without those that came to see the same as another: of each such group the least likely by chance stays.
-fn apart(kept: Vec<Tentative>, now: Vec<Option<Sighting>>) -> (Vec<Tentative>, Vec<Option<Sighting>>) {
-    let mut out: Vec<(Tentative, Option<Sighting>)> = Vec::new();
+fn apart(
+    kept: Vec<Tentative>,
+    now: Vec<Option<PoseHypothesis>>,
+) -> (Vec<Tentative>, Vec<Option<PoseHypothesis>>) {
+    let mut out: Vec<(Tentative, Option<PoseHypothesis>)> = Vec::new();
     for (t, s) in kept.into_iter().zip(now) {
-        let same = |o: &Option<Sighting>| matches!((o, &s), (Some(o), Some(s)) if o.picks == s.picks);
+        let same = |o: &Option<PoseHypothesis>| matches!((o, &s), (Some(o), Some(s)) if o.picks == s.picks);
         match out.iter_mut().find(|(_, o)| same(o)) {
             Some(o) if t.chance < o.0.chance => *o = (t, s),
             Some(_) => {}

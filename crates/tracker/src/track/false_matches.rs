@@ -1,32 +1,40 @@
-//! How likely a sighting is by chance alone.
+//! Computes the expected number of false matches as good as a pose hypothesis (an a-contrario test).
 //!
-//! Owns: [`by_chance`], [`likeness`], [`twins`]. Must not: decide what is accepted (`finding` does).
+//! Owns: [`expected_false_matches`], [`self_symmetry_rad`], [`indistinguishable`]. Must not: decide what is accepted (`body_search` does).
 
 use std::f64::consts::PI;
 
 use nalgebra::Vector2;
 
-use super::habits::Habits;
+use super::motion_priors::MotionPriors;
 use crate::detect::Detection;
 use crate::rigid::body::{Link, Mechanism};
-use crate::rigid::index::Sky;
-use crate::rigid::search::{Anchor, PAIRS, REACH_SIGMA, Search, Sighting};
+use crate::rigid::index::DetectionIndex;
+use crate::rigid::search::{Anchor, PAIRS, PoseHypothesis, REACH_SIGMA, Search};
 
-/// Greatest expected number of chance sightings for a body found anywhere.
+/// Greatest expected number of false matches for a body found anywhere in the frame.
 pub(super) const CHANCE_ANYWHERE: f64 = 1e-5;
 /// How exactly the only node seen of a body must be expected, px: within what a half hidden marker may be off.
 const LONE_GATE_PX: f64 = 1.5;
 /// The same where its area shows that it is whole.
 const WHOLE_GATE_PX: f64 = 3.0;
 
-/// Expected number of sightings as good as `s` that chance alone would give to `search` in `trials` poses.
-pub fn by_chance(search: &Search<'_>, s: &Sighting, trials: usize, habits: &Habits, image_px: f64) -> f64 {
+/// Expected number of false matches as good as `s`: poses that unrelated detections would give to `search` in `trials` poses.
+/// Unrelated detections are taken as evenly spread at `density` per px^2: one of them agrees with a node with probability
+/// `density * pi * radius^2`.
+pub fn expected_false_matches(
+    search: &Search<'_>,
+    s: &PoseHypothesis,
+    trials: usize,
+    priors: &MotionPriors,
+    image_px: f64,
+) -> f64 {
     let link = search.link;
     let n = link.nodes.len();
-    let others = search.free.iter().filter(|&&f| f).count().saturating_sub(s.support) as f64;
+    let others = search.free.iter().filter(|&&f| f).count().saturating_sub(s.inliers) as f64;
     let from = search.anchors.first().map_or(Vector2::zeros(), |a| a.local);
     let reach = link.reach_px(from).max(30.0);
-    let density = others.max(habits.clutter) / (PI * reach * reach);
+    let density = others.max(priors.clutter) / (PI * reach * reach);
     let whole =
         s.picks.iter().enumerate().filter_map(|(j, d)| d.filter(|&d| search.whole(j, d)).map(|d| (j, d)));
     let picked = whole.map(|(j, d)| search.sigma(j, d));
@@ -37,14 +45,14 @@ pub fn by_chance(search: &Search<'_>, s: &Sighting, trials: usize, habits: &Habi
     // Pairs of detections that lie in the window as two nodes of a body that hangs on nothing.
     let by_pairs =
         (n * n.saturating_sub(1) / 2) as f64 * (density * PI * gate * gate) * (density * 4.0 * radius * gate);
-    if s.support > base {
-        let k = s.support - base;
+    if s.inliers > base {
+        let k = s.inliers - base;
         let poses = if base == 2 { by_pairs.min(trials as f64) } else { trials as f64 };
         return poses * choose(n.saturating_sub(base).max(k), k) * hit.powi(k as i32);
     }
     let turn = search.window.map_or(PI, |w| w.angle_rad.min(PI));
     if n == 1 && base == 2 {
-        let density = others.max(habits.clutter) / image_px;
+        let density = others.max(priors.clutter) / image_px;
         let gate = search.window.map_or(f64::INFINITY, |w| w.origin_px + radius);
         return density * PI * gate * gate;
     }
@@ -55,7 +63,7 @@ pub fn by_chance(search: &Search<'_>, s: &Sighting, trials: usize, habits: &Habi
         1 if n > 1 && turn * reach > lone_gate => f64::INFINITY,
         1 => n as f64 * density * 4.0 * radius * reach * turn,
         // One or two nodes of a body that hangs on nothing.
-        _ if s.support == 1 => f64::INFINITY,
+        _ if s.inliers == 1 => f64::INFINITY,
         _ => by_pairs,
     }
 }
@@ -73,17 +81,17 @@ fn drawn(link: &Link) -> Vec<Detection> {
 fn anywhere<'a>(
     link: &'a Link,
     anchors: &'a [Anchor],
-    sky: &'a Sky<'a>,
+    index: &'a DetectionIndex<'a>,
     free: &'a [bool],
-    habits: &Habits,
+    priors: &MotionPriors,
 ) -> Search<'a> {
-    let floor_px = habits.floor_px;
-    Search { link, anchors, sky, free, window: None, reach_sigma: REACH_SIGMA, floor_px, pairs: PAIRS }
+    let floor_px = priors.floor_px;
+    Search { link, anchors, index, free, window: None, reach_sigma: REACH_SIGMA, floor_px, pairs: PAIRS }
 }
 
 /// The least turn of a body, about its first joint if it has one, that lays two of its nodes (three where it
 /// hangs on nothing) on places of nodes again; infinite if there is none.
-pub fn likeness(mechanism: &Mechanism, habits: &Habits, body: usize) -> f64 {
+pub fn self_symmetry_rad(mechanism: &Mechanism, priors: &MotionPriors, body: usize) -> f64 {
     let link = &mechanism.links[body];
     let stars = drawn(link);
     let anchors: Vec<Anchor> = mechanism
@@ -95,11 +103,11 @@ pub fn likeness(mechanism: &Mechanism, habits: &Habits, body: usize) -> f64 {
         .collect();
     let least = if anchors.is_empty() { 3 } else { 2 };
     let free = vec![true; stars.len()];
-    anywhere(link, &anchors, &Sky::new(&stars), &free, habits)
+    anywhere(link, &anchors, &DetectionIndex::new(&stars), &free, priors)
         .run()
-        .sightings
+        .hypotheses
         .iter()
-        .filter(|s| s.support >= least)
+        .filter(|s| s.inliers >= least)
         .filter(|s| s.picks.iter().enumerate().any(|(j, p)| p.is_some_and(|p| p != j)))
         .map(|s| s.fit.pose.rotation.angle().abs())
         .fold(f64::INFINITY, f64::min)
@@ -107,7 +115,7 @@ pub fn likeness(mechanism: &Mechanism, habits: &Habits, body: usize) -> f64 {
 
 /// For each body the others that look the same: one has all the nodes of the other at the same distances. Single
 /// nodes always do.
-pub fn twins(mechanism: &Mechanism, habits: &Habits) -> Vec<Vec<usize>> {
+pub fn indistinguishable(mechanism: &Mechanism, priors: &MotionPriors) -> Vec<Vec<usize>> {
     let links = &mechanism.links;
     let same = |a: usize, b: usize| {
         let (small, large) = if links[a].nodes.len() < links[b].nodes.len() { (a, b) } else { (b, a) };
@@ -116,8 +124,8 @@ pub fn twins(mechanism: &Mechanism, habits: &Habits) -> Vec<Vec<usize>> {
         }
         let stars = drawn(&links[large]);
         let free = vec![true; stars.len()];
-        let found = anywhere(&links[small], &[], &Sky::new(&stars), &free, habits).run();
-        found.sightings.first().is_some_and(|s| s.support == links[small].nodes.len())
+        let found = anywhere(&links[small], &[], &DetectionIndex::new(&stars), &free, priors).run();
+        found.hypotheses.first().is_some_and(|s| s.inliers == links[small].nodes.len())
     };
     (0..links.len()).map(|a| (0..links.len()).filter(|&b| b != a && same(a, b)).collect()).collect()
 }

@@ -1,13 +1,13 @@
-//! What a recording says of a rig before its markers are named for good: templates, joints, unrest, clutter.
+//! Estimates templates, joints, prediction error and clutter from a recording, before its markers are named for good.
 //!
-//! Owns: [`Lessons`]. Must not: name markers in the output.
+//! Owns: [`PriorEstimator`]. Must not: name markers in the output.
 
 use nalgebra::{Isometry2, Vector2};
 
-use super::habits::Habits;
+use super::motion_priors::MotionPriors;
 use super::seen::BodySeen;
 use crate::rigid::body::{Holder, Mechanism};
-use crate::rigid::index::Sky;
+use crate::rigid::index::DetectionIndex;
 use crate::rigid::joint::Shared;
 use crate::rigid::pose::place;
 
@@ -91,9 +91,9 @@ fn excess(samples: &[Samples]) -> Option<f64> {
     (nodes >= 2.0).then(|| (2.0 * scatter / (2.0 * nodes - 3.0) - stated / nodes).max(0.0))
 }
 
-/// What the frames seen so far say.
+/// Estimator of templates, joints and motion priors, frame by frame.
 #[derive(Debug, Clone)]
-pub struct Lessons {
+pub struct PriorEstimator {
     /// For each body and node.
     nodes: Vec<Vec<Samples>>,
     /// For each joint.
@@ -104,7 +104,7 @@ pub struct Lessons {
     places: Vec<(Vector2<f64>, usize)>,
 }
 
-impl Lessons {
+impl PriorEstimator {
     /// Nothing seen yet.
     pub fn new(mechanism: &Mechanism) -> Self {
         let joints = mechanism.hinges.iter().map(|h| h.joint + 1).max().unwrap_or(0);
@@ -118,7 +118,7 @@ impl Lessons {
     }
 
     /// Takes in one frame.
-    pub fn add(&mut self, mechanism: &Mechanism, seen: &[BodySeen], sky: &Sky<'_>) {
+    pub fn add(&mut self, mechanism: &Mechanism, seen: &[BodySeen], index: &DetectionIndex<'_>) {
         let firm = |s: &BodySeen| {
             s.fit
                 .as_ref()
@@ -129,15 +129,15 @@ impl Lessons {
         for (s, samples) in seen.iter().zip(&mut self.nodes) {
             used += s.picks.iter().flatten().count();
             let Some(pose) = firm(s) else { continue };
-            let complete = s.picks.iter().all(|p| p.is_some_and(|d| sky.whole(d)));
+            let complete = s.picks.iter().all(|p| p.is_some_and(|d| index.whole(d)));
             for (pick, sample) in s.picks.iter().zip(samples) {
                 if let Some(d) = *pick
-                    && sky.whole(d)
+                    && index.whole(d)
                 {
                     sample.add(Sample {
-                        local: place(&pose.inverse(), sky.place(d)),
-                        sigma_px: f64::from(sky.get(d).sigma_px),
-                        area_px: f64::from(sky.get(d).area_px),
+                        local: place(&pose.inverse(), index.place(d)),
+                        sigma_px: f64::from(index.get(d).sigma_px),
+                        area_px: f64::from(index.get(d).area_px),
                         complete,
                     });
                 }
@@ -156,12 +156,12 @@ impl Lessons {
                 Holder::Body(..) => {}
             }
         }
-        let mut node = vec![false; sky.len()];
+        let mut node = vec![false; index.len()];
         for d in seen.iter().flat_map(BodySeen::detections) {
             node[d] = true;
         }
-        for d in (0..sky.len()).filter(|&d| !node[d]) {
-            let at = sky.place(d);
+        for d in (0..index.len()).filter(|&d| !node[d]) {
+            let at = index.place(d);
             match self.places.iter().position(|p| (p.0 - at).norm() < SAME_PLACE_PX) {
                 Some(k) => self.places[k].1 += 1,
                 None if self.places.len() < PLACES => self.places.push((at, 1)),
@@ -169,11 +169,11 @@ impl Lessons {
             }
         }
         self.frames += 1;
-        self.left_over += sky.len().saturating_sub(used);
+        self.left_over += index.len().saturating_sub(used);
     }
 
-    /// The mechanism and habits as the frames say; what they do not say stays.
-    pub fn apply(&self, mechanism: &mut Mechanism, habits: &mut Habits) {
+    /// Sets the mechanism and the priors to what the frames say; what they do not say stays.
+    pub fn apply(&self, mechanism: &mut Mechanism, priors: &mut MotionPriors) {
         let excess: Vec<Option<f64>> = self.nodes.iter().map(|samples| excess(samples)).collect();
         let known: Vec<f64> = excess.iter().copied().flatten().collect();
         // A body that says nothing of it is seen by the same camera as the others.
@@ -225,11 +225,11 @@ impl Lessons {
             let standing: Vec<&(Vector2<f64>, usize)> =
                 self.places.iter().filter(|p| 3 * p.1 >= self.frames).collect();
             let still: usize = standing.iter().map(|p| p.1).sum();
-            habits.standing = standing.iter().map(|p| p.0).collect();
+            priors.standing = standing.iter().map(|p| p.0).collect();
             let moving = self.left_over.saturating_sub(still);
-            habits.clutter = (moving as f64 / self.frames as f64).max(0.05);
+            priors.clutter = (moving as f64 / self.frames as f64).max(0.05);
         }
-        habits.floor_px = LEAST_SLACK_PX;
+        priors.floor_px = LEAST_SLACK_PX;
     }
 }
 

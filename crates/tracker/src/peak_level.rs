@@ -1,6 +1,6 @@
 //! The greatest sample of a frame, at the speed at which memory can be read.
 //!
-//! Owns: [`brightest`]. Must not: unpack a frame. Written so that the compiler makes vector instructions of it, once for
+//! Owns: [`peak_level`]. Must not: unpack a frame. Written so that the compiler makes vector instructions of it, once for
 //! every machine of the kind and once for those with AVX2.
 
 use multiversion::multiversion;
@@ -13,11 +13,11 @@ use crate::frame::{Frame, PixelFormat};
 ///
 /// # Errors
 /// [`Error::Source`](crate::error::Error::Source) where the recording cannot be read any more.
-pub fn brightest(frame: &Frame) -> Result<Option<u16>> {
-    Ok(frame.bytes()?.and_then(|bytes| brightest_in(frame, bytes)))
+pub fn peak_level(frame: &Frame) -> Result<Option<u16>> {
+    Ok(frame.bytes()?.and_then(|bytes| peak_in(frame, bytes)))
 }
 
-fn brightest_in(frame: &Frame, bytes: &[u8]) -> Option<u16> {
+fn peak_in(frame: &Frame, bytes: &[u8]) -> Option<u16> {
     let (width, height) = (frame.width as usize, frame.height as usize);
     let row_bits = width.checked_mul(frame.format.bits_per_pixel() as usize)?;
     if frame.stride == 0 || frame.stride * 8 == row_bits {
@@ -146,9 +146,9 @@ mod tests {
                         depth_bits: bits as u32,
                         plane: Some(Box::new(bytes.clone())),
                     };
-                    assert_eq!(brightest(&frame), Ok(Some(top)), "{format:?} {width} x {height}, {at}");
+                    assert_eq!(peak_level(&frame), Ok(Some(top)), "{format:?} {width} x {height}, {at}");
                     frame.plane = Some(Box::new(bytes[..bytes.len() - 1].to_vec()));
-                    assert_eq!(brightest(&frame), Ok(None), "{format:?} {width} x {height} cut");
+                    assert_eq!(peak_level(&frame), Ok(None), "{format:?} {width} x {height} cut");
                 }
                 let dark = Frame {
                     index: 0,
@@ -161,7 +161,7 @@ mod tests {
                     // 255 only between the rows.
                     plane: Some(Box::new([vec![1; 2 * width], vec![255; 3], vec![1; 2 * width]].concat())),
                 };
-                assert_eq!(brightest(&dark), Ok(Some(257)));
+                assert_eq!(peak_level(&dark), Ok(Some(257)));
             }
         }
     }

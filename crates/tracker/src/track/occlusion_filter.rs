@@ -1,6 +1,6 @@
-//! Half hidden markers: which of them are believed, once the frames around them are known.
+//! Accepts or drops half hidden markers by the frames around them.
 //!
-//! Owns: [`Partly`]. A blob beside a node's place may be the rest of the marker or a glint. A marker is hidden and
+//! Owns: [`OcclusionFilter`]. A blob beside a node's place may be the rest of the marker or a glint. A marker is hidden and
 //! shown again gradually, so it is believed where an unbroken run of such frames touches one in which it is whole.
 
 use std::collections::VecDeque;
@@ -33,23 +33,23 @@ struct Held {
 
 /// Frames whose half hidden markers are not yet believed or given up.
 #[derive(Debug, Clone, Default)]
-pub struct Partly {
+pub struct OcclusionFilter {
     held: VecDeque<Held>,
     /// For each node whether it is given in the newest frame.
     given: Vec<bool>,
 }
 
-impl Partly {
-    /// Takes the next frame in order; `partly` says for each node of which only a part is seen how far that is from
+impl OcclusionFilter {
+    /// Takes the next frame in order; `offsets` says for each node of which only a part is seen how far that is from
     /// its place, px.
-    pub fn push(&mut self, stamp: FrameStamp, row: Vec<Observation>, partly: &[Option<Vector2<f64>>]) {
+    pub fn push(&mut self, stamp: FrameStamp, row: Vec<Observation>, offsets: &[Option<Vector2<f64>>]) {
         let n = row.len();
         self.given.resize(n, false);
         let mut doubt = vec![None; n];
         for k in 0..n {
             let seen = row[k].status == Status::Seen;
-            if seen && partly[k].is_some() {
-                doubt[k] = partly[k].filter(|_| !self.given[k]);
+            if seen && offsets[k].is_some() {
+                doubt[k] = offsets[k].filter(|_| !self.given[k]);
                 continue;
             }
             if seen {
@@ -120,11 +120,11 @@ impl Partly {
 mod tests {
     use super::*;
 
-    /// `x` whole, `p` partly, `.` not seen; what is believed in the end.
+    /// `x` whole, `p` half hidden, `.` not seen; what is believed in the end.
     fn believed(frames: &str) -> String {
-        let mut partly = Partly::default();
+        let mut filter = OcclusionFilter::default();
         let mut out = String::new();
-        let take = |p: &mut Partly, end: bool, out: &mut String| {
+        let take = |p: &mut OcclusionFilter, end: bool, out: &mut String| {
             while let Some((_, row)) = p.pop(end) {
                 out.push(if row[0].status == Status::Seen { 'x' } else { '.' });
             }
@@ -135,10 +135,10 @@ mod tests {
                 row[0].status = Status::Seen;
             }
             let stamp = FrameStamp { index: i as u64, ticks: i as i64, decoded: true };
-            partly.push(stamp, row, &[(c == 'p').then(Vector2::zeros)]);
-            take(&mut partly, false, &mut out);
+            filter.push(stamp, row, &[(c == 'p').then(Vector2::zeros)]);
+            take(&mut filter, false, &mut out);
         }
-        take(&mut partly, true, &mut out);
+        take(&mut filter, true, &mut out);
         out
     }
 
@@ -148,7 +148,7 @@ mod tests {
         for (step_px, goes, seen) in
             [(1.0, 1.0, true), (1.0, 0.8, true), (1.0, 0.0, false), (0.5, 1.0, false)]
         {
-            let mut partly = Partly::default();
+            let mut filter = OcclusionFilter::default();
             for i in 0..6_u32 {
                 let mut row = vec![Observation::MISSING];
                 if (1..5).contains(&i) {
@@ -162,9 +162,9 @@ mod tests {
                 }
                 let stamp = FrameStamp { index: u64::from(i), ticks: i64::from(i), decoded: true };
                 let off = Vector2::new((goes - 1.0) * step_px * f64::from(i), 1.5);
-                partly.push(stamp, row, &[Some(off)]);
+                filter.push(stamp, row, &[Some(off)]);
             }
-            let rows: Vec<bool> = std::iter::from_fn(|| partly.pop(true))
+            let rows: Vec<bool> = std::iter::from_fn(|| filter.pop(true))
                 .map(|(_, row)| row[0].status == Status::Seen)
                 .collect();
             assert_eq!(rows, [false, seen, seen, seen, seen, false]);

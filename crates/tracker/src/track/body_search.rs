@@ -1,29 +1,29 @@
-//! Whether a body is where it is expected, or anywhere, and whether what is found is it.
+//! Finds one body: near its predicted pose first, then in the whole frame; accepts or rejects the best hypothesis.
 //!
-//! Owns: [`Finding`]. Must not: carry anything from frame to frame.
+//! Owns: [`SearchOutcome`]. Must not: carry anything from frame to frame.
 
 use std::f64::consts::PI;
 
 use nalgebra::Vector2;
 
 use super::bodies::Bodies;
-use super::chance::{CHANCE_ANYWHERE, by_chance};
+use super::false_matches::{CHANCE_ANYWHERE, expected_false_matches};
 use super::seen::{BodySeen, accepted};
 use crate::rigid::body::Holder;
 use crate::rigid::forecast::{Forecast, hung_at};
-use crate::rigid::index::Sky;
+use crate::rigid::index::DetectionIndex;
 use crate::rigid::pose::place;
-use crate::rigid::search::{Anchor, REACH_SIGMA, Search, Sighting};
+use crate::rigid::search::{Anchor, PoseHypothesis, REACH_SIGMA, Search};
 
-/// Greatest expected number of chance sightings for a body found where its motion carries it.
+/// Greatest expected number of false matches for a body found at its predicted pose.
 const CHANCE_EXPECTED: f64 = 2e-3;
-/// The same where every node was seen in the frame before and is seen again near by: such a frame in which it went and
-/// something else came is rare by itself.
+/// Greatest expected number of false matches where every node was seen in the frame before and is seen again near by: a
+/// frame in which the body went and something else came is rare by itself.
 const CHANCE_NEAR: f64 = 1e-2;
-/// The same for a single marker that hangs on nothing: all there is to go by is that nothing else is near. It is the
+/// Greatest expected number of false matches for a single marker that hangs on nothing: only its motion tells it. It is the
 /// part of the frames in which it is hidden and something else may be taken for it, and only while its gate is wide:
 /// 40 px about a first place with one other mover in 0.3 Mpx are 0.02, a gap of four frames comes to 0.1, and once its
-/// rates are known 3 px are 1e-4. Tested on balls in a shaking picture, beside a pendulum (`worst`) and `balltoss`.
+/// rates are known 3 px are 1e-4. Tested on balls in a shaking picture, occluded a pendulum (`worst`) and `balltoss`.
 const CHANCE_SINGLE: f64 = 0.1;
 /// Around a place where something stands, a single marker is not told from it, px.
 const STANDING_PX: f64 = 6.0;
@@ -31,14 +31,14 @@ const STANDING_PX: f64 = 6.0;
 /// pose by less.
 const SAME_POSE_PX: f64 = 5.0;
 
-/// So many times nearer to where one body is expected than to where its twin is, what is seen is that one.
-const CLEARLY: f64 = 3.0;
+/// Ratio of distances: a body is accepted over an indistinguishable one if it is 3 times closer to its own prediction.
+const TWIN_RATIO: f64 = 3.0;
 
-/// What a search says of a body.
-pub(super) struct Finding {
+/// Outcome of the search for one body.
+pub(super) struct SearchOutcome {
     pub(super) seen: BodySeen,
-    /// Sightings between which nothing decides, each with its expected number by chance.
-    pub(super) undecided: Vec<(Sighting, f64)>,
+    /// Hypotheses between which nothing decides, each with its expected number of false matches.
+    pub(super) undecided: Vec<(PoseHypothesis, f64)>,
 }
 
 impl Bodies {
@@ -47,25 +47,25 @@ impl Bodies {
         &self,
         b: usize,
         time: f64,
-        sky: &Sky<'_>,
+        index: &DetectionIndex<'_>,
         free: &[bool],
         anchors: &[Anchor],
         known: &[BodySeen],
-    ) -> Finding {
+    ) -> SearchOutcome {
         let n = self.mechanism.links[b].nodes.len();
         let nothing =
-            |open: Vec<bool>| BodySeen { fit: None, picks: vec![None; n], open, beside: vec![None; n] };
+            |open: Vec<bool>| BodySeen { fit: None, picks: vec![None; n], open, occluded: vec![None; n] };
         let mut open = vec![false; n];
-        if sky.is_empty() {
-            return Finding { seen: nothing(open), undecided: Vec::new() };
+        if index.is_empty() {
+            return SearchOutcome { seen: nothing(open), undecided: Vec::new() };
         }
-        let stands = |s: Sighting| {
-            let seen = if self.may_be_twin(b, time, sky, &s, known) {
+        let stands = |s: PoseHypothesis| {
+            let seen = if self.may_be_twin(b, time, index, &s, known) {
                 nothing(s.picks.iter().map(Option::is_some).collect())
             } else {
                 accepted(s, n)
             };
-            Finding { seen, undecided: Vec::new() }
+            SearchOutcome { seen, undecided: Vec::new() }
         };
         let forecast = self.forecast(b, time, anchors);
         // A body of one node that hangs on nothing has no angle to be lost.
@@ -74,23 +74,23 @@ impl Bodies {
         let free = if single {
             // Nothing but its motion tells it from what stands still.
             let stands =
-                |d: usize| self.habits.standing.iter().any(|p| (p - sky.place(d)).norm() < STANDING_PX);
-            moving = (0..sky.len()).map(|d| free[d] && !stands(d)).collect();
+                |d: usize| self.priors.standing.iter().any(|p| (p - index.place(d)).norm() < STANDING_PX);
+            moving = (0..index.len()).map(|d| free[d] && !stands(d)).collect();
             &moving
         } else {
             free
         };
-        if let Some(s) = self.find_near(b, time, sky, free, anchors) {
+        if let Some(s) = self.find_near(b, time, index, free, anchors) {
             return stands(s);
         }
         if let Some(w) = forecast.filter(|w| single || w.angle_rad < PI) {
             // The usual case: every node near its expected place, and no other turn can look like it.
-            let search = self.search(b, sky, free, anchors, Some(w));
+            let search = self.search(b, index, free, anchors, Some(w));
             let about = anchors.first().map_or(Vector2::zeros(), |a| a.local);
-            if 2.0 * w.angle_rad < self.likeness[b]
-                && let Some(s) = search.grow(w.pose, about, w.angle_rad)
-                && (s.support == n || s.support >= 3)
-                && s.support >= 2
+            if 2.0 * w.angle_rad < self.self_symmetry_rad[b]
+                && let Some(s) = search.refine(w.pose, about, w.angle_rad)
+                && (s.inliers == n || s.inliers >= 3)
+                && s.inliers >= 2
                 && self.chance(&search, &s, 1) < CHANCE_ANYWHERE
             {
                 return stands(s);
@@ -100,22 +100,22 @@ impl Bodies {
                 1 if self.motions[b].was_just_seen(time) => CHANCE_NEAR,
                 _ => CHANCE_EXPECTED,
             };
-            match self.judge(&search, limit, &mut open) {
+            match self.resolve(&search, limit, &mut open) {
                 Ok((s, _)) => return stands(s),
                 // What is open where it is expected is not looked for elsewhere.
                 Err(undecided) if single || (n == 1 && !undecided.is_empty()) => {
-                    return Finding { seen: nothing(open), undecided };
+                    return SearchOutcome { seen: nothing(open), undecided };
                 }
                 Err(_) => {}
             }
-            if let Some(s) = self.find_last_node(b, time, sky, free, anchors) {
+            if let Some(s) = self.find_last_node(b, time, index, free, anchors) {
                 return stands(s);
             }
         }
-        let search = self.search(b, sky, free, anchors, None);
-        match self.judge(&search, CHANCE_ANYWHERE, &mut open) {
+        let search = self.search(b, index, free, anchors, None);
+        match self.resolve(&search, CHANCE_ANYWHERE, &mut open) {
             Ok((s, _)) => stands(s),
-            Err(undecided) => Finding { seen: nothing(open), undecided },
+            Err(undecided) => SearchOutcome { seen: nothing(open), undecided },
         }
     }
 
@@ -125,10 +125,10 @@ impl Bodies {
         &self,
         b: usize,
         time: f64,
-        sky: &Sky<'_>,
+        index: &DetectionIndex<'_>,
         free: &[bool],
         anchors: &[Anchor],
-    ) -> Option<Sighting> {
+    ) -> Option<PoseHypothesis> {
         let link = &self.mechanism.links[b];
         let n = link.nodes.len();
         let pose = self.motions[b].fresh(time).filter(|_| n > 1)?;
@@ -139,14 +139,14 @@ impl Bodies {
         };
         let reach = link.reach_px(about).max(1.0);
         let window = Forecast { pose, angle_rad: half / reach, origin_px: half };
-        let search = self.search(b, sky, free, anchors, Some(window));
-        let s = search.grow(pose, about, half / (REACH_SIGMA * reach))?;
+        let search = self.search(b, index, free, anchors, Some(window));
+        let s = search.refine(pose, about, half / (REACH_SIGMA * reach))?;
         let near = self.moved_px(b, &s) < half;
-        (s.support == n && near && self.chance(&search, &s, 1) < CHANCE_NEAR).then_some(s)
+        (s.inliers == n && near && self.chance(&search, &s, 1) < CHANCE_NEAR).then_some(s)
     }
 
-    /// How far a sighting is from a body's newest pose: the farthest of its nodes, px.
-    fn moved_px(&self, b: usize, s: &Sighting) -> f64 {
+    /// How far a hypothesis is from a body's newest pose: the farthest of its nodes, px.
+    fn moved_px(&self, b: usize, s: &PoseHypothesis) -> f64 {
         let Some(before) = self.motions[b].newest_pose() else { return f64::INFINITY };
         let far = |&t: &Vector2<f64>| (place(&s.fit.pose, t) - place(&before, t)).norm();
         self.mechanism.links[b].template.iter().map(far).fold(0.0, f64::max)
@@ -158,15 +158,15 @@ impl Bodies {
         &self,
         b: usize,
         time: f64,
-        sky: &Sky<'_>,
+        index: &DetectionIndex<'_>,
         free: &[bool],
         anchors: &[Anchor],
-    ) -> Option<Sighting> {
+    ) -> Option<PoseHypothesis> {
         let a = anchors.first()?;
         let w = self.motions[b].settled_forecast(time)?.hung(a.local, a.place);
         let mut open = vec![false; self.mechanism.links[b].nodes.len()];
-        let search = self.search(b, sky, free, anchors, Some(w));
-        self.judge(&search, CHANCE_EXPECTED, &mut open).ok().map(|(s, _)| s)
+        let search = self.search(b, index, free, anchors, Some(w));
+        self.resolve(&search, CHANCE_EXPECTED, &mut open).ok().map(|(s, _)| s)
     }
 
     /// Whether a body that looks the same and was not found yet in this frame may be what was found.
@@ -174,28 +174,29 @@ impl Bodies {
         &self,
         b: usize,
         time: f64,
-        sky: &Sky<'_>,
-        s: &Sighting,
+        index: &DetectionIndex<'_>,
+        s: &PoseHypothesis,
         known: &[BodySeen],
     ) -> bool {
-        self.twins[b].iter().filter(|&&o| known[o].fit.is_none() && !self.would_be_chance(b, o, time, s)).any(
-            |&o| {
-                let mut only = vec![false; sky.len()];
+        self.indistinguishable[b]
+            .iter()
+            .filter(|&&o| known[o].fit.is_none() && !self.would_be_chance(b, o, time, s))
+            .any(|&o| {
+                let mut only = vec![false; index.len()];
                 s.picks.iter().flatten().for_each(|&d| only[d] = true);
                 let anchors = self.anchors(o, known);
                 let window = self.forecast(o, time, &anchors).filter(|w| w.angle_rad < PI);
-                self.search(o, sky, &only, &anchors, window)
+                self.search(o, index, &only, &anchors, window)
                     .run()
-                    .sightings
+                    .hypotheses
                     .iter()
-                    .any(|t| t.support >= s.support && self.hangs(o, t, known))
-            },
-        )
+                    .any(|t| t.inliers >= s.inliers && self.hangs(o, t, known))
+            })
     }
 
     /// Whether it would be chance alone that a twin comes to where body `b`, seen in the frame before, is expected,
     /// just when `b` itself goes: both hang on nothing, and the twin may be in many more places.
-    fn would_be_chance(&self, b: usize, twin: usize, time: f64, s: &Sighting) -> bool {
+    fn would_be_chance(&self, b: usize, twin: usize, time: f64, s: &PoseHypothesis) -> bool {
         let hangs = |b: usize| self.mechanism.hinges.iter().any(|h| h.body == b);
         if hangs(b) || hangs(twin) || !self.motions[b].was_just_seen(time) {
             return false;
@@ -208,7 +209,7 @@ impl Bodies {
             let far = |&t: &Vector2<f64>| (place(&s.fit.pose, t) - place(&w.pose, t)).norm();
             let own_px = self.mechanism.links[b].template.iter().map(far).fold(0.0, f64::max);
             let other_px = (s.fit.pose.translation.vector - o.pose.translation.vector).norm();
-            return CLEARLY * own_px < other_px;
+            return TWIN_RATIO * own_px < other_px;
         }
         let off_px = (s.fit.pose.translation.vector - w.pose.translation.vector).norm();
         let off_rad = s.fit.pose.rotation.angle_to(&w.pose.rotation).abs();
@@ -224,7 +225,7 @@ impl Bodies {
 
     /// Whether a body seen so could hang where it must: a neighbour that was not found itself, but whose other
     /// joint's place is known, still has its own length.
-    fn hangs(&self, b: usize, s: &Sighting, known: &[BodySeen]) -> bool {
+    fn hangs(&self, b: usize, s: &PoseHypothesis, known: &[BodySeen]) -> bool {
         self.mechanism.hinges.iter().filter(|h| h.body == b).all(|h| {
             let Holder::Body(o, there) = h.holder else { return true };
             if known[o].fit.is_some() {
@@ -234,27 +235,27 @@ impl Bodies {
             self.anchors(o, known).iter().all(|a| {
                 let sigma_px = h.sigma_px.hypot(a.sigma_px).hypot(s.fit.sigma_at(h.local));
                 let length = (there - a.local).norm();
-                ((here - a.place).norm() - length).abs() < REACH_SIGMA * sigma_px.max(self.habits.floor_px)
+                ((here - a.place).norm() - length).abs() < REACH_SIGMA * sigma_px.max(self.priors.floor_px)
             })
         })
     }
 
-    /// The sighting that stands, if one does, with its expected number by chance; else those between which
+    /// The hypothesis that stands, if one does, with its expected number of false matches; else those between which
     /// nothing decides, and marks on the nodes that something seen may be.
     #[allow(clippy::type_complexity, reason = "what stands, or all that may")]
-    pub(super) fn judge(
+    pub(super) fn resolve(
         &self,
         search: &Search<'_>,
         limit: f64,
         open: &mut [bool],
-    ) -> Result<(Sighting, f64), Vec<(Sighting, f64)>> {
+    ) -> Result<(PoseHypothesis, f64), Vec<(PoseHypothesis, f64)>> {
         let found = search.run();
-        let mut sightings = found.sightings.into_iter();
-        let Some(best) = sightings.next() else { return Err(Vec::new()) };
+        let mut hypotheses = found.hypotheses.into_iter();
+        let Some(best) = hypotheses.next() else { return Err(Vec::new()) };
         let chance = self.chance(search, &best, found.trials);
-        let least = if best.support > 2 { best.support - 1 } else { best.support };
-        let rivals: Vec<Sighting> = sightings
-            .take_while(|s| s.support >= least)
+        let least = if best.inliers > 2 { best.inliers - 1 } else { best.inliers };
+        let rivals: Vec<PoseHypothesis> = hypotheses
+            .take_while(|s| s.inliers >= least)
             .filter(|s| !of_three(s, &best))
             .filter(|s| {
                 search
@@ -267,7 +268,8 @@ impl Bodies {
         if chance < limit && rivals.is_empty() {
             return Ok((best, chance));
         }
-        let undecided: Vec<(Sighting, f64)> = rivals.into_iter().chain([best]).map(|s| (s, chance)).collect();
+        let undecided: Vec<(PoseHypothesis, f64)> =
+            rivals.into_iter().chain([best]).map(|s| (s, chance)).collect();
         for (s, _) in &undecided {
             for (o, p) in open.iter_mut().zip(&s.picks) {
                 *o |= p.is_some();
@@ -276,16 +278,16 @@ impl Bodies {
         Err(undecided)
     }
 
-    fn chance(&self, search: &Search<'_>, s: &Sighting, trials: usize) -> f64 {
-        by_chance(search, s, trials, &self.habits, self.mechanism.image_px)
+    fn chance(&self, search: &Search<'_>, s: &PoseHypothesis, trials: usize) -> f64 {
+        expected_false_matches(search, s, trials, &self.priors, self.mechanism.image_px)
     }
 }
 
 /// Whether `s` is two of the three markers that are the whole of `best`: any two are a pair either way round, and what
 /// is expected by chance of `best` is that the third is where it is.
-fn of_three(s: &Sighting, best: &Sighting) -> bool {
+fn of_three(s: &PoseHypothesis, best: &PoseHypothesis) -> bool {
     best.picks.len() == 3
-        && best.support == 3
-        && s.support == 2
+        && best.inliers == 3
+        && s.inliers == 2
         && s.picks.iter().flatten().all(|&d| best.picks.contains(&Some(d)))
 }

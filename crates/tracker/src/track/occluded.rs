@@ -1,6 +1,6 @@
-//! Half hidden markers: the detection beside the place that a firm body gives a node not seen.
+//! Finds half hidden markers: the detection beside the place that a firm body gives a node not seen.
 //!
-//! Owns: [`look_beside`]. Must not: move a pose (what is beside is no part of it).
+//! Owns: [`find_occluded`]. Must not: move a pose (what is beside is no part of it).
 //!
 //! A blob in which markers run together shows all of them of which its area leaves a half, each at the place that its
 //! own body gives it.
@@ -9,10 +9,10 @@ use std::f64::consts::PI;
 
 use nalgebra::Vector2;
 
-use super::seen::{Beside, BodySeen};
+use super::seen::{BodySeen, Occluded};
 use crate::detect::Flags;
 use crate::rigid::body::{LEAST_PART, Link, Mechanism};
-use crate::rigid::index::Sky;
+use crate::rigid::index::DetectionIndex;
 use crate::rigid::pose::place;
 
 /// How far the centre of a marker that is at least half seen may be from the marker's, in radii: that of half a
@@ -26,29 +26,29 @@ const TOUCH_PX: f64 = 2.0;
 const FIRM_PX: f64 = 0.3;
 
 /// Finds half hidden markers: where a body's pose is firm, the detection beside the place of a node not seen.
-pub fn look_beside(
+pub fn find_occluded(
     mechanism: &Mechanism,
     body: usize,
-    sky: &Sky<'_>,
+    index: &DetectionIndex<'_>,
     free: &mut [bool],
     seen: &mut [BodySeen],
 ) {
     for j in 0..mechanism.links[body].nodes.len() {
-        if let Some(found) = beside(mechanism, (body, j), sky, free, seen) {
+        if let Some(found) = occluded(mechanism, (body, j), index, free, seen) {
             free[found.detection] = false;
-            seen[body].beside[j] = Some(found);
+            seen[body].occluded[j] = Some(found);
         }
     }
 }
 
 /// The detection beside the place of a node not seen, if its body's pose is firm.
-fn beside(
+fn occluded(
     mechanism: &Mechanism,
     (body, j): (usize, usize),
-    sky: &Sky<'_>,
+    index: &DetectionIndex<'_>,
     free: &[bool],
     seen: &[BodySeen],
-) -> Option<Beside> {
+) -> Option<Occluded> {
     let link = &mechanism.links[body];
     if seen[body].picks.get(j).is_none_or(Option::is_some) {
         return None;
@@ -57,9 +57,9 @@ fn beside(
     let (usual, scatter) = link.area_px[j];
     let radius = (usual / PI).sqrt();
     let near = if usual > 0.0 { BESIDE_RADII * radius } else { BESIDE_PX };
-    let found = |detection: usize| Beside { detection, place: there, off: sky.place(detection) - there };
-    let (d, r) = sky.nearest(there, near.max(2.0 * radius))?;
-    let part = sky.get(d);
+    let found = |detection: usize| Occluded { detection, place: there, off: index.place(detection) - there };
+    let (d, r) = index.nearest(there, near.max(2.0 * radius))?;
+    let part = index.get(d);
     let area_px = f64::from(part.area_px);
     if part.flags.has(Flags::MERGED) {
         // Only where every marker that may be in it is known is it told what of it is whose.
@@ -74,7 +74,7 @@ fn beside(
             // Its centre is that of all of them.
             let own = own.min(usual);
             let sum = company.iter().map(|c| c.1 * c.0).sum::<Vector2<f64>>() + own * there;
-            let off = (sum / (others + own) - sky.place(d)).norm();
+            let off = (sum / (others + own) - index.place(d)).norm();
             return (off <= near).then(|| found(d));
         }
         if area_px > usual + 4.0 * scatter {
@@ -90,7 +90,7 @@ fn beside(
         .template
         .iter()
         .enumerate()
-        .any(|(k, &t)| k != j && (place(&fit.pose, t) - sky.place(d)).norm() < r);
+        .any(|(k, &t)| k != j && (place(&fit.pose, t) - index.place(d)).norm() < r);
     (r <= near && free[d] && off && !nearer).then(|| found(d))
 }
 
