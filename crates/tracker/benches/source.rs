@@ -16,8 +16,8 @@ use std::time::Instant;
 
 use criterion::{Criterion, Throughput};
 use rayon::prelude::*;
-use tracker::peak_level::peak_level;
 use tracker::frame::Frame;
+use tracker::peak_level::peak_level;
 use tracker::source::{Decoder, OpenOptions, open};
 
 const WIDTH: usize = 1280;

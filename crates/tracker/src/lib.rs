@@ -10,7 +10,6 @@
 //! Image coordinates: x right, y down, pixel centres at integers, the first pixel is (0, 0). Times are integer
 //! ticks with a time base until they are written.
 
-
 pub mod csv_text;
 pub mod detect;
 pub mod discover;

@@ -126,7 +126,7 @@ fn not_at_rest(rig: &Rig, rows: &Rows) -> Option<String> {
         .max_by(|a, b| a.1.total_cmp(&b.1))?;
     (step > 0.5).then(|| {
         format!(
-            "the reference picture {} is not at rest: node {} moves {step:.1} px in a frame, so angles have no zero \
+            "the reference picture, frame {}, is not at rest: node {} moves {step:.1} px in a frame, so angles have no zero \
              from it. Film the rig hanging still first, or give a rest recording",
             rig.reference_frame.unwrap_or(0),
             rig.nodes[k].name
@@ -183,7 +183,10 @@ mod tests {
     fn markers_that_merge_and_a_reference_that_moves_are_told() {
         let said = advice(&bare(500.0, 1000));
         assert!(said.iter().any(|w| w.contains("merge in the picture when their bodies cross")), "{said:?}");
-        assert!(said.iter().any(|w| w.contains("the reference picture 0 is not at rest")), "{said:?}");
+        assert!(
+            said.iter().any(|w| w.contains("the reference picture, frame 0, is not at rest")),
+            "{said:?}"
+        );
         let still = LinkMotion::Swing {
             phi_rad: 0.0,
             amplitude_rad: 1.0,

@@ -93,7 +93,8 @@ pub fn discover(store: &DetectionStore, image_px: [u32; 2], stop: &Stop) -> Resu
     if !beyond.is_empty() {
         let beyond = beyond.join(", ");
         warnings.push(
-            format!("outside the image in the reference picture, where their links put them: {beyond}").into(),
+            format!("outside the image in the reference picture, where their links put them: {beyond}")
+                .into(),
         );
     }
     rig.check("discovered rig")?;

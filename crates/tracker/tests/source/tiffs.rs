@@ -4,8 +4,8 @@ use std::fs::File;
 use std::path::Path;
 
 use tiff::encoder::{Compression, DeflateLevel, TiffEncoder, colortype};
-use tracker::peak_level::peak_level;
 use tracker::frame::{Ending, PixelFormat};
+use tracker::peak_level::peak_level;
 use tracker::source::{OpenOptions, open};
 
 use crate::film::{encode, gray_jpeg, have_ffmpeg, read_all, samples};

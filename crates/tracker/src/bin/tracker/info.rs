@@ -5,11 +5,11 @@ use std::process::ExitCode;
 
 use rayon::prelude::*;
 use serde_json::{Value, json};
-use tracker::peak_level::peak_level;
 use tracker::error::Error;
 use tracker::frame::{Ending, Frame, FrameSource, PixelFormat, SourceInfo};
 use tracker::gaps::Damage;
 use tracker::name::{shown, text};
+use tracker::peak_level::peak_level;
 use tracker::pipeline;
 use tracker::pixel_aspect::AspectOrigin;
 use tracker::source::{Interlaced, OpenOptions, open};

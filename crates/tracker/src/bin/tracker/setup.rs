@@ -65,7 +65,7 @@ pub fn run(args: Args, front: &CommandLine) -> anyhow::Result<ExitCode> {
     if !args.quiet {
         let mut out = String::new();
         let index = rig.reference_frame.unwrap_or(0);
-        writeln!(out, "{}: {} nodes, reference picture {index}", text(&args.output), rig.nodes.len())?;
+        writeln!(out, "{}: {} nodes, reference picture: frame {index}", text(&args.output), rig.nodes.len())?;
         for body in &rig.bodies {
             let nodes: Vec<&str> =
                 rig.nodes.iter().filter(|n| n.body == body.name).map(|n| n.name.as_str()).collect();
