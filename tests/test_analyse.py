@@ -17,12 +17,12 @@ import pydpend as dp
 import pytest
 from pydpend.analyse import Options, analyse, read_config, write_config
 from pydpend.analyse.folder import RunFolder
-from pydpend.analyse.options import flag_of
 from pydpend.angles import read_angles
 from pydpend.cli import main, parser
 from pydpend.errors import PydpendError
 from pydpend.model import Damping, read_model
 from pydpend.nodes import read_nodes
+from pydpend.option_fields import flag_of
 from pydpend.report import report_page
 from pydpend.report.page import Table
 from pydpend.simulate import simulate
@@ -235,7 +235,7 @@ def test_a_config_says_whatever_a_flag_can(tmp_path: Path, capsys: pytest.Captur
         "time_column": "t 1", "rate_hz": 1000.0, "unit": "deg", "bodies": "b0,b1", "mirrored": True, "clockwise": True,
         "unwrap": True,
         "calibration": "holds", "model": "m.toml", "laws": "mu_v1,tau_c1", "ratios": "fixed", "free": "tilt,offset1",
-        "intervals": "profile", "comparison": False, "prediction": False, "start_s": 1.5, "stop_s": 9.0,
+        "clock": True, "intervals": "profile", "comparison": False, "prediction": False, "start_s": 1.5, "stop_s": 9.0,
         "angle_maps": True, "zero": "-178,-182", "link_length_m": 0.17, "estimator": "linkage",
         "columns": "time_s=t", "hanging_deg": -180.0, "overlay": False, "threads": 3, "pixel_aspect": "4:3",
     }  # fmt: skip
@@ -267,8 +267,8 @@ def test_whatever_a_fit_can_be_told_an_analysis_can() -> None:
     fit, analysis = (
         set(vars(parser().parse_args(words))) for words in (["fit", "a", "-o", "b"], ["analyse"])
     )
-    # Under another name, or of how to run; figures are always drawn.
-    other = {"angles", "no_figures"}
+    # Under another name, or of how to run; figures are always drawn, and a run folder is gone on with.
+    other = {"angles", "no_figures", "force"}
     assert fit - analysis == other
     assert "inputs" in analysis
 
@@ -331,7 +331,7 @@ def test_a_zero_by_the_vertical_and_how_far_it_was_off_are_in_the_report(tmp_pat
     constants = f"psi_kg_m2 = {BAR.psi_kg_m2}\nsigma_j = {BAR.sigma_j}\nm1_kg = {BAR.m1_kg}"
     (tmp_path / "bar.toml").write_text(f"[constants]\n{constants}\n", encoding="utf-8")
     options = Options(
-        (str(tmp_path / "held.parquet"),), zero="vertical=1", model=str(tmp_path / "bar.toml"), comparison=False,
+        inputs=(str(tmp_path / "held.parquet"),), zero="vertical=1", model=str(tmp_path / "bar.toml"), comparison=False,
         prediction=False, laws="mu_v1,tau_c1", start_s=1.1,
     )  # fmt: skip
     outcome = analyse(options, tmp_path / "run")

@@ -15,6 +15,7 @@ GROUPS: tuple[tuple[str, ...], ...] = (
         "terminal",
         "output",
         "number_words",
+        "option_fields",
         "errors",
         "crossing",
         "_tracker",

@@ -26,7 +26,7 @@ from pydpend.encoder import (
     read_holds,
 )
 from pydpend.errors import EncoderError, FitError, FitOptionError, PydpendError
-from pydpend.fit_options import check_fit
+from pydpend.fit_options import FitOptions
 from pydpend.model import derived
 
 from tests.free_decays import measured, released
@@ -76,8 +76,8 @@ def test_the_column_of_the_times_is_no_encoder() -> None:
 def test_a_name_given_twice_is_refused(single: bool) -> None:
     for laws, free in (("full", "tilt,tilt"), ("full", ("offset1", "tilt", "offset1")), ("mu_v1,mu_v1", ())):
         with pytest.raises(FitOptionError, match="is given twice"):
-            check_fit("trajectory", laws, {"free": free}, single=single)
-    check_fit("trajectory", "mu_v1,mu_q1", {"free": "tilt,offset1"}, single=single)
+            FitOptions(laws=laws, free=free).coefficients(single=single)
+    FitOptions(laws="mu_v1,mu_q1", free="tilt,offset1").coefficients(single=single)
 
 
 def test_a_recording_given_twice_is_refused_by_a_fit() -> None:

@@ -258,7 +258,7 @@ def test_the_pinned_pendulum_is_a_single_one() -> None:
     # One link's angles, zero where the body hangs, with the body's own constants, are the same pendulum.
     body, hanging = single.pinned(MODEL, 0.4)
     one = LinkAngles(both.t_s, both.phi_rad[:, :1] - hanging, both.sigma_rad[:, :1], name="one link")
-    fit = fit_damping(one, body, laws="paper", predict=True)
+    fit = fit_damping(one, body, laws="paper", prediction=True)
     assert abs(fit.ratios["sigma"].value - body.sigma_j / body.psi_kg_m2) < 4 * fit.ratios["sigma"].sigma
     assert 0.045 < fit.prediction["1"]["phi1_deg"] < 0.055
 

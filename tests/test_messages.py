@@ -275,10 +275,11 @@ def test_a_setting_that_a_command_has_not_is_named_with_one_that_has(
         assert str(Message.of(Setting("unwrap", True))).startswith("--unwrap (of `pydpend ")
         assert str(Message.of(Setting("threshold"))) == "--threshold (of `tracker track`)"
         assert (
-            str("Leave " + Setting("predict", False) + ".") == "Leave --no-prediction (of `pydpend analyse`)."
+            str("Leave " + Setting("prediction", False) + ".")
+            == "Leave --no-prediction (of `pydpend analyse`)."
         )
         assert str(Message.of(Step("tracker setup", "dp.setup"))) == "`tracker setup`"
-    assert str(Message.of(Setting("predict", False))) == "predict=False"
+    assert str(Message.of(Setting("prediction", False))) == "prediction=False"
     assert (
         str(fault(Setting("fps"), "is wrong", "Leave " + Setting("fps") + " out"))
         == "fps: is wrong. Leave fps=... out"
@@ -294,9 +295,9 @@ def test_options_of_the_other_method_are_refused_by_all(
         "free": ({"free": ["tilt"]}, ["--free", "tilt"], {"free": "tilt"}),
         "ratios": ({"ratios": True}, ["--ratios", "free"], {"ratios": "free"}),
         "intervals": ({"intervals": "profile"}, ["--intervals", "profile"], {"intervals": "profile"}),
-        "comparison": ({"compare": True}, ["--comparison"], {"comparison": True}),
-        "prediction": ({"predict": True}, ["--prediction"], {}),
-        "clock": ({"clock": True}, [], {}),
+        "comparison": ({"comparison": True}, ["--comparison"], {"comparison": True}),
+        "prediction": ({"prediction": True}, ["--prediction"], {}),
+        "clock": ({"clock": True}, ["--clock"], {"clock": True}),
     }
     for name, (keywords_, flags_, options) in wrong.items():
         with pytest.raises(FitOptionError, match="is an option of the trajectory fit"):
@@ -310,6 +311,8 @@ def test_options_of_the_other_method_are_refused_by_all(
         if options:
             with pytest.raises(FitOptionError):
                 pydpend.analyse.Options(method="energy", **options)
+    with pytest.raises(FitOptionError, match="predict: the option is called prediction now"):
+        dp.fit_damping(angles, model, predict=True)  # type: ignore[call-arg]
     # What is asked not to be done is not done, whatever the method.
     pydpend.analyse.Options(method="energy", comparison=False, prediction=False, ratios="fixed")
     assert not (tmp_path / "out").exists()

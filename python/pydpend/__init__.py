@@ -38,6 +38,7 @@ from pydpend.errors import (
 )
 from pydpend.export import export
 from pydpend.filming import Film, Truth, film
+from pydpend.fit_options import FitOptions
 from pydpend.linear import lyapunov, modes, poincare
 from pydpend.model import Damping, Model, derived, published, read_model
 from pydpend.nodes import Nodes, Rig, read_nodes
@@ -59,6 +60,7 @@ __all__ = [
     "Film",
     "FilmError",
     "FitError",
+    "FitOptions",
     "LinkAngles",
     "LinkStates",
     "Linkage",

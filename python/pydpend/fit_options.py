@@ -1,21 +1,24 @@
-"""What a damping fit can be told: the words that an option may be, and the method that it is of.
+"""What a damping fit can be told, in one class that is checked before any fit begins.
 
-`fit_damping`, ``pydpend fit`` and ``pydpend analyse`` all ask here, before any fit begins.
+`fit_damping`, ``pydpend fit``, ``pydpend analyse`` and the keys of a run's stages all have it from here.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, fields, replace
+from typing import Any, Self, TypedDict
 
 from pydpend.coefficients import FULL, JOINT_OF, PAPER, check_once, coefficients
 from pydpend.errors import FitOptionError, Message, Setting, Text, fault, listed, one_of
+from pydpend.option_fields import choices_of, method_of, option
 
 METHODS = ("trajectory", "energy")
 """The equations of motion fitted to the angles, or the paper's energy profile."""
 
 RATIOS = ("free", "fixed")
-"""Whether the inertial ratios are fitted too, as ``pydpend fit`` and ``pydpend analyse`` say it."""
+"""Whether the inertial ratios are fitted too; in Python also True and False."""
 
 INTERVALS = ("covariance", "profile")
 """How each coefficient's uncertainty is told."""
@@ -27,114 +30,195 @@ each joint."""
 UPPER = ("tilt", "offset1")
 """Those of `FREE` that a single pendulum has."""
 
-METHOD_OF: Mapping[str, str] = {
-    "ratios": "trajectory",
-    "free": "trajectory",
-    "clock": "trajectory",
-    "angle_maps": "trajectory",
-    "intervals": "trajectory",
-    "predict": "trajectory",
-    "compare": "trajectory",
-    "comparison": "trajectory",
-    "ten_coefficients": "energy",
-}
-"""Options that only one method has. All others (laws, start_s, stop_s, pinned) are of both."""
+OLD_NAMES = {"predict": "prediction", "compare": "comparison"}
+"""Names that options had."""
 
-NOTHING: tuple[object, ...] = (None, False, (), [], "", "covariance", "fixed")
+ASK_FOR_NOTHING: tuple[object, ...] = (None, False, "", "covariance", "fixed")
 """Values that ask for nothing beyond what every method does: the energy fit takes the ratios from the model."""
 
 
-def check_fit(
-    method: str, laws: str | Sequence[str], options: Mapping[str, object], *, single: bool = False
-) -> tuple[str, ...]:
-    """The coefficients of ``laws``. Raises FitOptionError for an option that is wrong, or of the other method.
+class FitKeywords(TypedDict, total=False):
+    """The fields of `FitOptions` besides method and laws, as keywords."""
 
-    ``options``: as the caller names them. ``single``: the recordings are of a single pendulum.
+    ratios: str | bool | None
+    free: str | Sequence[str]
+    clock: bool
+    angle_maps: bool
+    pinned: bool
+    ten_coefficients: bool
+    intervals: str
+    comparison: bool | None
+    prediction: bool | None
+    start_s: float | None
+    stop_s: float | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class FitOptions:
+    """How the damping is fitted. Every field is a flag of the same name in ``pydpend fit`` and ``pydpend analyse``.
+
+    Raises FitOptionError for a value that is not known, or an option of the other method.
     """
-    if method not in METHODS:
-        raise FitOptionError(one_of("method", method, METHODS))
-    names = coefficients(laws)
-    intervals = options.get("intervals", INTERVALS[0])
-    if intervals not in INTERVALS:
-        raise FitOptionError(one_of("intervals", intervals, INTERVALS))
-    free = free_names(options.get("free"))
-    for name in free:
-        if name not in FREE:
-            raise FitOptionError(one_of("free", name, FREE))
-    check_once("free", free)
-    for option, value in options.items():
-        owner = METHOD_OF.get(option, method)
-        if owner != method and value not in NOTHING:
+
+    method: str = option("trajectory", choices=METHODS)
+    """``trajectory``: the equations of motion are fitted to the angles; ``energy``: the paper's energy profile."""
+    laws: str | Sequence[str] = option("full")
+    """``full``, ``paper`` or a list of coefficients with commas (``mu_v1,tau_c1``)."""
+    ratios: str | bool | None = option(None, choices=RATIOS, of="trajectory")
+    """``free``: the inertial ratios are fitted too (trajectory only, and its default); ``fixed``: the model's are
+    believed."""
+    free: str | Sequence[str] = option("", of="trajectory")
+    """Further parameters to fit, with commas: added_inertia, tilt, offset1, offset2 (trajectory only)."""
+    clock: bool = option(False, of="trajectory")
+    """Fit the scale of the camera's clock too (trajectory only)."""
+    angle_maps: bool = option(False, of="trajectory")
+    """Learn the repeatable angle-dependent bias of the tracking with the fit (trajectory only)."""
+    pinned: bool = option(False)
+    """The elbow is pinned: a single pendulum. A recording of one link needs a one-link model instead."""
+    ten_coefficients: bool = option(False, of="energy")
+    """Also the paper's ten (Table 6), with a warning; needs the energy method and the paper's laws."""
+    intervals: str = option("covariance", choices=INTERVALS, of="trajectory")
+    """``covariance``: standard errors; ``profile``: 95 % intervals by profile likelihood too (takes much longer)."""
+    comparison: bool | None = option(None, of="trajectory")
+    """Leave each term out in turn, to say which the data ask for (trajectory only; the programs do it if not told)."""
+    prediction: bool | None = option(None)
+    """Predict each recording from the others, or the last part of a single one from the rest (the latter trajectory
+    only). The programs do it if not told, where it can be."""
+    start_s: float | None = option(None)
+    """Start of the free decay, s; found if not given."""
+    stop_s: float | None = option(None)
+    """End of the free decay, s; found if not given."""
+
+    def __post_init__(self) -> None:
+        for name in ("laws", "free"):
+            object.__setattr__(self, name, _with_commas(getattr(self, name)))
+        if isinstance(self.ratios, bool):
+            object.__setattr__(self, "ratios", RATIOS[0 if self.ratios else 1])
+        for field in fields(FitOptions):
+            value, known = getattr(self, field.name), choices_of(field)
+            if known and value is not None and value not in known:
+                raise FitOptionError(one_of(field.name, value, known))
+        names = coefficients(self.laws)
+        for name in self.freed:
+            if name not in FREE:
+                raise FitOptionError(one_of("free", name, FREE))
+        check_once("free", self.freed)
+        for field in fields(FitOptions):
+            if method_of(field) and getattr(self, field.name) not in ASK_FOR_NOTHING:
+                self._check_method(field.name, method_of(field))
+        if self.ten_coefficients and names != PAPER:
             raise FitOptionError(
                 fault(
-                    Setting(option),
-                    f"is an option of the {owner} fit, and the method is {method}",
-                    "Leave it out, or give " + _add(option, owner),
+                    Setting("ten_coefficients"),
+                    "the paper's ten are of its six laws",
+                    "Give " + Setting("laws", "paper"),
                 )
             )
-    if options.get("ten_coefficients") and names != PAPER:
-        raise FitOptionError(
-            fault(
-                Setting("ten_coefficients"),
-                "the paper's ten are of its six laws",
-                "Give " + Setting("laws", "paper"),
-            )
+        self._check_span()
+        if self.pinned:
+            self.coefficients(single=True)
+
+    @classmethod
+    def of(cls, options: FitOptions | None, **keywords: Any) -> FitOptions:
+        """The options with the keywords that are not None in place of theirs."""
+        for old, new in OLD_NAMES.items():
+            if old in keywords:
+                raise FitOptionError(fault(old, f"the option is called {new} now", "Rename it"))
+        given = {name: value for name, value in keywords.items() if value is not None}
+        return FitOptions(**given) if options is None else replace(options.fit, **given)
+
+    @property
+    def fit(self) -> FitOptions:
+        """These options alone, of a class that has more."""
+        return FitOptions(**{field.name: getattr(self, field.name) for field in fields(FitOptions)})
+
+    @property
+    def is_trajectory(self) -> bool:
+        """Whether the equations of motion are fitted."""
+        return self.method == METHODS[0]
+
+    @property
+    def frees_ratios(self) -> bool:
+        """Whether the inertial ratios are fitted too."""
+        return self.is_trajectory and self.ratios != RATIOS[1]
+
+    @property
+    def freed(self) -> tuple[str, ...]:
+        """The further parameters to fit."""
+        return tuple(name.strip() for name in _with_commas(self.free).split(",") if name.strip())
+
+    def coefficients(self, *, single: bool) -> tuple[str, ...]:
+        """The coefficients to fit; those of the upper joint where the recordings are of a ``single`` pendulum.
+
+        Raises FitOptionError for what was named and a single pendulum has not.
+        """
+        names = coefficients(self.laws)
+        return self._of_one_link(names) if single else names
+
+    def bare(self) -> Self:
+        """The same fit without what is found beside its coefficients: intervals, comparison, prediction, the ten."""
+        return replace(
+            self, intervals=INTERVALS[0], comparison=False, prediction=False, ten_coefficients=False
         )
-    _check_span(options.get("start_s"), options.get("stop_s"))
-    return _of_one_link(names, laws, options) if single else names
 
-
-def _add(option: str, owner: str) -> Message:
-    method = Message.of(Setting("method", owner))
-    return method + " and " + Setting("laws", "paper") if option == "ten_coefficients" else method
-
-
-def free_names(free: object) -> list[str]:
-    """``free`` as names: a sequence, or words with commas."""
-    if isinstance(free, str):
-        return [name.strip() for name in free.split(",") if name.strip()]
-    return list(free) if isinstance(free, Iterable) else []
-
-
-def _check_span(start_s: object, stop_s: object) -> None:
-    for name, value in (("start_s", start_s), ("stop_s", stop_s)):
-        if isinstance(value, (int, float)) and not math.isfinite(value):
-            raise FitOptionError(fault(Setting(name), f"{value} is not a time", "Give a number of seconds"))
-    if isinstance(start_s, (int, float)) and isinstance(stop_s, (int, float)) and not start_s < stop_s:
-        problem: Text = f"{start_s:g} s is not before " + Setting("stop_s") + f", {stop_s:g} s"
-        raise FitOptionError(fault(Setting("start_s"), problem, "Give the start of the decay, then its end"))
-
-
-def _of_one_link(
-    names: tuple[str, ...], laws: str | Sequence[str], options: Mapping[str, object]
-) -> tuple[str, ...]:
-    """The coefficients that a single pendulum has. What was named and it has not is refused."""
-    upper = tuple(name for name in names if JOINT_OF[name] == "upper")
-    known = [name for name in FULL if JOINT_OF[name] == "upper"]
-    if laws not in ("full", "paper") and len(upper) < len(names):
-        lower = next(name for name in names if name not in upper)
-        raise FitOptionError(
-            fault(
-                Setting("laws"),
-                f"{lower} is of the elbow or the lower link, and a single pendulum has neither",
-                f"Give paper, full or some of {', '.join(known)}",
-            )
+    def as_programs_do(self) -> Self:
+        """With the comparison and the prediction that nobody spoke of, where the method has them."""
+        return replace(
+            self,
+            comparison=self.is_trajectory if self.comparison is None else self.comparison,
+            prediction=self.is_trajectory if self.prediction is None else self.prediction,
         )
-    if options.get("angle_maps"):
-        raise FitOptionError(
-            fault(
-                Setting("angle_maps"),
-                "maps are of two links, and this is a single pendulum",
-                "Leave it out",
-            )
-        )
-    for name in free_names(options.get("free")):
-        if name not in UPPER:
+
+    def key(self) -> dict[str, Any]:
+        """All that the result of a fit depends on besides its recordings and its model."""
+        return asdict(self.fit)
+
+    def check_own_prediction(self) -> None:
+        """Raises FitOptionError where a part of the recordings that are fitted cannot be predicted from the rest."""
+        if self.prediction:
+            self._check_method("prediction", METHODS[0])
+
+    def _check_method(self, name: str, owner: str) -> None:
+        if owner == self.method:
+            return
+        method = Message.of(Setting("method", owner))
+        needed = method + " and " + Setting("laws", "paper") if name == "ten_coefficients" else method
+        problem = f"is an option of the {owner} fit, and the method is {self.method}"
+        raise FitOptionError(fault(Setting(name), problem, "Leave it out, or give " + needed))
+
+    def _check_span(self) -> None:
+        for name in ("start_s", "stop_s"):
+            value = getattr(self, name)
+            if value is not None and not math.isfinite(value):
+                raise FitOptionError(
+                    fault(Setting(name), f"{value} is not a time", "Give a number of seconds")
+                )
+        if self.start_s is not None and self.stop_s is not None and not self.start_s < self.stop_s:
+            problem: Text = f"{self.start_s:g} s is not before " + Setting("stop_s") + f", {self.stop_s:g} s"
+            advice = "Give the start of the decay, then its end"
+            raise FitOptionError(fault(Setting("start_s"), problem, advice))
+
+    def _of_one_link(self, names: tuple[str, ...]) -> tuple[str, ...]:
+        upper = tuple(name for name in names if JOINT_OF[name] == "upper")
+        if self.laws not in ("full", "paper") and len(upper) < len(names):
+            lower = next(name for name in names if name not in upper)
+            known = ", ".join(name for name in FULL if JOINT_OF[name] == "upper")
             raise FitOptionError(
-                fault(
-                    Setting("free"),
-                    f"{name} is of the elbow or the lower link, and a single pendulum has neither",
-                    f"Give {listed(UPPER)}, or leave it out",
-                )
+                fault(Setting("laws"), _not_of_one_link(lower), f"Give paper, full or some of {known}")
             )
-    return upper
+        if self.angle_maps:
+            problem = "maps are of two links, and this is a single pendulum"
+            raise FitOptionError(fault(Setting("angle_maps"), problem, "Leave it out"))
+        for name in self.freed:
+            if name not in UPPER:
+                advice = f"Give {listed(UPPER)}, or leave it out"
+                raise FitOptionError(fault(Setting("free"), _not_of_one_link(name), advice))
+        return upper
+
+
+def _not_of_one_link(name: str) -> str:
+    return f"{name} is of the elbow or the lower link, and a single pendulum has neither"
+
+
+def _with_commas(names: str | Sequence[str]) -> str:
+    return names if isinstance(names, str) else ",".join(names)

@@ -3,7 +3,7 @@ Fig. 20)."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 from pydpend.angles import LinkAngles
 from pydpend.damping import DampingFit, fit_damping
 from pydpend.damping.result import clean
+from pydpend.damping.shooting import Progress
 from pydpend.errors import FitError, fault
+from pydpend.fit_options import FitOptions
 from pydpend.model import Model
 
 Floats = NDArray[np.float64]
@@ -94,16 +96,28 @@ def combine(values: Floats, sigmas: Floats, unit: str) -> Spread:
     )
 
 
-def fit_trials(recordings: Sequence[LinkAngles], model: Model, **options: Any) -> Trials:
-    """Fits each recording and all jointly (common damping and inertias); options as in `fit_damping`.
+def fit_trials(
+    recordings: Sequence[LinkAngles],
+    model: Model,
+    options: FitOptions | None = None,
+    *,
+    progress: Progress | None = None,
+    alone: Callable[[int], object] | None = None,
+) -> Trials:
+    """Fits all recordings jointly (common damping and inertias) and each alone.
 
-    Raises FitError for fewer than two recordings and as `fit_damping` does.
+    ``alone`` is called with each recording's place, from 0, before it is fitted alone. Raises FitError for fewer than
+    two recordings and as `fit_damping` does.
     """
     if len(recordings) < 2:
         raise FitError(fault("trials", "there is one recording", "Give at least two"))
-    joint = fit_damping(recordings, model, **options)
-    each_options = {k: v for k, v in options.items() if k not in ("predict", "compare", "progress")}
-    each = tuple(fit_damping(r, model, **each_options) for r in recordings)
+    chosen = FitOptions() if options is None else options
+    joint = fit_damping(recordings, model, options=chosen, progress=progress)
+    each = []
+    for k, recording in enumerate(recordings):
+        if alone is not None:
+            alone(k)
+        each.append(fit_damping(recording, model, options=chosen.bare()))
     return summary(each, joint)
 
 

@@ -2,32 +2,27 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import Field, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
 from pydpend.angles import parse_zero, roll_sigma
 from pydpend.documents import read_toml
 from pydpend.errors import OptionError, Setting, Step, fault, one_of
-from pydpend.fit_options import INTERVALS, METHODS, RATIOS, check_fit
+from pydpend.fit_options import FitOptions
 from pydpend.kinds import Kind, expect
 from pydpend.model import check_model_called
+from pydpend.option_fields import choices_of, kind_of_value, meanings, option
 
-CHOICES = {
-    "method": METHODS,
-    "ratios": RATIOS,
-    "intervals": INTERVALS,
-    "estimator": ("rigid", "linkage", "pairwise"),
-    "unit": ("v", "rad", "deg"),
-}
-"""Options that are one of a few words."""
+ESTIMATORS = ("rigid", "linkage", "pairwise")
+"""How angles come from nodes."""
 
 
-@dataclass(frozen=True)
-class Options:
-    """What to analyse and how. The defaults need no thought; every field is a flag of the same name."""
+@dataclass(frozen=True, kw_only=True)
+class Options(FitOptions):
+    """What to analyse and how. The defaults need no thought; every field, a fit's too, is a flag of the
+    same name."""
 
     inputs: tuple[str, ...] = ()
     """Films, node tables or angles tables; several are trials of one pendulum."""
@@ -45,38 +40,12 @@ class Options:
     """Column or channel of the encoder file that holds the time, where its name does not say."""
     rate_hz: float | None = None
     """Samples per second of the encoder file, where it has no time."""
-    unit: str | None = None
+    unit: str | None = option(None, choices=("v", "rad", "deg"))
     """Unit of the encoder's column, ``v``, ``rad`` or ``deg``, where its name does not say."""
     calibration: str | None = None
     """Folder of hold recordings, or an encoder.json made by ``pydpend calibrate``."""
     model: str = "derived"
     """``derived``, ``published`` or a pendulum.toml."""
-    method: str = "trajectory"
-    """``trajectory`` or ``energy``."""
-    laws: str = "full"
-    """``full``, ``paper`` or a list of coefficients with commas."""
-    ratios: str | None = None
-    """``free``: the inertial ratios are fitted too (trajectory only, and its default); ``fixed``: the model's are
-    believed."""
-    free: str = ""
-    """Further parameters to fit, with commas: added_inertia, tilt, offset1, offset2."""
-    pinned: bool = False
-    """The elbow is pinned: a single pendulum. A recording of one link needs a one-link model instead."""
-    ten_coefficients: bool = False
-    """Also the paper's ten, with a warning; needs the energy method and the paper's laws."""
-    intervals: str = "covariance"
-    """``covariance``: standard errors; ``profile``: 95 % intervals by profile likelihood too (takes much longer)."""
-    comparison: bool | None = None
-    """Leave each term out in turn, to say which the data ask for (trajectory only, and then done if not given)."""
-    prediction: bool | None = None
-    """Predict each recording from the others, or the last part of a single one from the rest (the latter trajectory
-    only). Done if not given, where it can be."""
-    start_s: float | None = None
-    """Start of the free decay; found if not given."""
-    stop_s: float | None = None
-    """End of the free decay; found if not given."""
-    angle_maps: bool = False
-    """Learn angle-dependent tracking bias with the fit."""
     zero: str = "rest"
     """Where the links hang: ``rest`` (found in the recording), ``vertical`` (the picture's, uncertain by the camera's
     roll: 1 deg, or ``vertical=0.5``), ``reference_frame``, degrees of each link in the rig's reference picture
@@ -87,7 +56,7 @@ class Options:
     """The film is mirror-inverted or taken from behind."""
     link_length_m: float | None = None
     """Pivot to elbow in m, for the scale."""
-    estimator: str = "rigid"
+    estimator: str = option("rigid", choices=ESTIMATORS)
     """How angles come from nodes: ``rigid``, ``linkage`` or ``pairwise``."""
     columns: str | None = None
     """Which columns of angles tables are which, e.g. ``time_s=t_s,phi1_rad=theta1_rad,phi2_rad=theta2_rad``."""
@@ -103,11 +72,11 @@ class Options:
     """Threads for tracking; all cores if not given. Changes no result."""
 
     def __post_init__(self) -> None:
-        for field, known in CHOICES.items():
-            value = getattr(self, field)
-            if value is not None and value not in known:
-                raise OptionError(one_of(field, value, known))
-        check_fit(self.method, self.laws, vars(self), single=self.pinned)
+        super().__post_init__()
+        for field in fields(self):
+            value, known = getattr(self, field.name), choices_of(field)
+            if known and value is not None and value not in known:
+                raise OptionError(one_of(field.name, value, known))
         if self.columns is not None and any(
             not (ours.strip() and theirs.strip())
             for ours, _, theirs in (word.partition("=") for word in self.columns.split(","))
@@ -125,15 +94,21 @@ class Options:
                 raise OptionError(fault(Setting(name), f"{value:g} is not above 0", "Give a number above 0"))
         if self.threads is not None and self.threads < 1:
             raise OptionError(fault(Setting("threads"), f"{self.threads} is below 1", "Give 1 or more"))
-        for option in ("calibration", "column", "time_column", "rate_hz", "unit"):
-            if getattr(self, option) is not None and self.encoder is None:
+        for name in ("calibration", "column", "time_column", "rate_hz", "unit"):
+            if getattr(self, name) is not None and self.encoder is None:
                 raise OptionError(
                     fault(
-                        Setting(option),
+                        Setting(name),
                         "is of the encoder's file",
                         "Name the file with " + Setting("encoder"),
                     )
                 )
+
+    def joint_fit(self, several: bool) -> FitOptions:
+        """The options of the fit to all recordings. Where there are ``several``, each is predicted from the others in a
+        stage of its own."""
+        chosen = self.fit.as_programs_do()
+        return replace(chosen, prediction=False) if several else chosen
 
 
 WANTED: Mapping[str, tuple[Kind, ...]] = {
@@ -171,11 +146,6 @@ def check_files(options: Options) -> None:
         roll_sigma(said)
 
 
-def flag_of(field: str) -> str:
-    """The flag of ``pydpend analyse`` for a field: ``start_s`` is ``--start``."""
-    return "--" + field.removesuffix("_s").removesuffix("_deg").replace("_", "-")
-
-
 WRITE_CONFIG = Step(
     "pydpend analyse --write-config", "pydpend.analyse.write_config(pydpend.analyse.Options())"
 )
@@ -192,32 +162,38 @@ def read_config(path: str | Path) -> Options:
     """Options from a TOML file as ``--write-config`` writes it. Unknown keys are errors."""
     expect(path, ("config",), OptionError)
     raw = read_toml(Path(path), OptionError, "Start from what " + WRITE_CONFIG + " prints")
-    known = {f.name: f for f in fields(Options)}
+    known = {f.name: f for f in all_options()}
     values: dict[str, Any] = {}
     for key in raw:
         if key in OLD_NAMES:
             raw.refuse(key, f"the option is called {OLD_NAMES[key]} now", "Rename the key")
         if key not in known:
             raw.refuse(key, f"{key} is not an option", f"Known are {', '.join(known)}")
-        wanted = str(known[key].type)
-        if key == "inputs":
-            values[key] = raw.texts(key)
-        elif wanted.startswith("bool"):
-            values[key] = raw.flag(key)
-        elif wanted.startswith("int"):
-            values[key] = raw.whole(key, -(2**31), 2**31 - 1)
-        elif wanted.startswith("float"):
-            values[key] = raw.number(key)
-        else:
-            values[key] = raw.text(key)
+        match kind_of_value(known[key]):
+            case "texts":
+                values[key] = raw.texts(key)
+            case "flag":
+                values[key] = raw.flag(key)
+            case "whole":
+                values[key] = raw.whole(key, -(2**31), 2**31 - 1)
+            case "number":
+                values[key] = raw.number(key)
+            case "text":
+                values[key] = raw.text(key)
     return Options(**values)
+
+
+def all_options() -> list[Field[Any]]:
+    """Every option: what is analysed and how films are read first, how the damping is fitted last."""
+    of_fit = {f.name for f in fields(FitOptions)}
+    return sorted(fields(Options), key=lambda f: f.name in of_fit)
 
 
 def write_config(options: Options) -> str:
     """The options as TOML, each with what it means; what is not set is commented out."""
-    docs = _field_docs()
+    docs = meanings(Options)
     lines = [f"# {READ_CONFIG}", ""]
-    for f in fields(Options):
+    for f in all_options():
         value = getattr(options, f.name)
         lines += [f"# {line}" for line in docs[f.name].splitlines()]
         if value is None:
@@ -238,25 +214,3 @@ def _quoted(text: str) -> str:
     """A TOML basic string."""
     escaped = text.replace("\\", "\\\\").replace('"', '\\"')
     return '"' + "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in escaped) + '"'
-
-
-def _field_docs() -> dict[str, str]:
-    """What the string under each field of `Options` says; the one place where options are explained."""
-    import ast
-    import inspect
-
-    body = ast.parse(inspect.getsource(Options)).body[0]
-    assert isinstance(body, ast.ClassDef)
-    docs = {f.name: "" for f in dataclasses.fields(Options)}
-    for this, following in zip(body.body, body.body[1:], strict=False):
-        if (
-            isinstance(this, ast.AnnAssign)
-            and isinstance(this.target, ast.Name)
-            and isinstance(following, ast.Expr)
-            and isinstance(following.value, ast.Constant)
-        ):
-            docs[this.target.id] = str(following.value.value)
-    return docs
-
-
-option_docs = _field_docs

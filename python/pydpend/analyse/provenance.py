@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import platform
 import shlex
-from dataclasses import fields
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 from pydpend.analyse.contents import about
 from pydpend.analyse.folder import Digests, RunFolder
-from pydpend.analyse.options import Options, flag_of
+from pydpend.analyse.options import Options, all_options
+from pydpend.option_fields import flag_of
 
 FILES = ("rig", "encoder", "calibration", "model", "zero")
 """Options that may name a file or a folder."""
@@ -45,7 +45,7 @@ def command(options: Options, folder: Path) -> str:
     """The command line that does this run again."""
     words = ["pydpend", "analyse", *options.inputs, "-o", str(folder)]
     default = Options()
-    for f in fields(Options):
+    for f in all_options():
         value = getattr(options, f.name)
         if f.name == "inputs" or value == getattr(default, f.name):
             continue

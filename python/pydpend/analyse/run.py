@@ -97,10 +97,6 @@ def plan(options: Options, folder: Path, digests: Digests | None = None) -> list
     for r in found:
         _plan_recording(r, options, folder / r.name, known, add)
     ready = tuple(f"{r.name}/angles" for r in found)
-    fits = [
-        known.option(options.model) if f == "model" else getattr(options, f)
-        for f in ("model", "method", "laws", "ratios", "free", "pinned", "angle_maps", "start_s", "stop_s")
-    ]
     several = len(found) > 1
     if options.prediction and not several and options.method == "energy":
         raise OptionError(
@@ -110,18 +106,13 @@ def plan(options: Options, folder: Path, digests: Digests | None = None) -> list
                 "Leave it out, or give " + Setting("method", "trajectory") + " or another recording",
             )
         )
-    more = [
-        options.ten_coefficients,
-        options.intervals,
-        options.comparison is not False,
-        options.prediction is not False and not several,
-    ]
+    model = known.option(options.model)
     add(
         "fit",
         "Damping fit",
         ready,
         "fit",
-        [*fits, *more],
+        [model, options.joint_fit(several).key()],
         lambda into, tell, resume: stages.fit(found, options, folder, into, tell),
     )
     if several and options.prediction is not False:
@@ -130,7 +121,7 @@ def plan(options: Options, folder: Path, digests: Digests | None = None) -> list
             "Prediction of each recording from the others",
             ready,
             "",
-            fits,
+            [model, options.bare().key()],
             lambda into, tell, resume: stages.prediction(found, options, folder, into, tell),
         )
     for r in found:

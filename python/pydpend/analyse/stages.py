@@ -249,30 +249,23 @@ def fit(found: tuple[Recording, ...], options: Options, folder: Path, into: Path
     from pydpend.damping.stored import write_fit
     from pydpend.model import CONSTANTS, model_called
     from pydpend.plots.damping import save_figures
-    from pydpend.trials import summary
+    from pydpend.trials import fit_trials
 
-    recordings, model, settings = _angles(folder, found), model_called(options.model), _settings(options)
-    trajectory = options.method == "trajectory"
-    fitted = fit_damping(
-        recordings,
-        model,
-        progress=_steps(tell),
-        compare=trajectory and options.comparison is not False,
-        # Several recordings are predicted in a stage of their own.
-        predict=trajectory and options.prediction is not False and len(recordings) == 1,
-        intervals=options.intervals,
-        pinned=options.pinned,
-        ten_coefficients=options.ten_coefficients,
-        **settings,
-    )
+    recordings, model = _angles(folder, found), model_called(options.model)
+    chosen = options.joint_fit(len(found) > 1)
     trials = None
     if len(recordings) > 1:
-        each = []
-        for k, one in enumerate(recordings):
-            tell(f"recording {k + 1} alone")
-            each.append(fit_damping(one, model, pinned=options.pinned, **settings))
-        trials = summary(each, fitted)
+        trials = fit_trials(
+            recordings,
+            model,
+            chosen,
+            progress=_steps(tell),
+            alone=lambda k: tell(f"recording {k + 1} alone"),
+        )
+        fitted = trials.joint
         _write_json(into / "trials.json", trials.to_json())
+    else:
+        fitted = fit_damping(recordings, model, options=chosen, progress=_steps(tell))
     write_fit(fitted, into)
     if not options.pinned:
         sigmas = model.sigmas()
@@ -283,19 +276,6 @@ def fit(found: tuple[Recording, ...], options: Options, folder: Path, into: Path
         _write_json(into / "model.json", {"name": model.name, "constants": constants})
     save_figures(fitted, trials, into)
     return fitted.message
-
-
-def _settings(options: Options) -> dict[str, Any]:
-    """What every fit of a run has in common."""
-    return {
-        "method": options.method,
-        "laws": options.laws,
-        "start_s": options.start_s,
-        "stop_s": options.stop_s,
-        "ratios": None if options.ratios is None else options.ratios == "free",
-        "free": [name for name in options.free.split(",") if name],
-        "angle_maps": options.angle_maps,
-    }
 
 
 def converged(folder: Path) -> bool:
@@ -324,7 +304,7 @@ def prediction(found: tuple[Recording, ...], options: Options, folder: Path, int
     for i, one in enumerate(recordings):
         tell(f"{i + 1} of {len(recordings)}")
         others = recordings[:i] + recordings[i + 1 :]
-        fitted = fit_damping(others, model, **_settings(options))
+        fitted = fit_damping(others, model, options=options.fit.bare())
         stored = StoredFit.of(fitted)
         predicted = stored.predict(one, start_s=options.start_s, stop_s=options.stop_s)
         out[one.name] = predicted.to_json()

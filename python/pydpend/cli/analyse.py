@@ -14,9 +14,12 @@ import json
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import fields, replace
+from dataclasses import Field, replace
 from pathlib import Path
+from typing import Any
 
+from pydpend.cli.flags import add_fields, given
+from pydpend.option_fields import meanings
 from pydpend.terminal import below, shown
 
 HELP = "film, nodes or angles in, a run folder with a report out"
@@ -24,9 +27,9 @@ HELP = "film, nodes or angles in, a run folder with a report out"
 
 def add_arguments(p: argparse.ArgumentParser) -> None:
     """One flag for each field of `Options`, and how to run."""
-    from pydpend.analyse.options import CHOICES, Options, flag_of, option_docs
+    from pydpend.analyse.options import Options
 
-    docs = option_docs()
+    docs = meanings(Options)
     p.add_argument("inputs", nargs="*", metavar="RECORDING|NODES|ANGLES", help=docs["inputs"])
     p.add_argument("-o", "--output", metavar="DIR", help="run folder, made or gone on with")
     p.add_argument("--config", metavar="TOML", help="options from a file; flags given besides replace them")
@@ -34,18 +37,13 @@ def add_arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument("--dry-run", action="store_true", help="say what would be done and stop")
     p.add_argument("--json", action="store_true", help="print what was done as JSON")
     p.add_argument("--quiet", action="store_true", help="no progress")
-    for f in fields(Options):
-        if f.name == "inputs":
-            continue
-        flag = flag_of(f.name)
-        text = docs[f.name].replace("``", "").replace("%", "%%")
-        kind = str(f.type)
-        if kind.startswith("bool"):
-            p.add_argument(flag, dest=f.name, action=argparse.BooleanOptionalAction, default=None, help=text)
-        else:
-            number = float if kind.startswith("float") else int if kind.startswith("int") else str
-            choices = CHOICES.get(f.name)
-            p.add_argument(flag, dest=f.name, type=number, choices=choices, default=None, help=text)
+    add_fields(p, Options, _flagged())
+
+
+def _flagged() -> list[Field[Any]]:
+    from pydpend.analyse.options import all_options
+
+    return [f for f in all_options() if f.name != "inputs"]
 
 
 def run(args: argparse.Namespace) -> int:
@@ -55,11 +53,10 @@ def run(args: argparse.Namespace) -> int:
     from pydpend.errors import PydpendError, fault
 
     options = read_config(args.config) if args.config else Options()
-    given = {f.name: getattr(args, f.name) for f in fields(Options) if f.name != "inputs"}
-    given = {k: v for k, v in given.items() if v is not None}
+    told = given(args, _flagged())
     if args.inputs:
-        given["inputs"] = tuple(args.inputs)
-    options = replace(options, **given)
+        told["inputs"] = tuple(args.inputs)
+    options = replace(options, **told)
     if args.write_config:
         print(write_config(options))
         return 0

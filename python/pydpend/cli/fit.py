@@ -16,11 +16,13 @@ import math
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from pydpend.cli.flags import add_fields, given
 from pydpend.cli.writes import add_force, check_files
-from pydpend.fit_options import FREE, INTERVALS, METHODS, RATIOS, check_fit, free_names
+from pydpend.fit_options import FitOptions
 from pydpend.terminal import below
 
 if TYPE_CHECKING:
@@ -36,70 +38,19 @@ def add_arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument(
         "--model", default="derived", help="derived (default), published, or a pendulum's TOML file"
     )
-    p.add_argument(
-        "--method",
-        choices=METHODS,
-        default="trajectory",
-        help="trajectory: fit the equations of motion (default); energy: the paper's energy profile",
-    )
-    p.add_argument(
-        "--laws",
-        default="full",
-        help="full (default), paper, or coefficients separated by commas (mu_v1,tau_c1)",
-    )
-    p.add_argument(
-        "--ratios",
-        choices=RATIOS,
-        help="whether the inertial ratios are fitted too (trajectory only, and its default) or the model's believed",
-    )
-    p.add_argument(
-        "--free",
-        default="",
-        metavar="NAMES",
-        help=f"further parameters to fit, with commas: {', '.join(FREE)}",
-    )
-    p.add_argument(
-        "--angle-maps", action="store_true", help="learn repeatable angle-dependent bias of the tracking"
-    )
-    p.add_argument(
-        "--ten-coefficients",
-        action="store_true",
-        help="also the paper's ten (Table 6), with a warning; needs --method energy --laws paper",
-    )
-    p.add_argument("--pinned", action="store_true", help="the elbow is pinned: a single pendulum")
-    p.add_argument(
-        "--intervals",
-        choices=INTERVALS,
-        default="covariance",
-        help="standard errors (default), or 95 %% intervals by profile likelihood too: everything else fitted "
-        "again at a few values of each coefficient",
-    )
-    p.add_argument(
-        "--prediction",
-        action=argparse.BooleanOptionalAction,
-        help="fit again without each part to predict it (trajectory only, and then done if not given)",
-    )
-    p.add_argument(
-        "--comparison",
-        action=argparse.BooleanOptionalAction,
-        help="leave each term out in turn to see if the data ask for it (trajectory only, and then done if not given)",
-    )
+    add_fields(p, FitOptions, fields(FitOptions))
     p.add_argument("--no-figures", action="store_true", help="write no figures")
     add_output_arguments(p)
 
 
 def add_angles_arguments(p: argparse.ArgumentParser, *, many: bool) -> None:
-    """Arguments that say which angles, and which part of them."""
+    """Arguments that say which angles, and how they are to be understood."""
     p.add_argument(
         "angles",
         metavar="ANGLES",
         nargs="+" if many else None,
         help="angles table (Parquet, CSV) or a folder of the paper's authors' form (DPmean_data_RB0.npy ...)",
     )
-    p.add_argument(
-        "--start", dest="start_s", type=float, metavar="S", help="start of the free decay, s (default: found)"
-    )
-    p.add_argument("--stop", dest="stop_s", type=float, metavar="S", help="its end, s (default: found)")
     add_table_arguments(p)
 
 
@@ -177,42 +128,25 @@ def run(args: argparse.Namespace) -> int:
     from pydpend.damping.stored import files_of_fit, write_fit, write_json
     from pydpend.model import model_called
     from pydpend.output import check_folder, results_folder
+    from pydpend.trials import fit_trials
 
-    check_fit(args.method, args.laws, vars(args), single=args.pinned)
+    options = FitOptions(**given(args, fields(FitOptions)))
+    options.check_own_prediction()
     check_folder(args.output)
-    names = files_of_fit(len(args.angles), figures=not args.no_figures, maps=args.angle_maps)
+    names = files_of_fit(len(args.angles), figures=not args.no_figures, maps=options.angle_maps)
     check_files(args, *(args.output / name for name in names))
     recordings = [read(path, args) for path in args.angles]
     model = model_called(args.model)
-    options = {
-        "method": args.method,
-        "laws": args.laws,
-        "start_s": args.start_s,
-        "stop_s": args.stop_s,
-        "ratios": None if args.ratios is None else args.ratios == "free",
-        "free": free_names(args.free),
-        "angle_maps": args.angle_maps,
-        "pinned": args.pinned,
-        "ten_coefficients": args.ten_coefficients,
-    }
-    trajectory = args.method == "trajectory"
+    chosen = options.as_programs_do()
     report = progress("fit", args.quiet)
-    fit = fit_damping(
-        recordings,
-        model,
-        predict=trajectory if args.prediction is None else args.prediction,
-        compare=trajectory if args.comparison is None else args.comparison,
-        intervals=args.intervals,
-        progress=report,
-        **options,
-    )
-    if report is not None:
-        print(file=sys.stderr)
     trials = None
     if len(recordings) > 1:
-        from pydpend.trials import summary
-
-        trials = summary([fit_damping(r, model, **options) for r in recordings], fit)
+        trials = fit_trials(recordings, model, chosen, progress=report)
+        fit = trials.joint
+    else:
+        fit = fit_damping(recordings, model, options=chosen, progress=report)
+    if report is not None:
+        print(file=sys.stderr)
     results_folder(args.output)
     write_fit(fit, args.output)
     if trials is not None:
@@ -243,10 +177,10 @@ def describe(fit: DampingFit) -> list[str]:
     lines += [interval.sentence(name) for name, interval in fit.intervals.items()]
     swings = ", ".join(f"{f:.4f}" for f in fit.modes_hz)
     lines.append(f"small oscillations of the fitted pendulum: {swings} Hz")
-    for given in fit.inputs:
-        if given.get("tail_modes_hz"):
-            seen = ", ".join(f"{f:.4f}" for f in given["tail_modes_hz"])
-            lines.append(f"measured in the last seconds of {given['name']}: {seen} Hz")
+    for recording in fit.inputs:
+        if recording.get("tail_modes_hz"):
+            seen = ", ".join(f"{f:.4f}" for f in recording["tail_modes_hz"])
+            lines.append(f"measured in the last seconds of {recording['name']}: {seen} Hz")
     for group in ("law", "joint"):
         parts = ", ".join(
             f"{k} {100 * e.value:.1f} +- {100 * e.sigma:.1f} %" for k, e in fit.shares[group].items()

@@ -10,10 +10,13 @@ from __future__ import annotations
 
 import argparse
 import json
+from dataclasses import fields
 from pathlib import Path
 
 from pydpend.cli.fit import add_angles_arguments, add_output_arguments, read
+from pydpend.cli.flags import add_fields
 from pydpend.cli.writes import check_files
+from pydpend.fit_options import FitOptions
 from pydpend.output import check_folder, results_folder, write_text
 
 HELP = "predict a recording from a fit to others"
@@ -22,6 +25,7 @@ HELP = "predict a recording from a fit to others"
 def add_arguments(p: argparse.ArgumentParser) -> None:
     """The command's arguments."""
     add_angles_arguments(p, many=False)
+    add_fields(p, FitOptions, [f for f in fields(FitOptions) if f.name in ("start_s", "stop_s")])
     p.add_argument(
         "--fit", required=True, type=Path, metavar="DIR", help="folder (or fit.json) of pydpend fit"
     )

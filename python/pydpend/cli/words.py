@@ -12,9 +12,6 @@ from dataclasses import dataclass
 
 from pydpend.errors import Setting, Step, listed
 
-FLAGS = {"predict": "prediction", "compare": "comparison"}
-"""Keywords of Python whose flag has another name."""
-
 VALUES: Mapping[tuple[str, object], str] = {("ratios", True): "free", ("ratios", False): "fixed"}
 """Values that are words on the command line and truth values in Python."""
 
@@ -24,9 +21,8 @@ UNITS = ("_s", "_deg", "_rad")
 
 def flags_of(keyword: str) -> tuple[str, ...]:
     """The flags that a keyword may have: ``start_s`` has ``--start-s`` or ``--start``."""
-    name = FLAGS.get(keyword, keyword)
-    bare = next((name.removesuffix(unit) for unit in UNITS if name.endswith(unit)), name)
-    return tuple(dict.fromkeys(f"--{n.replace('_', '-')}" for n in (name, bare)))
+    bare = next((keyword.removesuffix(unit) for unit in UNITS if keyword.endswith(unit)), keyword)
+    return tuple(dict.fromkeys(f"--{n.replace('_', '-')}" for n in (keyword, bare)))
 
 
 class CommandLine:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +25,8 @@ from pydpend.damping.ten import fit_ten
 from pydpend.damping.trajectory import fit_trajectory, plausible_or_raise
 from pydpend.damping.uncertainty import identifiability
 from pydpend.errors import FitError, fault
-from pydpend.fit_options import check_fit, free_names
+from pydpend.fit_options import FitKeywords, FitOptions
+from pydpend.information import undetermined
 from pydpend.model import Model
 
 Floats = NDArray[np.float64]
@@ -33,61 +35,43 @@ Floats = NDArray[np.float64]
 def fit_damping(
     angles: LinkAngles | Sequence[LinkAngles],
     model: Model,
-    method: str = "trajectory",
-    laws: str | Sequence[str] = "full",
+    method: str | None = None,
+    laws: str | Sequence[str] | None = None,
     *,
-    start_s: float | None = None,
-    stop_s: float | None = None,
-    ratios: bool | None = None,
-    free: Sequence[str] = (),
-    clock: bool = False,
-    angle_maps: bool = False,
-    pinned: bool = False,
-    ten_coefficients: bool = False,
-    predict: bool = False,
-    compare: bool = False,
-    intervals: str = "covariance",
+    options: FitOptions | None = None,
     progress: Progress | None = None,
+    **keywords: Unpack[FitKeywords],
 ) -> DampingFit:
     """Damping coefficients of a double pendulum from its free motion.
 
-    ``angles``: one recording or several (fitted jointly). ``method``: ``"trajectory"`` fits the equations
+    ``angles``: one recording or several (fitted jointly). ``method``: ``"trajectory"`` (default) fits the equations
     of motion to the angles (docs/damping.md); ``"energy"`` is the paper's energy profile. ``laws``:
-    ``"full"``, ``"paper"`` or names of coefficients. ``ratios``: whether lambda, sigma, kappa and a3 over
-    psi are free too, as they are by default (trajectory only; the energy method uses the model's). ``free``: further
-    parameters (``added_inertia``, ``tilt``, ``offset1``, ``offset2``); ``clock``: the camera clock's scale.
-    ``pinned``: the elbow is pinned, and the pendulum a single one; angles of one link are a single pendulum's too,
-    and need a one-link ``model``.
-    ``ten_coefficients``: also the paper's ten, which the data do not determine (energy with the paper's laws only).
-    ``angle_maps``: learn repeatable angle bias. ``predict``: also
-    fit without each part in turn and predict it. ``compare``: also leave each term out in turn, and say which the data
-    ask for (`compare_terms`; trajectory only). ``intervals``: ``"profile"`` gives each coefficient's 95 % interval by
-    profile likelihood too (`DampingFit.intervals`; trajectory only), beside the covariance's standard errors. The
-    free decay is found unless ``start_s`` and ``stop_s`` state it.
+    ``"full"`` (default), ``"paper"`` or names of coefficients. Angles of one link are a single pendulum's, and need a
+    one-link ``model``.
+
+    All else is a field of `FitOptions`, given in ``options`` or as a keyword, which goes before: ``ratios``: whether
+    lambda, sigma, kappa and a3 over psi are free too, as they are by default (trajectory only; the energy method uses
+    the model's). ``free``: further parameters (``added_inertia``, ``tilt``, ``offset1``, ``offset2``); ``clock``: the
+    camera clock's scale. ``pinned``: the elbow is pinned, and the pendulum a single one. ``ten_coefficients``: also the
+    paper's ten, which the data do not determine (energy with the paper's laws only). ``angle_maps``: learn repeatable
+    angle bias. ``prediction``: also fit without each part in turn and predict it. ``comparison``: also leave each term
+    out in turn, and say which the data ask for (`compare_terms`; trajectory only). ``intervals``: ``"profile"`` gives
+    each coefficient's 95 % interval by profile likelihood too (`DampingFit.intervals`; trajectory only), beside the
+    covariance's standard errors. The free decay is found unless ``start_s`` and ``stop_s`` state it.
 
     Raises FitOptionError for an option that is wrong or of the other method, FitError for recordings without a free
-    decay and models the recordings refute.
+    decay, models the recordings refute, and angles that do not determine the coefficients.
     """
+    chosen = FitOptions.of(options, method=method, laws=laws, **keywords)
+    chosen.check_own_prediction()
     given = [angles] if isinstance(angles, LinkAngles) else list(angles)
     if not given:
         raise FitError(fault("fit", "there is no recording", "Give at least one"))
-    single = pinned or model.links == 1 or any(a.links == 1 for a in given)
-    options = {
-        "ratios": ratios,
-        "free": free,
-        "clock": clock,
-        "angle_maps": angle_maps,
-        "intervals": intervals,
-        "predict": predict,
-        "compare": compare,
-        "ten_coefficients": ten_coefficients,
-        "start_s": start_s,
-        "stop_s": stop_s,
-    }
-    names = check_fit(method, laws, options, single=single)
+    single = chosen.pinned or model.links == 1 or any(a.links == 1 for a in given)
+    names = chosen.coefficients(single=single)
     check_distinct(given)
     if single:
-        given, model = reduced(given, model, pinned)
+        given, model = reduced(given, model, chosen.pinned)
         if not names:
             raise FitError(
                 fault(
@@ -96,30 +80,31 @@ def fit_damping(
                     "A single pendulum has mu_v1, mu_q1, rmu1 and tau_c1",
                 )
             )
-    recordings = [prepare(a, model, start_s, stop_s) for a in given]
-    if method == "energy":
-        return _energy(recordings, model, names, ten_coefficients, progress)
+    recordings = [prepare(a, model, chosen.start_s, chosen.stop_s) for a in given]
+    try:
+        if not chosen.is_trajectory:
+            return _energy(recordings, model, names, chosen.ten_coefficients, progress)
+        return _trajectory(recordings, model, names, chosen, progress)
+    except np.linalg.LinAlgError as problem:
+        raise FitError(undetermined(f"their equations have no solution ({problem})")) from problem
 
-    def run(some: Sequence[Recording], quiet: bool = False, profile: bool = False) -> DampingFit:
-        return fit_trajectory(
-            some,
-            model,
-            names,
-            ratios=ratios is not False,
-            free=free_names(free),
-            clock=clock,
-            angle_maps=angle_maps,
-            profile=profile,
-            progress=None if quiet else progress,
-        )
 
-    fit = run(recordings, profile=intervals == "profile")
-    if predict:
-        prediction, note = held_out(recordings, lambda some: run(some, quiet=True))
+def _trajectory(
+    recordings: Sequence[Recording],
+    model: Model,
+    names: Sequence[str],
+    options: FitOptions,
+    progress: Progress | None,
+) -> DampingFit:
+    """The trajectory fit, with the prediction and the comparison that are asked for."""
+    fit = fit_trajectory(recordings, model, names, options, progress=progress)
+    if options.prediction:
+        bare = options.bare()
+        prediction, note = held_out(recordings, lambda some: fit_trajectory(some, model, names, bare))
         fit = replace(fit, prediction=prediction, notes=(*fit.notes, note))
-    if compare:
+    if options.comparison:
         try:
-            terms = compare_terms(recordings, model, names, ratios=ratios is not False, progress=progress)
+            terms = compare_terms(recordings, model, names, ratios=options.frees_ratios, progress=progress)
         except FitError as problem:
             return replace(fit, notes=(*fit.notes, f"the terms were not compared: {problem}"))
         fit = replace(fit, terms=terms)

@@ -17,6 +17,7 @@ from pydpend.damping.shares import energy_curve, shares, unit_works
 from pydpend.damping.shooting import Progress, Solution, Track
 from pydpend.damping.uncertainty import covariance, identifiability
 from pydpend.errors import FitError, fault
+from pydpend.fit_options import FitOptions
 from pydpend.information import check_errors
 from pydpend.model import Model
 
@@ -35,31 +36,27 @@ def fit_trajectory(
     recordings: Sequence[Recording],
     model: Model,
     names: Sequence[str],
+    options: FitOptions,
     *,
-    ratios: bool = True,
-    free: Sequence[str] = (),
-    clock: bool = False,
-    angle_maps: bool = False,
-    profile: bool = False,
     segment_s: float = SEGMENT_S,
     max_iterations: int = 60,
     progress: Progress | None = None,
 ) -> DampingFit:
-    """Fits the coefficients ``names`` (and the inertial ratios) to one or several recordings with them in
+    """Fits the coefficients ``names``, and what ``options`` frees besides, to one or several recordings with them in
     common.
 
-    ``free``: further parameters (``added_inertia``, ``tilt``, ``offset1``, ``offset2``). Where segments of
-    ``segment_s`` do not converge, shorter ones are taken, down to `shooting.PIECE_S`. ``profile``: also intervals by
-    profile likelihood. Raises FitError for constants the recordings refute, and where nothing is determined.
+    Where segments of ``segment_s`` do not converge, shorter ones are taken, down to `shooting.PIECE_S`. Raises FitError
+    for constants the recordings refute, and where nothing is determined.
     """
     tracks = [r.track for r in recordings]
     length = length_of(recordings, segment_s)
+    ratios, angle_maps = options.frees_ratios, options.angle_maps
     if not ratios:
         _refuse(recordings, model, None)
     else:
         for r in recordings:
             plausible_or_raise(r, model)
-    wanted = [*(ratios_of(recordings[0].angles.links) if ratios else ()), *names, *free]
+    wanted = [*(ratios_of(recordings[0].angles.links) if ratios else ()), *names, *options.freed]
     bounded = [n for n in wanted if n in FULL]
     bias = None
     settled = shooting.settled(
@@ -93,7 +90,7 @@ def fit_trajectory(
             free=wanted,
             bounded=bounded,
             slack=FLOOR,
-            clock=clock,
+            clock=options.clock,
             huber=huber,
             max_iterations=max_iterations,
             progress=progress,
@@ -108,18 +105,14 @@ def fit_trajectory(
             recordings,
             model,
             names,
-            ratios=ratios,
-            free=free,
-            clock=clock,
-            angle_maps=angle_maps,
-            profile=profile,
+            options,
             segment_s=max(shooting.PIECE_S, length / 2),
             max_iterations=max_iterations,
             progress=progress,
         )
     used = tracks if bias is None else maps.corrected(tracks, bias)
     fit = _judge(recordings, used, model, names, wanted, solution, bias, progress)
-    if not profile:
+    if options.intervals != "profile":
         return fit
     if refused := refusal(solution):
         return replace(fit, notes=(*fit.notes, refused))

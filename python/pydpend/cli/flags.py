@@ -1,0 +1,33 @@
+"""Flags made from the fields of a class of options, and the options that they give."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterable
+from dataclasses import Field
+from typing import Any
+
+from pydpend.option_fields import choices_of, flag_of, kind_of_value, meanings
+
+
+def add_fields(p: argparse.ArgumentParser, options: type, fields: Iterable[Field[Any]]) -> None:
+    """A flag for each field of the class ``options``; one that is not given is None."""
+    docs = meanings(options)
+    for f in fields:
+        text = docs[f.name].replace("``", "").replace("%", "%%")
+        kind = kind_of_value(f)
+        if kind == "flag":
+            action = argparse.BooleanOptionalAction
+            p.add_argument(flag_of(f.name), dest=f.name, action=action, default=None, help=text)
+        else:
+            number = {"number": float, "whole": int}.get(kind, str)
+            choices = choices_of(f) or None
+            p.add_argument(
+                flag_of(f.name), dest=f.name, type=number, choices=choices, default=None, help=text
+            )
+
+
+def given(args: argparse.Namespace, fields: Iterable[Field[Any]]) -> dict[str, Any]:
+    """The options of these fields that the command line gives."""
+    values = {f.name: getattr(args, f.name) for f in fields}
+    return {name: value for name, value in values.items() if value is not None}

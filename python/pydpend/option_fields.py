@@ -1,0 +1,68 @@
+"""Options as fields of a frozen class: what each means, which words it may be, and the kind of its value.
+
+The command line makes its flags from these, the TOML form its keys. The string under a field is what it means.
+"""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+import inspect
+from dataclasses import Field
+from functools import cache
+from typing import Any, Literal
+
+Kind = Literal["flag", "whole", "number", "texts", "text"]
+
+
+def option(default: Any, *, choices: tuple[str, ...] = (), of: str = "") -> Any:
+    """A field with its default. ``choices``: the words that it may be; ``of``: the one method that has the option."""
+    return dataclasses.field(default=default, metadata={"choices": choices, "of": of})
+
+
+def choices_of(field: Field[Any]) -> tuple[str, ...]:
+    """The words that an option may be; empty where it is free."""
+    words: tuple[str, ...] = field.metadata.get("choices", ())
+    return words
+
+
+def method_of(field: Field[Any]) -> str:
+    """The one method that has the option, "" where all have it."""
+    return str(field.metadata.get("of", ""))
+
+
+def kind_of_value(field: Field[Any]) -> Kind:
+    """What a command line or a file gives for the option."""
+    declared = str(field.type)
+    kinds: tuple[tuple[str, Kind], ...] = (
+        ("tuple", "texts"),
+        ("bool", "flag"),
+        ("int", "whole"),
+        ("float", "number"),
+    )
+    return next((kind for start, kind in kinds if declared.startswith(start)), "text")
+
+
+def flag_of(name: str) -> str:
+    """The flag of an option: ``start_s`` is ``--start``."""
+    return "--" + name.removesuffix("_s").removesuffix("_deg").replace("_", "-")
+
+
+@cache
+def meanings(options: type) -> dict[str, str]:
+    """What the string under each field of a class says, those of the classes that it extends too."""
+    out: dict[str, str] = {}
+    for part in reversed(options.__mro__):
+        if not dataclasses.is_dataclass(part):
+            continue
+        body = ast.parse(inspect.cleandoc(inspect.getsource(part))).body[0]
+        assert isinstance(body, ast.ClassDef)
+        for this, following in zip(body.body, body.body[1:], strict=False):
+            if (
+                isinstance(this, ast.AnnAssign)
+                and isinstance(this.target, ast.Name)
+                and isinstance(following, ast.Expr)
+                and isinstance(following.value, ast.Constant)
+            ):
+                out[this.target.id] = str(following.value.value)
+    return out
