@@ -7,13 +7,16 @@ mod clock;
 mod decide;
 mod facts;
 mod grid;
+mod places;
 mod rational;
 mod steps;
+mod strip;
 mod words;
 
 pub use clock::Clock;
 pub use decide::decide;
 pub use facts::{Captured, Doubt, Timing, TimingKind};
+pub(crate) use grid::gaps as grid_gaps;
 pub use rational::rational;
 pub use steps::{Standstill, Steps};
 pub use words::{notes, rate_words, times_words};

@@ -61,7 +61,7 @@ impl Steps {
     }
 
     /// Steps in a row, each with how many times it comes.
-    pub(super) fn runs(&self) -> &[(i64, u64)] {
+    pub(crate) fn runs(&self) -> &[(i64, u64)] {
         &self.runs
     }
 
@@ -73,7 +73,7 @@ impl Steps {
     }
 
     /// The stamps.
-    pub(super) fn stamps(&self) -> impl Iterator<Item = i64> + '_ {
+    pub(crate) fn stamps(&self) -> impl Iterator<Item = i64> + '_ {
         let mut at = self.first;
         let steps = self.runs.iter().flat_map(|&(step, count)| std::iter::repeat_n(step, count as usize));
         let first = (self.len > 0).then_some(self.first);

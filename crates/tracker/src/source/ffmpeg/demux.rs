@@ -150,25 +150,30 @@ impl Demuxer {
 
     /// The rate that the container claims, frames per second.
     pub(super) fn rate(&self) -> Option<ffi::AVRational> {
-        let stream = self.stream();
-        [stream.avg_frame_rate, stream.r_frame_rate].into_iter().find(|r| is_rate(*r))
+        Some(self.stream().avg_frame_rate).filter(|r| is_rate(*r)).or_else(|| self.guessed())
     }
 
     /// Rates that the container gives, frames per second, the likeliest first. Of MP4 and QuickTime the average is none of
     /// them: it is the number of frames over the whole length, which a last frame that is shown longer falsifies.
     pub(super) fn rates(&self) -> impl Iterator<Item = ffi::AVRational> + use<> {
-        let stream = self.stream();
         let is_counted = self.container().contains("mp4");
-        let average = Some(stream.avg_frame_rate).filter(|_| !is_counted);
-        average.into_iter().chain([stream.r_frame_rate]).filter(|r| is_rate(*r))
+        let average = Some(self.stream().avg_frame_rate).filter(|r| !is_counted && is_rate(*r));
+        average.into_iter().chain(self.guessed())
     }
 
-    /// Whether neither the file nor the coded film says anything of time.
+    /// The lowest rate of which all time stamps are multiples, as libavformat guesses; where it knows no better it gives one
+    /// frame per tick, which says nothing.
+    fn guessed(&self) -> Option<ffi::AVRational> {
+        let (rate, base) = (self.stream().r_frame_rate, self.stream().time_base);
+        let is_tick = i64::from(rate.num) * i64::from(base.num) == i64::from(rate.den) * i64::from(base.den);
+        Some(rate).filter(|r| is_rate(*r) && !is_tick)
+    }
+
+    /// Whether neither the file nor the coded film says anything of time. Where a coded stream gives no rate, libavformat
+    /// may put a usual one in one of its two places; the other keeps what it was told.
     pub(super) fn is_untimed(&self) -> bool {
-        let stream = self.stream();
-        let rates = [stream.avg_frame_rate, stream.r_frame_rate];
-        let is_told = |r: &ffi::AVRational| (r.num, r.den) == (NOT_GIVEN.num, NOT_GIVEN.den);
-        rates.iter().any(is_told) && !rates.into_iter().any(is_rate)
+        let rates = [self.stream().avg_frame_rate, self.stream().r_frame_rate];
+        rates.iter().any(|r| (r.num, r.den) == (NOT_GIVEN.num, NOT_GIVEN.den))
     }
 
     /// What the file's boxes say, if it has such.

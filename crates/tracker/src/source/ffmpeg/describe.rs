@@ -32,7 +32,6 @@ pub(super) fn describe(
     let (pixel_aspect, pixel_aspect_origin) = options.aspect(aspect(demuxer, orientation, &mut warnings));
 
     let stream = demuxer.stream();
-    let stream_base = positive(stream.time_base).unwrap_or((1, 1_000_000));
     let rate = demuxer.rate();
     let stream_rate_hz = rate.map(|r| f64::from(r.num) / f64::from(r.den));
     let (time_base, rate_hz, rate_origin) = match options.fps {
@@ -41,11 +40,7 @@ pub(super) fn describe(
         None if demuxer.is_untimed() => {
             (TimeBase { numerator: 1, denominator: 1 }, None, RateOrigin::Unknown)
         }
-        None => (
-            TimeBase { numerator: stream_base.0, denominator: stream_base.1 },
-            stream_rate_hz,
-            if stream_rate_hz.is_some() { RateOrigin::Container } else { RateOrigin::Unknown },
-        ),
+        None => (stream_base(demuxer), stream_rate_hz, RateOrigin::Container),
     };
     if demuxer.boxes().edits_change_time {
         warnings.push(
@@ -85,6 +80,12 @@ pub(super) fn describe(
         warnings,
     };
     Ok((info, orientation))
+}
+
+/// The unit of the stream's time stamps.
+pub(super) fn stream_base(demuxer: &Demuxer) -> TimeBase {
+    let (numerator, denominator) = positive(demuxer.stream().time_base).unwrap_or((1, 1_000_000));
+    TimeBase { numerator, denominator }
 }
 
 /// Ticks from frame to frame by the rate that the container claims, at least 1.

@@ -3,42 +3,52 @@
 //! Owns: [`Lost`]. A gap is damage where the file is damaged beside it; else the recorder left frames out. A film of
 //! variable rate has gaps by nature: there nothing is concluded from them.
 
-use crate::gaps::{Cause, Gap, Gaps};
+use std::collections::BTreeMap;
 
-/// Different steps that are counted; more are a variable rate.
-const MOST_STEPS: usize = 64;
-/// Wide steps that are remembered; more are a variable rate.
-const MOST_WIDE: usize = 10_000;
+use crate::frame::TimeBase;
+use crate::gaps::{Cause, Gap, Gaps};
+use crate::timing::{Steps, grid_gaps};
+
+/// Places of damage that are remembered.
+const MOST_BREAKS: usize = 10_000;
+/// Stretches of equal steps that are remembered (16 MiB); more are a variable rate.
+const MOST_RUNS: usize = 1 << 20;
 /// Part of all steps that must be the usual one, give or take a tick, for a film to be called evenly spaced.
 const EVEN: f64 = 0.8;
+/// Usual steps, in ticks, from which a step shows by itself whether a frame lacks, though its ends are rounded.
+const CLEAR_STEP: i64 = 8;
 /// Frames by which display order and decoding order may differ (H.264's and HEVC's limit).
 const REORDER: i64 = 16;
 
-/// A step between two frames that is wider than most.
+/// Watches the times of frames as they are handed out.
+#[derive(Debug)]
+pub(super) struct Lost {
+    base: TimeBase,
+    /// Rates that the container gives.
+    claims: Vec<[u64; 2]>,
+    steps: Steps,
+    /// Times beside which the file is damaged, ticks, and how many frames came before, once that is known.
+    breaks: Vec<(i64, Option<u64>)>,
+}
+
+/// A step between two frames, ticks, and the frames that lack in it.
 #[derive(Debug, Clone, Copy)]
 struct Wide {
     after: u64,
     from: i64,
     to: i64,
-}
-
-/// Watches the times of frames as they are handed out.
-#[derive(Debug, Default)]
-pub(super) struct Lost {
-    last: Option<(u64, i64)>,
-    /// Each step seen, ticks, and how often.
-    steps: Vec<(i64, u64)>,
-    least: Option<i64>,
-    wide: Vec<Wide>,
-    variable: bool,
-    /// Times beside which the file is damaged, ticks, and how many frames came before, once that is known.
-    breaks: Vec<(i64, Option<u64>)>,
+    frames: u64,
 }
 
 impl Lost {
+    /// A film of this time base, whose container gives these rates.
+    pub(super) fn new(base: TimeBase, claims: &[[u64; 2]]) -> Self {
+        Self { base, claims: claims.to_vec(), steps: Steps::default(), breaks: Vec::new() }
+    }
+
     /// The file is damaged before the packet of this time.
     pub(super) fn broken(&mut self, ticks: i64) {
-        if self.breaks.len() < MOST_WIDE {
+        if self.breaks.len() < MOST_BREAKS {
             self.breaks.push((ticks, None));
         }
     }
@@ -48,74 +58,90 @@ impl Lost {
         for (_, frames) in self.breaks.iter_mut().filter(|(at, frames)| frames.is_none() && *at <= ticks) {
             *frames = Some(index);
         }
-        if let Some((after, from)) = self.last
-            && let Some(step) = ticks.checked_sub(from).filter(|s| *s > 0)
-        {
-            self.step(Wide { after, from, to: ticks }, step);
+        if self.steps.runs().len() < MOST_RUNS {
+            self.steps.push(ticks);
         }
-        self.last = Some((index, ticks));
-    }
-
-    fn step(&mut self, wide: Wide, step: i64) {
-        let least = *self.least.get_or_insert(step);
-        self.least = Some(least.min(step));
-        if let Some((_, count)) = self.steps.iter_mut().find(|(s, _)| *s == step) {
-            *count += 1;
-        } else if self.steps.len() < MOST_STEPS {
-            self.steps.push((step, 1));
-        } else {
-            self.variable = true;
-        }
-        if step > least.saturating_add(least / 4) {
-            if self.wide.len() < MOST_WIDE {
-                self.wide.push(wide);
-            } else {
-                self.variable = true;
-            }
-        }
-    }
-
-    /// The usual step and by how much steps differ from it through rounding, ticks; `None` for a variable rate.
-    fn usual(&self) -> Option<(f64, i64)> {
-        let all: u64 = self.steps.iter().map(|(_, n)| n).sum();
-        if self.variable {
-            return None;
-        }
-        [0, 1].into_iter().find_map(|rounding| {
-            let near = |s: i64| self.steps.iter().filter(move |(t, _)| t.abs_diff(s) <= rounding as u64);
-            let count = |s: i64| near(s).map(|(_, n)| *n).sum::<u64>();
-            let (mode, _) = self.steps.iter().max_by_key(|(s, n)| (count(*s), *n))?;
-            let sum: f64 = near(*mode).map(|(s, n)| *s as f64 * *n as f64).sum();
-            (count(*mode) as f64 >= EVEN * all as f64).then(|| (sum / count(*mode) as f64, rounding))
-        })
     }
 
     /// What is not there between the frames handed out so far.
     pub(super) fn gaps(&self) -> Gaps {
         let mut gaps = Gaps::default();
-        let Some((usual, rounding)) = self.usual() else {
+        let Some((usual, wide)) = self.on_grid().or_else(|| self.by_steps()) else {
             // Where frames come at any time, a break that frames follow is all that tells of a loss.
             for frames in self.breaks.iter().filter_map(|(_, f)| *f) {
                 gaps.push(Gap { after: frames.checked_sub(1), frames: None, cause: Cause::Damage });
             }
             return gaps;
         };
-        for wide in &self.wide {
-            let step = (wide.to - wide.from) as f64;
-            let frames = (step / usual).round() - 1.0;
-            // Where stamps are rounded, each is off by up to a tick.
-            let rounding = rounding as f64;
-            let off = (step - (frames + 1.0) * usual).abs();
-            if step < 1.5 * usual + rounding || off > (0.1 * usual).max(2.0 * rounding) {
-                continue;
-            }
-            let reach = (REORDER as f64 * usual) as i64;
+        let reach = (REORDER as f64 * usual) as i64;
+        for wide in wide {
             let near = wide.from.saturating_sub(reach)..=wide.to.saturating_add(reach);
             let damaged = self.breaks.iter().any(|(at, _)| near.contains(at));
             let cause = if damaged { Cause::Damage } else { Cause::Recorder };
-            gaps.push(Gap { after: Some(wide.after), frames: Some(frames as u64), cause });
+            gaps.push(Gap { after: Some(wide.after), frames: Some(wide.frames), cause });
         }
         gaps
+    }
+
+    /// Time from frame to frame, ticks, and the steps in which frames lack, where the stamps are those of an even rate
+    /// rounded to whole ticks.
+    fn on_grid(&self) -> Option<(f64, Vec<Wide>)> {
+        if self.steps.runs().len() == MOST_RUNS {
+            return None;
+        }
+        let gaps = grid_gaps(&self.steps, self.base, &self.claims)?;
+        let mut wide = Vec::with_capacity(gaps.len());
+        let mut lacking = 0;
+        let mut pairs = self.pairs();
+        let mut next = 1;
+        for (place, up_to) in gaps {
+            let (from, to) = pairs.nth((place - next) as usize)?;
+            wide.push(Wide { after: place - 1, from, to, frames: up_to - lacking });
+            (next, lacking) = (place + 1, up_to);
+        }
+        let steps = (self.steps.len() - 1 + lacking) as f64;
+        Some((self.steps.span() as f64 / steps, wide))
+    }
+
+    /// The same where single stamps are off the grid, by the step that most frames have.
+    fn by_steps(&self) -> Option<(f64, Vec<Wide>)> {
+        if self.steps.runs().len() == MOST_RUNS {
+            return None;
+        }
+        let (usual, rounding) = self.usual()?;
+        // Where stamps are rounded, each is off by up to a tick.
+        let rounding = rounding as f64;
+        let wide = self.pairs().zip(0..).filter_map(|((from, to), after)| {
+            let step = to.saturating_sub(from) as f64;
+            let frames = (step / usual).round() - 1.0;
+            let off = (step - (frames + 1.0) * usual).abs();
+            let is_wide = step >= 1.5 * usual + rounding && off <= (0.1 * usual).max(2.0 * rounding);
+            is_wide.then_some(Wide { after, from, to, frames: frames as u64 })
+        });
+        Some((usual, wide.collect()))
+    }
+
+    /// The usual step and by how much steps differ from it through rounding, ticks; `None` for a variable rate and for
+    /// one of few ticks, where rounding cannot be told from frames that lack.
+    fn usual(&self) -> Option<(f64, i64)> {
+        let mut steps: BTreeMap<i64, u64> = BTreeMap::new();
+        for &(step, count) in self.steps.runs().iter().filter(|(step, _)| *step > 0) {
+            *steps.entry(step).or_insert(0) += count;
+        }
+        let all: u64 = steps.values().sum();
+        [0, 1].into_iter().find_map(|rounding| {
+            let near = |s: i64| steps.range(s - rounding..=s.saturating_add(rounding));
+            let count = |s: i64| near(s).map(|(_, n)| *n).sum::<u64>();
+            let (mode, _) = steps.iter().max_by_key(|(s, n)| (count(**s), **n))?;
+            let sum: f64 = near(*mode).map(|(s, n)| *s as f64 * *n as f64).sum();
+            let is_even = *mode >= CLEAR_STEP && count(*mode) as f64 >= EVEN * all as f64;
+            is_even.then(|| (sum / count(*mode) as f64, rounding))
+        })
+    }
+
+    /// Times of each frame and the next, ticks.
+    fn pairs(&self) -> impl Iterator<Item = (i64, i64)> + '_ {
+        self.steps.stamps().zip(self.steps.stamps().skip(1))
     }
 }
 
@@ -124,7 +150,7 @@ mod tests {
     use super::*;
 
     fn watch(times: impl IntoIterator<Item = i64>, breaks: &[i64]) -> Gaps {
-        let mut lost = Lost::default();
+        let mut lost = Lost::new(TimeBase { numerator: 1, denominator: 1000 }, &[]);
         breaks.iter().for_each(|b| lost.broken(*b));
         times.into_iter().enumerate().for_each(|(i, t)| lost.frame(i as u64, t));
         lost.gaps()
@@ -154,9 +180,21 @@ mod tests {
     }
 
     #[test]
-    fn coarse_ticks_are_no_gaps() {
-        // 600 frames per second in milliseconds: steps of 1 and 2.
-        let gaps = watch((0..1000).map(|i| (i as f64 / 0.6).round() as i64), &[]);
-        assert!(gaps.places.is_empty(), "{gaps:?}");
+    fn stamps_that_are_now_and_then_a_tick_off_have_gaps_of_the_usual_step() {
+        let jitter = |i: i64| i64::from(i % 7 == 0) - i64::from(i % 11 == 0) * 2;
+        let times = (0..200).filter(|i| !(90..92).contains(i)).map(|i| 40 * i + jitter(i));
+        let gap = Gap { after: Some(89), frames: Some(2), cause: Cause::Recorder };
+        assert_eq!(watch(times, &[]).places, [gap]);
+        // Of steps of few ticks nothing is said.
+        let times = (0..200).map(|i| 2 * i + jitter(i).signum());
+        assert!(watch(times, &[]).places.is_empty());
+    }
+
+    #[test]
+    fn ticks_as_long_as_a_frame_are_no_gaps() {
+        for rate in [600.0, 834.0, 900.0, 960.0, 990.0] {
+            let gaps = watch((0..1000).map(|i| (f64::from(i) * 1000.0 / rate).round() as i64), &[]);
+            assert!(gaps.places.is_empty(), "{rate}: {gaps:?}");
+        }
     }
 }

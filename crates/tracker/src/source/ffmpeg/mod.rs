@@ -29,7 +29,7 @@ use ffmpeg_next::ffi;
 
 use decode::{Decoder, Picture, Received};
 use demux::{Demuxer, Packet};
-use describe::{describe, step};
+use describe::{describe, step, stream_base};
 use feed::Feed;
 use fields::FieldOrder;
 use layout::Layout;
@@ -135,6 +135,7 @@ impl FfmpegSource {
 
         let counts_frames = options.fps.is_some() || demuxer.is_untimed();
         let step = step(&demuxer);
+        let lost = Lost::new(stream_base(&demuxer), &info.claims.container);
         let feed = Feed::new(demuxer, name, can_reopen, if intra_only { 1 } else { 6 })?;
         if let Some(order) = feed.field_order(name)? {
             match options.interlaced {
@@ -175,7 +176,7 @@ impl FfmpegSource {
             packets: 0,
             last_byte: None,
             last_is_cut: false,
-            lost: Lost::default(),
+            lost,
             held: VecDeque::new(),
             ready: VecDeque::new(),
             replay: VecDeque::new(),
