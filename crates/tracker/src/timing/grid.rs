@@ -103,8 +103,13 @@ fn found(stamps: &Stamps<'_>, base: TimeBase, claims: &[[u64; 2]]) -> Option<Fit
 /// The grid of stamps, rounded to whole ticks, of which nothing but the stamps tells the rate.
 fn unclaimed(ticks: &[i64], even: &Strip, base: TimeBase) -> Option<Fit> {
     let whole = places::at_commonest(ticks).and_then(|p| placed(ticks, p, base, &[], ROUNDED));
+    // Every step that the stamps allow is near to the whole one.
     let is_near = |fit: &Fit| {
-        whole.as_ref().is_some_and(|w| (step_ticks(w, base) / step_ticks(fit, base) - 1.0).abs() < NEAR_RATE)
+        let farthest = match fit.period {
+            Period::Rate { .. } => step_ticks(fit, base),
+            Period::Ticks { step, sigma } => step + 3f64.sqrt() * sigma,
+        };
+        whole.as_ref().is_some_and(|w| (farthest / step_ticks(w, base) - 1.0).abs() < NEAR_RATE)
     };
     if let Some(fit) = chosen(even, base, &[], Gaps::new(), ROUNDED) {
         let is_chance = is_near(&fit) && whole.as_ref().is_some_and(|w| w.gaps.len() <= FEW_GAPS);

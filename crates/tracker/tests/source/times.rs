@@ -127,6 +127,8 @@ fn a_coded_stream_without_a_rate_has_none() {
         ("b.hevc", Some(25.0), &["-c:v", "libx265", "-x265-params", "log-level=none"]),
         ("d.mjpeg", None, &["-c:v", "mjpeg", "-pix_fmt", "yuvj420p"]),
         ("e.m2v", Some(25.0), &["-c:v", "mpeg2video"]),
+        ("f.hevc", None, &["-c:v", "libx265", "-x265-params", "log-level=none:vui-timing-info=0"]),
+        ("g.obu", None, &["-c:v", "libaom-av1", "-cpu-used", "8", "-f", "obu"]),
     ] {
         let path = made(folder.path(), name, "25", 20, more);
         let mut source = open(path.to_str().unwrap(), &OpenOptions::default()).unwrap();
@@ -138,6 +140,52 @@ fn a_coded_stream_without_a_rate_has_none() {
         if rate.is_none() {
             assert_eq!(ticks, (0..20).collect::<Vec<i64>>());
         }
+    }
+}
+
+#[test]
+fn a_frame_of_about_a_tick_is_no_gap_and_a_gap_is_one() {
+    if !have_ffmpeg() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let select = |left_out: &str| format!("select='not({left_out})'");
+    let (one, more) = ("eq(n,200)", "between(n,150,151)+eq(n,60)+between(n,300,306)");
+    let (jpeg, flash) = (["-c:v", "mjpeg", "-pix_fmt", "yuvj420p"], ["-c:v", "flashsv", "-pix_fmt", "bgr24"]);
+    let ms = ["-video_track_timescale", "1000"];
+    let (jpeg_ms, ffv1) = ([&jpeg[..], &ms].concat(), ["-c:v", "ffv1"]);
+    for (name, rate, left_out, dropped, codec) in [
+        ("a.mkv", "834", "0", 0, &ffv1[..]),
+        ("b.mkv", "990", "0", 0, &ffv1),
+        ("c.flv", "960", "0", 0, &flash),
+        ("d.mov", "850", "0", 0, &jpeg_ms),
+        ("e.mov", "990", "0", 0, &jpeg_ms),
+        ("f.mkv", "1000", one, 1, &ffv1),
+        ("g.mkv", "990", one, 1, &ffv1),
+        ("h.mkv", "990", more, 10, &ffv1),
+        ("i.flv", "900", more, 10, &flash),
+        ("j.mkv", "2000", "between(n,100,106)", 7, &ffv1),
+        ("k.avi", "990", more, 10, &jpeg),
+    ] {
+        let select = select(left_out);
+        let arguments = [&["-vf", &select, "-fps_mode", "passthrough"][..], codec].concat();
+        let path = made(folder.path(), name, rate, 400, &arguments);
+        let (timing, _) = timed(&path);
+        assert_eq!(timing.lacking, dropped, "{name}: {timing:?}");
+        let off = (timing.rate_hz.unwrap() - rate.parse::<f64>().unwrap()).abs();
+        assert!(off <= timing.rate_sigma_hz.map_or(1e-9, |s| 1.8 * s), "{name}: {timing:?}");
+        let (status, out, _) = info(&[path.to_str().unwrap(), "--count"], Stdio::null());
+        assert_eq!(status, 0, "{out}");
+        assert_eq!(out.contains("dropped by the recorder"), dropped > 0, "{name}: {out}");
+        let words = format!("{dropped} frame{} dropped", if dropped == 1 { " was" } else { "s were" });
+        assert!(dropped == 0 || out.contains(&words), "{name}: {out}");
+    }
+    // Of a short film whose codec has no rate, libavformat gives one frame per tick.
+    for count in [20, 60, 119] {
+        let (timing, _) = timed(&made(folder.path(), "short.mov", "960", count, &jpeg_ms));
+        assert!(timing.rate_from_stamps, "{count}: {timing:?}");
+        let off = (timing.rate_hz.unwrap() - 960.0).abs();
+        assert!(off <= timing.rate_sigma_hz.map_or(1e-9, |s| 1.8 * s), "{count}: {timing:?}");
     }
 }
 

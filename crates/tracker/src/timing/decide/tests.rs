@@ -1,5 +1,7 @@
 use super::*;
 
+mod sweep;
+
 const MS: TimeBase = TimeBase { numerator: 1, denominator: 1000 };
 
 fn claims(rates: &[[u64; 2]]) -> RateClaims {
