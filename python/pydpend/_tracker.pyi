@@ -306,7 +306,7 @@ def shooting_fit(
     learned: bool,
     huber: float,
     max_iterations: int,
-    stretch: float = 1.0,
+    clock_scale: float = 1.0,
     progress: Callable[[int, int, float], object] | None = None,
 ) -> dict[str, Any]:
     """The multiple-shooting fit; `pydpend.damping.shooting` names the shapes and units of each argument and result."""
@@ -317,7 +317,7 @@ def shooting_trace(
     segment_times: _Floats,
     segment_states: _Floats,
     model: dict[str, float],
-    stretch: float,
+    clock_scale: float,
 ) -> tuple[_Ints, _Floats, _Floats]:
     """The motion of every segment at its R samples.
 

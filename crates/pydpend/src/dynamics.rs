@@ -5,7 +5,7 @@
 use std::collections::HashMap;
 
 use dynamics::shooting::{
-    self, Point, Progress, Recording, Segment, Settings, ShootingError, Slack, Span, Status, follow,
+    self, Fit, Point, Progress, Recording, Segment, Settings, ShootingError, Slack, Span, Status, follow,
     local_state,
 };
 use dynamics::{Field, Fixed, Parameters, TERMS};
@@ -139,7 +139,7 @@ fn states(given: &PyReadonlyArray2<'_, f64>) -> Vec<[f64; 4]> {
 /// The multiple-shooting fit. See `pydpend.damping.shooting` for the shapes and the meaning of each argument.
 #[pyfunction]
 #[pyo3(signature = (recordings, segment_rows, segment_times, segment_states, model, zeros, *, free, bounded, clock,
-                    free_zeros, slack, learned, huber, max_iterations, stretch=1.0, progress=None))]
+                    free_zeros, slack, learned, huber, max_iterations, clock_scale=1.0, progress=None))]
 #[expect(clippy::too_many_arguments, reason = "one keyword each in Python")]
 pub fn shooting_fit<'py>(
     py: Python<'py>,
@@ -157,7 +157,7 @@ pub fn shooting_fit<'py>(
     learned: bool,
     huber: f64,
     max_iterations: usize,
-    stretch: f64,
+    clock_scale: f64,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let owned = recordings.iter().map(angles).collect::<PyResult<Vec<_>>>()?;
@@ -184,8 +184,12 @@ pub fn shooting_fit<'py>(
     {
         return Err(PyValueError::new_err("segments do not lie in the recordings"));
     }
-    let start =
-        Point { parameters: parameters(&model)?, stretch, zeros_rad: zeros, states: states(&segment_states) };
+    let start = Point {
+        parameters: parameters(&model)?,
+        clock_scale,
+        zeros_rad: zeros,
+        states: states(&segment_states),
+    };
     let mut raised = None;
     let outcome = py.detach(|| {
         let views: Vec<Recording<'_>> = owned.iter().map(Angles::view).collect();
@@ -203,12 +207,16 @@ pub fn shooting_fit<'py>(
     if let Some(error) = raised {
         return Err(error);
     }
-    let fit = outcome.map_err(|e: ShootingError| PyValueError::new_err(e.to_string()))?;
+    fit_columns(py, &outcome.map_err(|e: ShootingError| PyValueError::new_err(e.to_string()))?)
+}
+
+/// A fit as a dictionary of numbers and arrays.
+fn fit_columns<'py>(py: Python<'py>, fit: &Fit) -> PyResult<Bound<'py, PyDict>> {
     let out = PyDict::new(py);
     let values: HashMap<&str, f64> =
         Field::ALL.iter().map(|f| (f.name(), fit.point.parameters.get(*f))).collect();
     out.set_item("parameters", values)?;
-    out.set_item("stretch", fit.point.stretch)?;
+    out.set_item("clock_scale", fit.point.clock_scale)?;
     out.set_item("zeros_rad", rows(py, &fit.point.zeros_rad)?)?;
     out.set_item("states", rows(py, &fit.point.states)?)?;
     let n = fit.gradient.len();
@@ -222,7 +230,7 @@ pub fn shooting_fit<'py>(
     out.set_item("scores", fit.scores.transpose().as_slice().to_pyarray(py).reshape([k, g])?)?;
     out.set_item("slack", fit.slack)?;
     out.set_item("own_sigma", fit.own_sigma)?;
-    out.set_item("joint_chi2", fit.joint_chi2)?;
+    out.set_item("jump_chi2", fit.jump_chi2)?;
     out.set_item("log_evidence", fit.log_evidence)?;
     out.set_item("cost", fit.cost)?;
     out.set_item("squares", fit.squares)?;
@@ -255,7 +263,7 @@ pub fn shooting_trace<'py>(
     segment_times: PyReadonlyArray2<'py, f64>,
     segment_states: PyReadonlyArray2<'py, f64>,
     model: HashMap<String, f64>,
-    stretch: f64,
+    clock_scale: f64,
 ) -> PyResult<Tables<'py>> {
     let owned = recordings.iter().map(angles).collect::<PyResult<Vec<_>>>()?;
     let list = segments(&segment_rows, &segment_times);
@@ -264,7 +272,7 @@ pub fn shooting_trace<'py>(
     }
     let point = Point {
         parameters: parameters(&model)?,
-        stretch,
+        clock_scale,
         zeros_rad: Vec::new(),
         states: states(&segment_states),
     };

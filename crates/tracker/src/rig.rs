@@ -205,11 +205,9 @@ impl Rig {
     /// # Errors
     /// [`Error::Rig`] naming the first key at fault.
     pub fn check(&self, name: &str) -> Result<()> {
-        let fault = |key: String, problem: String, advice: &str| {
-            Err(Error::Rig(Fault::new(name, problem).at(Place::Key(key)).advice(advice)))
-        };
         if self.schema == 0 || self.schema > RIG_SCHEMA {
-            return fault(
+            return wrong(
+                name,
                 "schema".into(),
                 format!("version {} is not known, this program reads up to {RIG_SCHEMA}", self.schema),
                 "Use a newer tracker",
@@ -222,26 +220,41 @@ impl Rig {
                     .advice("Add [[node]] entries or run " + SETUP),
             ));
         }
+        self.check_bodies(name)?;
+        self.check_nodes(name)?;
+        self.check_joints(name)
+    }
+
+    /// Each body has a name of its own.
+    fn check_bodies(&self, name: &str) -> Result<()> {
         for (i, b) in self.bodies.iter().enumerate() {
             if b.name.is_empty() || self.bodies[..i].iter().any(|o| o.name == b.name) {
-                return fault(
+                return wrong(
+                    name,
                     format!("body {i}"),
                     format!("the name {:?} is empty or given twice", b.name),
                     "Give each body its own name",
                 );
             }
         }
+        Ok(())
+    }
+
+    /// Each node has a name of its own, a body and a place of its own, and each body a node.
+    fn check_nodes(&self, name: &str) -> Result<()> {
         let [w, h] = self.image_px.map(f64::from);
         for (i, n) in self.nodes.iter().enumerate() {
             if n.name.is_empty() || self.nodes[..i].iter().any(|o| o.name == n.name) {
-                return fault(
+                return wrong(
+                    name,
                     format!("node {i}"),
                     format!("the name {:?} is empty or given twice", n.name),
                     "Give each node its own name",
                 );
             }
             if self.body_index(&n.body).is_none() {
-                return fault(
+                return wrong(
+                    name,
                     format!("node {}", n.name),
                     format!("its body {:?} is not in the rig", n.body),
                     "Add a [[body]] of that name",
@@ -250,14 +263,16 @@ impl Rig {
             if let Some(o) = self.nodes[..i].iter().find(|o| {
                 (&o.body, o.x_px.to_bits(), o.y_px.to_bits()) == (&n.body, n.x_px.to_bits(), n.y_px.to_bits())
             }) {
-                return fault(
+                return wrong(
+                    name,
                     format!("node {}", n.name),
                     format!("it is at ({}, {}) px as node {} of its body is", n.x_px, n.y_px, o.name),
                     "Give its own centre in the reference picture",
                 );
             }
             if !self.in_reach([n.x_px, n.y_px]) {
-                return fault(
+                return wrong(
+                    name,
                     format!("node {}", n.name),
                     format!(
                         "({}, {}) px is farther from the image of {w} x {h} px than its diagonal is long",
@@ -269,30 +284,39 @@ impl Rig {
         }
         for b in &self.bodies {
             if !self.nodes.iter().any(|n| n.body == b.name) {
-                return fault(
+                return wrong(
+                    name,
                     format!("body {}", b.name),
                     "it has no nodes".into(),
                     "Give it a node or leave it out",
                 );
             }
         }
+        Ok(())
+    }
+
+    /// Each joint names one body or two, and has a place.
+    fn check_joints(&self, name: &str) -> Result<()> {
         for j in &self.joints {
             if j.bodies.is_empty() || j.bodies.len() > 2 {
-                return fault(
+                return wrong(
+                    name,
                     format!("joint {}", j.name),
                     format!("it names {} bodies", j.bodies.len()),
                     "Name one body (a fixed pivot) or two",
                 );
             }
             if let Some(b) = j.bodies.iter().find(|b| self.body_index(b).is_none()) {
-                return fault(
+                return wrong(
+                    name,
                     format!("joint {}", j.name),
                     format!("its body {b:?} is not in the rig"),
                     "Name bodies of the rig",
                 );
             }
             if !(j.x_px.is_finite() && j.y_px.is_finite()) {
-                return fault(
+                return wrong(
+                    name,
                     format!("joint {}", j.name),
                     "its place is not finite".into(),
                     "Give its place in the reference picture",
@@ -301,4 +325,9 @@ impl Rig {
         }
         Ok(())
     }
+}
+
+/// The error for an entry of the rig called `name`.
+fn wrong(name: &str, key: String, problem: String, advice: &str) -> Result<()> {
+    Err(Error::Rig(Fault::new(name, problem).at(Place::Key(key)).advice(advice)))
 }

@@ -199,7 +199,7 @@ def _solved(
         huber=huber,
         max_iterations=STEPS,
         clock="clock" in near.names,
-        stretch=near.stretch,
+        clock_scale=near.clock_scale,
     )
 
 

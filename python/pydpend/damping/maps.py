@@ -70,7 +70,7 @@ def corrected(tracks: Sequence[Track], maps: Maps) -> list[Track]:
 
 def learn(tracks: Sequence[Track], solution: Solution) -> Maps:
     """Maps from the residuals of a fit to the uncorrected angles ``tracks``."""
-    path = shooting.trace(tracks, solution.segments, solution.parameters, solution.stretch)
+    path = shooting.trace(tracks, solution.segments, solution.parameters, solution.clock_scale)
     residual = shooting.residuals(tracks, path, solution.zeros_rad)
     phi = np.empty_like(residual)
     sigma = np.empty_like(residual)

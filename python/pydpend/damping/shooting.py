@@ -108,7 +108,7 @@ class Solution:
     """Each segment's part of the gradient with the states eliminated, (K, G)."""
     slack: Floats
     own_sigma: Floats
-    joint_chi2: Floats
+    jump_chi2: Floats
     log_evidence: float
     cost: float
     squares: Floats
@@ -121,7 +121,7 @@ class Solution:
     stuck: int
     iterations: int
     status: str
-    stretch: float
+    clock_scale: float
 
     @property
     def chi2(self) -> float:
@@ -186,7 +186,7 @@ def solve(
     huber: float = 3.5,
     max_iterations: int = 60,
     clock: bool = False,
-    stretch: float = 1.0,
+    clock_scale: float = 1.0,
     progress: Progress | None = None,
 ) -> Solution:
     """Runs the fit. Raises FitError when there is nothing to fit or the motion is not determined."""
@@ -206,7 +206,7 @@ def solve(
             learned=learned,
             huber=huber,
             max_iterations=max_iterations,
-            stretch=stretch,
+            clock_scale=clock_scale,
             progress=progress,
         )
     except ValueError as problem:
@@ -230,7 +230,7 @@ def solve(
         out["scores"][:, known],
         np.array(out["slack"]),
         np.array(out["own_sigma"]),
-        np.array(out["joint_chi2"]),
+        np.array(out["jump_chi2"]),
         out["log_evidence"],
         out["cost"],
         np.array(out["squares"]),
@@ -241,7 +241,7 @@ def solve(
         out["stuck"],
         out["iterations"],
         out["status"],
-        out["stretch"],
+        out["clock_scale"],
     )
 
 
@@ -294,11 +294,11 @@ class Trace:
 
 
 def trace(
-    tracks: Sequence[Track], segments: Segments, parameters: dict[str, float], stretch: float = 1.0
+    tracks: Sequence[Track], segments: Segments, parameters: dict[str, float], clock_scale: float = 1.0
 ) -> Trace:
     """Follows each segment from its state."""
     index, state, power = _tracker.shooting_trace(
-        tracks, segments.rows, segments.times_s, segments.states, parameters, stretch
+        tracks, segments.rows, segments.times_s, segments.states, parameters, clock_scale
     )
     return Trace(index[:, 0], index[:, 1], index[:, 2], state, power)
 

@@ -178,7 +178,7 @@ def tightened(
         huber=1e3,
         learned=False,
         max_iterations=12,
-        stretch=solution.stretch,
+        clock_scale=solution.clock_scale,
         progress=progress,
     )
 
@@ -211,7 +211,7 @@ def _judge(
         n: solution.parameters[n] / psi for n in RATIOS
     }
     links = recordings[0].angles.links
-    path = shooting.trace(tracks, solution.segments, solution.parameters, solution.stretch)
+    path = shooting.trace(tracks, solution.segments, solution.parameters, solution.clock_scale)
     c_rows = [kept.index(n) for n in names]
     c_cov = cov[np.ix_(c_rows, c_rows)]
     fitted = fitted_model(model, solution.parameters)

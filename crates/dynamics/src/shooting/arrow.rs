@@ -1,7 +1,7 @@
-//! The arrow-shaped normal matrix of a multiple-shooting fit: chains of 4x4 blocks with a common border.
+//! Eliminates the arrow-shaped normal matrix of a multiple-shooting fit: chains of 4x4 blocks with a common border.
 //!
 //! Segment states come first, each coupled to the next of its chain; the common unknowns (coefficients, ratios,
-//! angle zeros) form the border. One forward elimination and one back substitution solve it in time linear in the
+//! angle zeros) form the border: the shared parameters. One forward elimination and one back substitution solve it in time linear in the
 //! number of segments, and give the blocks of the inverse that the slack and the covariances need.
 
 use nalgebra::{DMatrix, DVector, Matrix4, Matrix4xX, Vector4};
@@ -13,8 +13,8 @@ pub struct Block {
     pub own: Matrix4<f64>,
     /// With respect to this state and the next one's; `None` at the end of a chain.
     pub next: Option<Matrix4<f64>>,
-    /// With respect to this state and the border, (4, G).
-    pub border: Matrix4xX<f64>,
+    /// With respect to this state and the shared parameters, (4, G).
+    pub shared: Matrix4xX<f64>,
     /// Gradient.
     pub gradient: Vector4<f64>,
     /// The samples' part of `own`'s diagonal.
@@ -26,7 +26,7 @@ pub struct Block {
 pub struct Arrow {
     /// Segments in order.
     pub blocks: Vec<Block>,
-    /// Border with border, (G, G).
+    /// Of the shared parameters with each other, (G, G).
     pub corner: DMatrix<f64>,
     /// Border's gradient.
     pub gradient: DVector<f64>,
@@ -38,20 +38,20 @@ pub struct Arrow {
 pub struct Eliminated {
     inverse: Vec<Matrix4<f64>>,
     next: Vec<Option<Matrix4<f64>>>,
-    border: Vec<Matrix4xX<f64>>,
+    shared: Vec<Matrix4xX<f64>>,
     gradient: Vec<Vector4<f64>>,
-    /// What is left for the border: its marginal second derivatives.
+    /// What is left for the shared parameters: its marginal second derivatives.
     pub corner: DMatrix<f64>,
     /// And gradient.
     pub corner_gradient: DVector<f64>,
 }
 
 impl Arrow {
-    /// The gradient along a step of states and border.
+    /// The gradient along a step of states and shared parameters.
     #[must_use]
-    pub fn slope(&self, states: &[Vector4<f64>], border: &DVector<f64>) -> f64 {
+    pub fn slope(&self, states: &[Vector4<f64>], shared: &DVector<f64>) -> f64 {
         let along: f64 = self.blocks.iter().zip(states).map(|(b, s)| b.gradient.dot(s)).sum();
-        along + self.gradient.dot(border)
+        along + self.gradient.dot(shared)
     }
 
     /// Eliminates the states, with `damping` times the samples' part of the diagonal added to it (the joints' part
@@ -63,7 +63,7 @@ impl Arrow {
         let mut out = Eliminated {
             inverse: Vec::with_capacity(n),
             next: Vec::with_capacity(n),
-            border: Vec::with_capacity(n),
+            shared: Vec::with_capacity(n),
             gradient: Vec::with_capacity(n),
             corner: self.corner.clone(),
             corner_gradient: self.gradient.clone(),
@@ -77,23 +77,23 @@ impl Arrow {
             for i in 0..4 {
                 own[(i, i)] += damping * block.damped[i];
             }
-            let (mut border, mut gradient) = (block.border.clone(), block.gradient);
+            let (mut shared, mut gradient) = (block.shared.clone(), block.gradient);
             if let Some((o, b, g)) = carry.take() {
                 own -= o;
-                border -= b;
+                shared -= b;
                 gradient -= g;
             }
             let inverse = scaled_inverse(&own)?;
-            let through: Matrix4xX<f64> = inverse * &border;
-            out.corner.gemm_tr(-1.0, &border, &through, 1.0);
+            let through: Matrix4xX<f64> = inverse * &shared;
+            out.corner.gemm_tr(-1.0, &shared, &through, 1.0);
             out.corner_gradient.gemv_tr(-1.0, &through, &gradient, 1.0);
             if let Some(next) = block.next {
                 let back = next.transpose() * inverse;
-                carry = Some((back * next, back * &border, back * gradient));
+                carry = Some((back * next, back * &shared, back * gradient));
             }
             out.inverse.push(inverse);
             out.next.push(block.next);
-            out.border.push(border);
+            out.shared.push(shared);
             out.gradient.push(gradient);
         }
         Some(out)
@@ -116,14 +116,14 @@ fn scaled_inverse(m: &Matrix4<f64>) -> Option<Matrix4<f64>> {
 }
 
 impl Eliminated {
-    /// The states' steps for a given border step: the minimiser of the quadratic model.
+    /// The states' steps for a given step of the shared parameters: the minimiser of the quadratic model.
     #[must_use]
-    pub fn states(&self, border: &DVector<f64>) -> Vec<Vector4<f64>> {
+    pub fn states(&self, shared: &DVector<f64>) -> Vec<Vector4<f64>> {
         let mut steps = vec![Vector4::zeros(); self.inverse.len()];
         let mut after = Vector4::zeros();
         for k in (0..self.inverse.len()).rev() {
             let mut right =
-                -self.gradient[k] - Vector4::from_iterator((&self.border[k] * border).iter().copied());
+                -self.gradient[k] - Vector4::from_iterator((&self.shared[k] * shared).iter().copied());
             if let Some(next) = self.next[k] {
                 right -= next * after;
             }
@@ -144,12 +144,12 @@ impl Eliminated {
         let n = scale.len();
         let scaled = DMatrix::from_fn(n, n, |r, c| self.corner[(r, c)] / (scale[r] * scale[c]));
         let values = scaled.symmetric_eigenvalues();
-        let border: f64 = values.iter().map(|v| v.max(1e-14).ln()).sum();
-        states + border + scale.iter().map(|s| 2.0 * s.ln()).sum::<f64>()
+        let shared: f64 = values.iter().map(|v| v.max(1e-14).ln()).sum();
+        states + shared + scale.iter().map(|s| 2.0 * s.ln()).sum::<f64>()
     }
 
     /// Covariance blocks of the states: for each segment its own block, and the block with the next segment's state,
-    /// both for a known border; and how the states move with the border, (4, G).
+    /// both for known shared parameters; and how the states move with the shared parameters, (4, G).
     #[must_use]
     pub fn covariances(&self) -> Vec<Spread> {
         let n = self.inverse.len();
@@ -159,14 +159,14 @@ impl Eliminated {
             let inverse = self.inverse[k];
             let mut own = inverse;
             let mut with_next = Matrix4::zeros();
-            let mut pull = self.border[k].clone();
+            let mut pull = self.shared[k].clone();
             if let (Some(next), Some(later)) = (self.next[k], &after) {
                 let gain = inverse * next;
                 with_next = -gain * later.own;
                 own += gain * later.own * gain.transpose();
-                pull += next * &later.with_border;
+                pull += next * &later.with_shared;
             }
-            let spread = Spread { own, with_next, with_border: -(inverse * pull) };
+            let spread = Spread { own, with_next, with_shared: -(inverse * pull) };
             after = Some(spread.clone());
             out.push(spread);
         }
@@ -178,12 +178,12 @@ impl Eliminated {
 /// Covariance of one segment's state; see [`Eliminated::covariances`].
 #[derive(Clone, Debug)]
 pub struct Spread {
-    /// Covariance of this state for a known border.
+    /// Covariance of this state for known shared parameters.
     pub own: Matrix4<f64>,
     /// With the next segment's state.
     pub with_next: Matrix4<f64>,
-    /// Derivative of this state with respect to the border, (4, G).
-    pub with_border: Matrix4xX<f64>,
+    /// Derivative of this state with respect to the shared parameters, (4, G).
+    pub with_shared: Matrix4xX<f64>,
 }
 
 #[cfg(test)]
@@ -218,7 +218,7 @@ mod tests {
             arrow.blocks.push(Block {
                 own: block(k, k),
                 next: (k != 2 && k != 4).then(|| block(k, k + 1)),
-                border: Matrix4xX::from_fn(g, |i, j| dense[(4 * k + i, 4 * n + j)]),
+                shared: Matrix4xX::from_fn(g, |i, j| dense[(4 * k + i, 4 * n + j)]),
                 gradient: Vector4::from_fn(|i, _| (i + k) as f64 * 0.3 - 1.0),
                 damped: Vector4::zeros(),
             });
@@ -240,16 +240,16 @@ mod tests {
         let determinant = dense.clone().cholesky().map(|c| c.determinant().ln());
         assert!(determinant.is_some_and(|d| (done.log_determinant() - d).abs() < 1e-10));
         let corner = done.corner.clone().try_inverse().ok_or("singular").unwrap_or(DMatrix::zeros(g, g));
-        let border = -(&corner * &done.corner_gradient);
+        let shared = -(&corner * &done.corner_gradient);
         // rounding of a well-conditioned 23x23 system
-        assert!((&border - step.rows(4 * n, g)).amax() < 1e-12);
-        for (k, s) in done.states(&border).iter().enumerate() {
+        assert!((&shared - step.rows(4 * n, g)).amax() < 1e-12);
+        for (k, s) in done.states(&shared).iter().enumerate() {
             assert!((s - step.fixed_rows::<4>(4 * k)).amax() < 1e-12);
         }
         for (k, spread) in done.covariances().iter().enumerate() {
             let full = spread.own
                 + Matrix4::from_iterator(
-                    (&spread.with_border * &corner * spread.with_border.transpose()).iter().copied(),
+                    (&spread.with_shared * &corner * spread.with_shared.transpose()).iter().copied(),
                 );
             assert!((full - inverse.view((4 * k, 4 * k), (4, 4))).amax() < 1e-12);
         }

@@ -14,7 +14,7 @@ pub struct Point {
     /// Parameters of the motion.
     pub parameters: Parameters<f64>,
     /// True time per clock time.
-    pub stretch: f64,
+    pub clock_scale: f64,
     /// Angle zeros of each recording, rad: measured = true + zero.
     pub zeros_rad: Vec<[f64; 2]>,
     /// State at each segment's start.
@@ -64,7 +64,7 @@ pub fn trial(recording: &Recording<'_>, segment: &Segment, k: usize, point: &Poi
     let span = Span { start_s: segment.start_s, end_s: segment.end_s, times_s: times };
     let zeros = point.zeros_rad[segment.recording];
     let mut cost = 0.0;
-    let end = follow(&point.parameters, point.states[k], &span, point.stretch, false, |n, x| {
+    let end = follow(&point.parameters, point.states[k], &span, point.clock_scale, false, |n, x| {
         let i = segment.first + n;
         for j in 0..2 {
             if recording.seen(i, j) {
@@ -80,6 +80,70 @@ pub fn trial(recording: &Recording<'_>, segment: &Segment, k: usize, point: &Poi
 /// Information on the state of a link that is not there, that holds it where it is: of the size of a milliradian's.
 const HELD: f64 = 1e6;
 
+/// Sums over a segment's samples, per link: of weight times (1, derivative) x (1, derivative), and of weighted residuals.
+struct Sums<const N: usize> {
+    products: [[[f64; N]; N]; 2],
+    slopes: [[f64; N]; 2],
+    with_residual: [[f64; N]; 2],
+    weights: [f64; 2],
+    residuals: [f64; 2],
+}
+
+impl<const N: usize> Default for Sums<N> {
+    fn default() -> Self {
+        Self {
+            products: [[[0.0; N]; N]; 2],
+            slopes: [[0.0; N]; 2],
+            with_residual: [[0.0; N]; 2],
+            weights: [0.0; 2],
+            residuals: [0.0; 2],
+        }
+    }
+}
+
+impl<const N: usize> Sums<N> {
+    /// Adds a sample of link `j`: the angle's derivatives, its weight `w`, and weight times residual `wr`.
+    #[inline(always)]
+    fn add(&mut self, j: usize, d: &[f64; N], w: f64, wr: f64) {
+        for a in 0..N {
+            let wa = w * d[a];
+            self.slopes[j][a] += wa;
+            self.with_residual[j][a] += wr * d[a];
+            for (sum, b) in self.products[j][a].iter_mut().zip(d) {
+                *sum += wa * b;
+            }
+        }
+        self.weights[j] += w;
+        self.residuals[j] += wr;
+    }
+
+    /// Second derivatives and gradient with respect to the state, `common` unknowns and, where they are free, two zeros.
+    fn equations(&self, common: usize, zeros: bool) -> (DMatrix<f64>, DVector<f64>) {
+        let zeros_at = 4 + common;
+        let size = zeros_at + 2 * usize::from(zeros);
+        let mut hessian = DMatrix::zeros(size, size);
+        let mut gradient = DVector::zeros(size);
+        for j in 0..2 {
+            for a in 0..zeros_at {
+                gradient[a] += self.with_residual[j][a];
+                for b in 0..zeros_at {
+                    hessian[(a, b)] += self.products[j][a][b];
+                }
+            }
+            if zeros {
+                let z = zeros_at + j;
+                gradient[z] += self.residuals[j];
+                hessian[(z, z)] += self.weights[j];
+                for a in 0..zeros_at {
+                    hessian[(a, z)] += self.slopes[j][a];
+                    hessian[(z, a)] += self.slopes[j][a];
+                }
+            }
+        }
+        (hessian, gradient)
+    }
+}
+
 /// Everything of one segment at a point, with `N` directions: the state and up to `N - 4` common unknowns.
 pub fn linearise<const N: usize>(
     recording: &Recording<'_>,
@@ -89,29 +153,23 @@ pub fn linearise<const N: usize>(
     settings: &Settings,
 ) -> Local {
     let common = settings.free.len() + usize::from(settings.clock);
-    let zeros_at = 4 + common;
-    let size = zeros_at + 2 * usize::from(settings.zeros);
     let mut p: Parameters<Dual<N>> = point.parameters.lift();
     for (i, field) in settings.free.iter().enumerate() {
         p.set(*field, Dual::variable(point.parameters.get(*field), 4 + i));
     }
-    let stretch = if settings.clock {
-        Dual::variable(point.stretch, 4 + settings.free.len())
+    let clock_scale = if settings.clock {
+        Dual::variable(point.clock_scale, 4 + settings.free.len())
     } else {
-        Dual::constant(point.stretch)
+        Dual::constant(point.clock_scale)
     };
     let x0: State<Dual<N>> = std::array::from_fn(|i| Dual::variable(point.states[k][i], i));
     let times = &recording.t_s[segment.first..segment.last];
     let span = Span { start_s: segment.start_s, end_s: segment.end_s, times_s: times };
     let zeros = point.zeros_rad[segment.recording];
 
-    // Per link: sums over samples of weight * (1, derivative) x (1, derivative) in the upper triangle.
-    let mut sums = [[[0.0; N]; N]; 2];
-    let mut slopes = [[0.0; N]; 2];
-    let mut with_residual = [[0.0; N]; 2];
-    let (mut weights, mut residuals) = ([0.0; 2], [0.0; 2]);
+    let mut sums = Sums::<N>::default();
     let (mut cost, mut squares, mut counts) = (0.0, [0.0; 2], [0; 2]);
-    let end = follow(&p, x0, &span, stretch, false, |n, x| {
+    let end = follow(&p, x0, &span, clock_scale, false, |n, x| {
         let i = segment.first + n;
         for j in 0..2 {
             if !recording.seen(i, j) {
@@ -123,40 +181,11 @@ pub fn linearise<const N: usize>(
             cost += half;
             squares[j] += weight * r * r;
             counts[j] += 1;
-            let (w, wr) = (weight * scale * scale, weight * scale * r);
-            let d = &x[j].d;
-            for a in 0..N {
-                let wa = w * d[a];
-                slopes[j][a] += wa;
-                with_residual[j][a] += wr * d[a];
-                for b in 0..N {
-                    sums[j][a][b] += wa * d[b];
-                }
-            }
-            weights[j] += w;
-            residuals[j] += wr;
+            sums.add(j, &x[j].d, weight * scale * scale, weight * scale * r);
         }
     });
 
-    let mut hessian = DMatrix::zeros(size, size);
-    let mut gradient = DVector::zeros(size);
-    for j in 0..2 {
-        for a in 0..zeros_at {
-            gradient[a] += with_residual[j][a];
-            for b in 0..zeros_at {
-                hessian[(a, b)] += sums[j][a][b];
-            }
-        }
-        if settings.zeros {
-            let z = zeros_at + j;
-            gradient[z] += residuals[j];
-            hessian[(z, z)] += weights[j];
-            for a in 0..zeros_at {
-                hessian[(a, z)] += slopes[j][a];
-                hessian[(z, a)] += slopes[j][a];
-            }
-        }
-    }
+    let (mut hessian, gradient) = sums.equations(common, settings.zeros);
     for i in recording.links..2 {
         // A link that is not there rests at zero; nothing else depends on its state.
         for a in [i, 2 + i] {

@@ -199,12 +199,12 @@ pub struct Span<'a> {
 }
 
 /// Integrates from `x0` over the span, handing `sink` the index and the angles (with `rates` also the rates) at each
-/// sample. `stretch` is the true time per clock time. A motion that leaves the finite numbers ends early.
+/// sample. `clock_scale` is the true time per clock time. A motion that leaves the finite numbers ends early.
 pub fn follow<S: Real>(
     p: &Parameters<S>,
     x0: State<S>,
     span: &Span<'_>,
-    stretch: S,
+    clock_scale: S,
     rates: bool,
     mut sink: impl FnMut(usize, &State<S>),
 ) -> End<S> {
@@ -228,11 +228,11 @@ pub fn follow<S: Real>(
             break;
         }
         let mut to = end_s.min(t + ANGLE_PER_STEP / speed);
-        let mut h = stretch * (to - t);
+        let mut h = clock_scale * (to - t);
         let mut trial = path.step(&k, h);
         if let Some(part) = path.graze(&k, &trial, h.value()) {
             to = t + part * (to - t);
-            h = stretch * (to - t);
+            h = clock_scale * (to - t);
             trial = path.step(&k, h);
         }
         let mut ending = [0, 1].map(|j| path.ends(&trial, j));
@@ -248,7 +248,7 @@ pub fn follow<S: Real>(
                 let left = h - gone;
                 let (there, used) = path.switch(&k, left, ending);
                 while next < times_s.len() && times_s[next] <= to {
-                    let since = stretch * (times_s[next] - t) - gone;
+                    let since = clock_scale * (times_s[next] - t) - gone;
                     if since.value() > used.value() {
                         break;
                     }
@@ -267,7 +267,7 @@ pub fn follow<S: Real>(
             }
             let left = h - gone;
             while next < times_s.len() && times_s[next] <= to {
-                sink(next, &inside(&k, &trial, left, stretch * (times_s[next] - t) - gone, rates));
+                sink(next, &inside(&k, &trial, left, clock_scale * (times_s[next] - t) - gone, rates));
                 next += 1;
             }
         }

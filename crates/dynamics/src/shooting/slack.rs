@@ -1,4 +1,4 @@
-//! The slack: how far a segment's end may be from the next one's start.
+//! Estimates the slack: the standard deviation allowed to the jump between a segment's end and the next one's start.
 
 use nalgebra::{DVector, Matrix4, Vector4};
 
@@ -30,16 +30,16 @@ pub(super) fn own_sigma(locals: &[Local]) -> Option<[f64; 4]> {
 }
 
 /// Jumps squared and their degrees of freedom, per component, after the step that minimises the linear problem.
-fn joints(
+fn jumps_squared(
     problem: &Problem<'_>,
     point: &Point,
     locals: &[Local],
     done: &Eliminated,
-    border: &DVector<f64>,
+    shared: &DVector<f64>,
     slack: [f64; 4],
 ) -> ([f64; 4], [f64; 4]) {
-    let states = done.states(border);
-    let parameters = border.rows(0, problem.common);
+    let states = done.states(shared);
+    let parameters = shared.rows(0, problem.common);
     let spreads = done.covariances();
     let corner = pseudo_inverse(&done.corner);
     let (mut squares, mut freedom) = ([0.0; 4], [0.0; 4]);
@@ -49,7 +49,7 @@ fn joints(
         let d: Vector4<f64> = jump + states[k + 1] - a * states[k] - moved;
         let (here, after) = (&spreads[k], &spreads[k + 1]);
         let cross = a * here.with_next;
-        let mut pull = &after.with_border - a * &here.with_border;
+        let mut pull = &after.with_shared - a * &here.with_shared;
         let mut common = pull.columns_mut(0, problem.common);
         common -= b;
         let through = &pull * &corner;
@@ -81,12 +81,12 @@ pub(super) fn learned(
 ) -> Option<Learned> {
     let mut now = Learned { slack: start, chi2: [f64::NAN; 4] };
     let mut solved: Option<Learned> = None;
-    for _ in 0..MOST_GUESSES {
+    for _ in 0..MAX_GUESSES {
         let slack = now.slack;
         let weight = Vector4::from(slack.map(|s| 1.0 / (s * s)));
         let done = problem.assemble(point, locals, Some(weight)).eliminate(0.0);
-        let step = done.and_then(|done| problem.border_step(point, &done).map(|border| (done, border)));
-        let Some((done, border)) = step else {
+        let step = done.and_then(|done| problem.shared_step(point, &done).map(|shared| (done, shared)));
+        let Some((done, shared)) = step else {
             if let Some(before) = solved {
                 // So tight that it is lost in rounding where the motion is not yet the right one.
                 return Some(before);
@@ -98,14 +98,14 @@ pub(super) fn learned(
             now.slack = std::array::from_fn(|i| (slack[i] / 10.0).max(lowest[i]));
             continue;
         };
-        let (squares, freedom) = joints(problem, point, locals, &done, &border, slack);
+        let (squares, freedom) = jumps_squared(problem, point, locals, &done, &shared, slack);
         now.chi2 = std::array::from_fn(|i| squares[i] / (freedom[i].max(1e-9) * slack[i] * slack[i]));
         solved = Some(now);
         now.slack = std::array::from_fn(|i| {
             let wanted = (squares[i] / freedom[i].max(1e-3)).sqrt();
             wanted.clamp(slack[i] / 10.0, slack[i] * 10.0).max(lowest[i])
         });
-        if apart(now.slack, slack) < KNOWN {
+        if apart(now.slack, slack) < SLACK_TOLERANCE {
             break;
         }
     }
@@ -115,13 +115,13 @@ pub(super) fn learned(
 /// Change of the logarithm of a weight from which a derivative is taken: far above rounding, far below curvature.
 const STEP: f64 = 0.02;
 
-/// Variance that the jumps show over the slack's square: one common to the components `given`, 1 for the others, whose
-/// slack was learned. Not below zero.
+/// Observed variance of the jumps over the slack's square, not below zero: one common to the components `given`, 1 for the
+/// others, whose slack was learned.
 ///
 /// With `H` the part of the hat matrix between jumps (each over its slack), `f = tr(1 - H)` over the given components
 /// and `K = sum (1 - H)^2` over pairs of them, the expected sum of squares of their jumps is `f - K + shown K`. `H`
 /// depends on the weights as `dH = (H - H^2) d ln w`, so `K = f + df/d ln w`.
-pub(super) fn shown(
+pub(super) fn jump_variance_ratio(
     problem: &Problem<'_>,
     point: &Point,
     locals: &[Local],
@@ -132,8 +132,8 @@ pub(super) fn shown(
         let slack = std::array::from_fn(|i| slack[i] * if given[i] { (-0.5 * shift).exp() } else { 1.0 });
         let weight = Vector4::from(slack.map(|s| 1.0 / (s * s)));
         let done = problem.assemble(point, locals, Some(weight)).eliminate(0.0)?;
-        let border = problem.border_step(point, &done)?;
-        let (squares, freedom) = joints(problem, point, locals, &done, &border, slack);
+        let shared = problem.shared_step(point, &done)?;
+        let (squares, freedom) = jumps_squared(problem, point, locals, &done, &shared, slack);
         let over = |v: &dyn Fn(usize) -> f64| (0..4).filter(|&i| given[i]).map(v).sum::<f64>();
         Some((over(&|i| squares[i] / (slack[i] * slack[i])), over(&|i| freedom[i])))
     };
@@ -149,9 +149,9 @@ pub(super) fn shown(
 }
 
 /// A slack known to 2 % changes no standard error that is quoted to two digits.
-pub(super) const KNOWN: f64 = 0.02;
+pub(super) const SLACK_TOLERANCE: f64 = 0.02;
 /// Most guesses at the slack; ten are enough where it is determined.
-const MOST_GUESSES: usize = 40;
+const MAX_GUESSES: usize = 40;
 
 /// Largest difference of two slacks, as a logarithm.
 pub(super) fn apart(a: [f64; 4], b: [f64; 4]) -> f64 {

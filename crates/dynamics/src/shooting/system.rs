@@ -8,7 +8,7 @@ use super::linearise::{Local, Point, linearise, trial};
 use super::problem::{Recording, Segment, Settings};
 
 /// Number of directions the largest dual number has.
-pub(super) const MOST: usize = 24;
+pub(super) const MAX_DIRECTIONS: usize = 24;
 
 /// Recordings, segments, what is free, and how many common unknowns (`common` those of the motion).
 pub(super) struct Problem<'a> {
@@ -16,7 +16,7 @@ pub(super) struct Problem<'a> {
     pub(super) segments: &'a [Segment],
     pub(super) settings: &'a Settings,
     pub(super) common: usize,
-    pub(super) border: usize,
+    pub(super) shared: usize,
 }
 
 /// Least relative information that counts, tried in turn.
@@ -48,7 +48,7 @@ impl Problem<'_> {
                 5..=12 => linearise::<12>(recording, segment, k, point, self.settings),
                 13..=16 => linearise::<16>(recording, segment, k, point, self.settings),
                 17..=20 => linearise::<20>(recording, segment, k, point, self.settings),
-                _ => linearise::<MOST>(recording, segment, k, point, self.settings),
+                _ => linearise::<MAX_DIRECTIONS>(recording, segment, k, point, self.settings),
             }
         };
         threads::install(|| self.segments.par_iter().enumerate().map(one).collect())
@@ -93,14 +93,14 @@ impl Problem<'_> {
             .map(|k| (k, Vector4::from(point.states[k + 1]) - locals[k].end))
     }
 
-    /// Column in the border of each of a segment's local unknowns after its state.
+    /// Column in the shared parameters of each of a segment's local unknowns after its state.
     pub(super) fn columns(&self, segment: &Segment) -> impl Fn(usize) -> usize + use<> {
         let (common, recording) = (self.common, segment.recording);
         move |c| if c < common { c } else { common + 2 * recording + (c - common) }
     }
 
     pub(super) fn assemble(&self, point: &Point, locals: &[Local], weight: Option<Vector4<f64>>) -> Arrow {
-        let g = self.border;
+        let g = self.shared;
         let mut arrow = Arrow {
             blocks: Vec::with_capacity(locals.len()),
             corner: DMatrix::zeros(g, g),
@@ -110,12 +110,12 @@ impl Problem<'_> {
         for (segment, local) in self.segments.iter().zip(locals) {
             let column = self.columns(segment);
             let extra = local.gradient.len() - 4;
-            let mut border = Matrix4xX::zeros(g);
+            let mut shared = Matrix4xX::zeros(g);
             for c in 0..extra {
                 let to = column(c);
                 arrow.gradient[to] += local.gradient[4 + c];
                 for r in 0..4 {
-                    border[(r, to)] += local.hessian[(r, 4 + c)];
+                    shared[(r, to)] += local.hessian[(r, 4 + c)];
                 }
                 for r in 0..extra {
                     arrow.corner[(column(r), to)] += local.hessian[(4 + r, 4 + c)];
@@ -126,7 +126,7 @@ impl Problem<'_> {
                 own,
                 damped: own.diagonal(),
                 next: None,
-                border,
+                shared,
                 gradient: local.gradient.fixed_rows::<4>(0).into(),
             });
         }
@@ -145,21 +145,21 @@ impl Problem<'_> {
                 block.own += aw * a;
                 block.next = Some(-aw);
                 block.gradient -= a.transpose() * wd;
-                let mut left = block.border.columns_mut(0, self.common);
+                let mut left = block.shared.columns_mut(0, self.common);
                 left += aw * b;
                 let after = &mut arrow.blocks[k + 1];
                 after.own += w;
                 after.gradient += wd;
-                let mut right = after.border.columns_mut(0, self.common);
+                let mut right = after.shared.columns_mut(0, self.common);
                 right -= w * b;
             }
         }
         arrow
     }
 
-    /// The border's step: the minimiser of the quadratic model with the bounds kept (active set).
-    pub(super) fn border_step(&self, point: &Point, done: &Eliminated) -> Option<DVector<f64>> {
-        let g = self.border;
+    /// The step of the shared parameters: the minimiser of the quadratic model with the bounds kept (active set).
+    pub(super) fn shared_step(&self, point: &Point, done: &Eliminated) -> Option<DVector<f64>> {
+        let g = self.shared;
         let mut fixed: Vec<Option<f64>> = vec![None; g];
         for _ in 0..=g {
             let free: Vec<usize> = (0..g).filter(|&i| fixed[i].is_none()).collect();
@@ -209,10 +209,10 @@ impl Problem<'_> {
             out.damping = *damping;
             let found = arrow
                 .eliminate(*damping)
-                .and_then(|done| self.border_step(point, &done).map(|border| (done.states(&border), border)));
-            if let Some((states, border)) = found {
-                let promised = -0.5 * arrow.slope(&states, &border);
-                let next = self.moved(point, &border, &states);
+                .and_then(|done| self.shared_step(point, &done).map(|shared| (done.states(&shared), shared)));
+            if let Some((states, shared)) = found {
+                let promised = -0.5 * arrow.slope(&states, &shared);
+                let next = self.moved(point, &shared, &states);
                 let gain = cost - self.cost(&next, weight);
                 if gain >= -1e-12 * cost {
                     *damping = if *damping < 1e-9 { 0.0 } else { *damping * 0.1 };
@@ -228,22 +228,22 @@ impl Problem<'_> {
         out
     }
 
-    pub(super) fn moved(&self, point: &Point, border: &DVector<f64>, states: &[Vector4<f64>]) -> Point {
+    pub(super) fn moved(&self, point: &Point, shared: &DVector<f64>, states: &[Vector4<f64>]) -> Point {
         let mut next = point.clone();
         for (i, field) in self.settings.free.iter().enumerate() {
-            let mut value = point.parameters.get(*field) + border[i];
+            let mut value = point.parameters.get(*field) + shared[i];
             if self.settings.bounded.contains(field) {
                 value = value.max(0.0);
             }
             next.parameters.set(*field, value);
         }
         if self.settings.clock {
-            next.stretch += border[self.settings.free.len()];
+            next.clock_scale += shared[self.settings.free.len()];
         }
         if self.settings.zeros {
             for (r, zeros) in next.zeros_rad.iter_mut().enumerate() {
-                zeros[0] += border[self.common + 2 * r];
-                zeros[1] += border[self.common + 2 * r + 1];
+                zeros[0] += shared[self.common + 2 * r];
+                zeros[1] += shared[self.common + 2 * r + 1];
             }
         }
         for (x, dx) in next.states.iter_mut().zip(states) {

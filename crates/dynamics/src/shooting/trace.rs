@@ -46,7 +46,7 @@ pub fn trace(recordings: &[Recording<'_>], segments: &[Segment], point: &Point) 
         };
         let mut out = Trace::default();
         let p = &point.parameters;
-        follow(p, point.states[k], &span, point.stretch, true, |n, x| {
+        follow(p, point.states[k], &span, point.clock_scale, true, |n, x| {
             let sign = [x[2], x[3] - x[2]].map(f64::signum);
             let motion = accelerations(p, x, sign.map(Contact::Slip));
             out.recording.push(segment.recording);

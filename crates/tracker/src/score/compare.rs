@@ -6,6 +6,58 @@ use super::result::{AngleError, FULL, HALF, Match, Reacquisition, Score, Tracked
 use crate::error::{Error, Fault, Result};
 use crate::synth::Truth;
 
+/// Wrong identities that are named in a [`Score`].
+const FIRST_WRONG: usize = 10;
+
+/// What became of the nodes' identities.
+#[derive(Default)]
+struct Identities {
+    wrong: u64,
+    switches: u64,
+    false_positives: u64,
+    first_wrong: Vec<(u64, String, String)>,
+}
+
+/// Sums over the errors of places.
+#[derive(Default)]
+struct Errors {
+    count: u64,
+    sum_px: [f64; 2],
+    squares_px2: [f64; 2],
+    /// Squared errors over their variances, and how many coordinates.
+    over_variance: f64,
+    with_sigma: u64,
+}
+
+impl Errors {
+    fn add(&mut self, error_px: [f64; 2], sigma_px: Option<f64>) {
+        self.count += 1;
+        for (axis, error) in error_px.into_iter().enumerate() {
+            self.sum_px[axis] += error;
+            self.squares_px2[axis] += error * error;
+        }
+        if let Some(sigma) = sigma_px.filter(|s| s.is_finite() && *s > 0.0) {
+            self.over_variance += (error_px[0] * error_px[0] + error_px[1] * error_px[1]) / (sigma * sigma);
+            self.with_sigma += 2;
+        }
+    }
+
+    /// Root mean square error of an axis, px; NaN without errors.
+    fn rms_px(&self, axis: usize) -> f64 {
+        if self.count > 0 { (self.squares_px2[axis] / self.count as f64).sqrt() } else { f64::NAN }
+    }
+
+    /// Mean error of an axis, px; NaN without errors.
+    fn bias_px(&self, axis: usize) -> f64 {
+        if self.count > 0 { self.sum_px[axis] / self.count as f64 } else { f64::NAN }
+    }
+
+    /// Root mean square of error over stated uncertainty; `None` where none is stated.
+    fn over_sigma(&self) -> Option<f64> {
+        (self.with_sigma > 0).then(|| (self.over_variance / self.with_sigma as f64).sqrt())
+    }
+}
+
 /// A table and a truth, frame by frame.
 pub(super) struct Comparison<'a> {
     pub(super) tracked: &'a Tracked,
@@ -59,102 +111,104 @@ impl Comparison<'_> {
     }
 
     pub(super) fn score(&self) -> Result<Score> {
-        let (n, m) = (self.tracked.nodes.len(), self.truth.nodes.len());
+        let m = self.truth.nodes.len();
         let of = self.consensus();
         let node_of: Vec<Option<usize>> = (0..m).map(|j| of.iter().position(|o| *o == Some(j))).collect();
-        let mut s = Score {
+        let per_marker = self.coverage(&node_of);
+        let identities = self.identities(&of);
+        let errors = self.errors(&of);
+        let name = |j: usize| self.truth.nodes[j].0.clone();
+        let (visible_rows, covered_rows) =
+            (per_marker.iter().map(|c| c[0]).sum(), per_marker.iter().map(|c| c[1]).sum());
+        Ok(Score {
             frames: self.rows.len() as u64,
             frames_missing: (self.truth.frames.len() - self.rows.len()) as u64,
-            matches: Vec::new(),
-            unmatched: (0..m)
-                .filter(|&j| node_of[j].is_none())
-                .map(|j| self.truth.nodes[j].0.clone())
+            matches: (self.tracked.nodes.iter().zip(&of))
+                .map(|(node, of)| Match {
+                    node: node.clone(),
+                    truth: of.map(name),
+                    coverage: of.map_or(0.0, |j| part(per_marker[j][1], per_marker[j][0])),
+                })
                 .collect(),
-            visible_rows: 0,
-            covered_rows: 0,
-            coverage: 1.0,
-            wrong: 0,
-            switches: 0,
-            false_positives: 0,
-            reacquisition: Reacquisition::default(),
-            rms_x_px: f64::NAN,
-            rms_y_px: f64::NAN,
-            bias_px: [f64::NAN; 2],
-            error_over_sigma: None,
-            angles: Vec::new(),
-            first_wrong: Vec::new(),
-        };
-        let mut per_marker = vec![[0u64; 2]; m];
-        let (mut sum, mut squares, mut count) = ([0.0; 2], [0.0; 2], 0u64);
-        let (mut ratios, mut ratio_count) = (0.0, 0u64);
-        let mut at: Vec<Option<usize>> = vec![None; n];
+            unmatched: (0..m).filter(|&j| node_of[j].is_none()).map(name).collect(),
+            visible_rows,
+            covered_rows,
+            coverage: part(covered_rows, visible_rows),
+            wrong: identities.wrong,
+            switches: identities.switches,
+            false_positives: identities.false_positives,
+            first_wrong: identities.first_wrong,
+            reacquisition: self.reacquisition(&node_of),
+            rms_x_px: errors.rms_px(0),
+            rms_y_px: errors.rms_px(1),
+            bias_px: [errors.bias_px(0), errors.bias_px(1)],
+            error_over_sigma: errors.over_sigma(),
+            angles: self.angles(&node_of),
+        })
+    }
+
+    /// For each marker the rows in which it is at least half visible, and those of them in which its node agrees.
+    fn coverage(&self, node_of: &[Option<usize>]) -> Vec<[u64; 2]> {
+        let mut out = vec![[0u64; 2]; node_of.len()];
         for &(row, t) in &self.rows {
-            for j in 0..m {
+            for (j, count) in out.iter_mut().enumerate() {
                 if self.visible(t, j) >= HALF {
-                    per_marker[j][0] += 1;
+                    count[0] += 1;
                     let seen = node_of[j].and_then(|i| self.place(row, i));
-                    per_marker[j][1] += u64::from(seen.is_some_and(|p| self.agrees(p, t, j)));
+                    count[1] += u64::from(seen.is_some_and(|p| self.agrees(p, t, j)));
                 }
             }
-            for i in 0..n {
+        }
+        out
+    }
+
+    /// The marker at a place in a row of the truth: the node's `own` if it agrees, since two markers may be within the limit
+    /// of each other.
+    fn marker_at(&self, p: [f64; 2], t: usize, own: Option<usize>) -> Option<usize> {
+        let agrees = |j: usize| self.visible(t, j) > 0.0 && self.agrees(p, t, j);
+        own.filter(|&j| agrees(j)).or_else(|| (0..self.truth.nodes.len()).find(|&j| agrees(j)))
+    }
+
+    /// Which marker each node was at, row by row: wrong ones, changes, none.
+    fn identities(&self, of: &[Option<usize>]) -> Identities {
+        let mut out = Identities::default();
+        let mut at: Vec<Option<usize>> = vec![None; of.len()];
+        for &(row, t) in &self.rows {
+            for (i, &own) in of.iter().enumerate() {
                 let Some(p) = self.place(row, i) else { continue };
-                // Its own marker first: two markers may be within the limit of each other.
-                let own = of[i].filter(|&j| self.agrees(p, t, j) && self.visible(t, j) > 0.0);
-                let here = own.or_else(|| (0..m).find(|&j| self.visible(t, j) > 0.0 && self.agrees(p, t, j)));
-                let Some(j) = here else {
-                    s.false_positives += 1;
+                let Some(j) = self.marker_at(p, t, own) else {
+                    out.false_positives += 1;
                     continue;
                 };
-                if own.is_none() {
-                    s.wrong += 1;
-                    if s.first_wrong.len() < 10 {
-                        s.first_wrong.push((
-                            self.truth.frames[t].frame,
-                            self.tracked.nodes[i].clone(),
-                            self.truth.nodes[j].0.clone(),
-                        ));
+                if own != Some(j) {
+                    out.wrong += 1;
+                    if out.first_wrong.len() < FIRST_WRONG {
+                        let frame = self.truth.frames[t].frame;
+                        let node = self.tracked.nodes[i].clone();
+                        out.first_wrong.push((frame, node, self.truth.nodes[j].0.clone()));
                     }
                 }
-                s.switches += u64::from(at[i].is_some_and(|before| before != j));
+                out.switches += u64::from(at[i].is_some_and(|before| before != j));
                 at[i] = Some(j);
-                if own.is_some() && self.visible(t, j) >= FULL {
+            }
+        }
+        out
+    }
+
+    /// Errors of the places of fully visible markers at which their own nodes are.
+    fn errors(&self, of: &[Option<usize>]) -> Errors {
+        let mut out = Errors::default();
+        for &(row, t) in &self.rows {
+            for (i, &own) in of.iter().enumerate() {
+                let Some((p, j)) = self.place(row, i).zip(own) else { continue };
+                if self.visible(t, j) >= FULL && self.agrees(p, t, j) {
                     let mark = &self.truth.frames[t].nodes[j];
-                    let e = [p[0] - mark.x_px, p[1] - mark.y_px];
-                    count += 1;
-                    for axis in 0..2 {
-                        sum[axis] += e[axis];
-                        squares[axis] += e[axis] * e[axis];
-                    }
-                    if let Some(&sigma) = self.tracked.sigma_px.get(row * n + i) {
-                        let sigma = f64::from(sigma);
-                        if sigma.is_finite() && sigma > 0.0 {
-                            ratios += (e[0] * e[0] + e[1] * e[1]) / (sigma * sigma);
-                            ratio_count += 2;
-                        }
-                    }
+                    let sigma = self.tracked.sigma_px.get(row * of.len() + i);
+                    out.add([p[0] - mark.x_px, p[1] - mark.y_px], sigma.map(|s| f64::from(*s)));
                 }
             }
         }
-        for (i, node) in self.tracked.nodes.iter().enumerate() {
-            s.matches.push(Match {
-                node: node.clone(),
-                truth: of[i].map(|j| self.truth.nodes[j].0.clone()),
-                coverage: of[i].map_or(0.0, |j| part(per_marker[j][1], per_marker[j][0])),
-            });
-        }
-        s.visible_rows = per_marker.iter().map(|c| c[0]).sum();
-        s.covered_rows = per_marker.iter().map(|c| c[1]).sum();
-        s.coverage = part(s.covered_rows, s.visible_rows);
-        if count > 0 {
-            let c = count as f64;
-            s.rms_x_px = (squares[0] / c).sqrt();
-            s.rms_y_px = (squares[1] / c).sqrt();
-            s.bias_px = [sum[0] / c, sum[1] / c];
-        }
-        s.error_over_sigma = (ratio_count > 0).then(|| (ratios / ratio_count as f64).sqrt());
-        s.reacquisition = self.reacquisition(&node_of);
-        s.angles = self.angles(&node_of);
-        Ok(s)
+        out
     }
 
     fn reacquisition(&self, node_of: &[Option<usize>]) -> Reacquisition {

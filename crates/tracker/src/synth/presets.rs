@@ -87,18 +87,14 @@ pub fn preset(name: &str, seed: u64) -> Result<Scene> {
                 .advice(format!("Choose one of {}", PRESETS.join(", "))),
         ));
     }
-    // A little arithmetic on the seed spreads what differs between seeds; the rest is drawn inside the film.
-    let part = |k: u64| {
-        let mut z = (seed ^ (k << 32)).wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(k);
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    };
     let (mut links, markers) = paper_layout([360.0, 360.0], 6.0, 200.0, 24.0);
     links[0].motion =
-        Some(LinkMotion::Tumble { phi_rad: 6.0 * (part(1) - 0.5), rate_rad_s: 7.0, frequency_hz: 2.0 });
-    links[1].motion =
-        Some(LinkMotion::Tumble { phi_rad: 6.0 * (part(2) - 0.5), rate_rad_s: 14.0, frequency_hz: 3.0 });
+        Some(LinkMotion::Tumble { phi_rad: 6.0 * (part(seed, 1) - 0.5), rate_rad_s: 7.0, frequency_hz: 2.0 });
+    links[1].motion = Some(LinkMotion::Tumble {
+        phi_rad: 6.0 * (part(seed, 2) - 0.5),
+        rate_rad_s: 14.0,
+        frequency_hz: 3.0,
+    });
     let mut s = Scene {
         schema: SCENE_SCHEMA,
         image_px: [720, 720],
@@ -117,20 +113,38 @@ pub fn preset(name: &str, seed: u64) -> Result<Scene> {
         hidden: Vec::new(),
         dropouts: Vec::new(),
     };
+    harm(&mut s, name);
+    s.check(name)?;
+    Ok(s)
+}
+
+/// A number from 0 to 1 for purpose `k`: a little arithmetic on the seed spreads what differs between seeds; the rest is drawn
+/// inside the film.
+fn part(seed: u64, k: u64) -> f64 {
+    let mut z = (seed ^ (k << 32)).wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(k);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+}
+
+/// Adds to a clean scene what is hard about the scene `name`.
+fn harm(s: &mut Scene, name: &str) {
+    let seed = s.seed;
+    let part = |k: u64| part(seed, k);
     let levels = |s: &mut Scene, marker: f64, bar: f64| {
         s.markers.iter_mut().for_each(|m| m.level = marker);
         s.links.iter_mut().for_each(|l| l.level = bar);
     };
     match name {
         "noisy" => {
-            levels(&mut s, 130.0, 24.0);
+            levels(s, 130.0, 24.0);
             s.camera.read_noise = 9.0;
             s.camera.shot_gain = 0.3;
             s.camera.black = 16.0;
             s.light.background_gradient = [8.0, -4.0];
         }
         "dim" => {
-            levels(&mut s, 34.0, 12.0);
+            levels(s, 34.0, 12.0);
             s.camera.read_noise = 5.0;
             s.camera.black = 16.0;
             s.light.background = 6.0;
@@ -145,7 +159,7 @@ pub fn preset(name: &str, seed: u64) -> Result<Scene> {
                 level: [80.0, 240.0],
             });
             // One link twice as bright as the other, and light that falls off across the image.
-            levels(&mut s, 110.0, 16.0);
+            levels(s, 110.0, 16.0);
             s.links[1].light = 2.0;
             s.light.uneven = [0.3, -0.2];
         }
@@ -182,8 +196,6 @@ pub fn preset(name: &str, seed: u64) -> Result<Scene> {
         "fast" => s.rate_hz = 250.0,
         _ => {}
     }
-    s.check(name)?;
-    Ok(s)
 }
 
 #[cfg(test)]

@@ -72,37 +72,16 @@ impl NorpixSource {
         }
         .map_err(unreadable)?;
         if pictures.is_empty() {
+            let problem = format!(
+                "not one whole picture: the file has {size} bytes, and pictures begin at {}",
+                header.start
+            );
             return Err(Error::Source(
-                Fault::new(
-                    name,
-                    format!(
-                        "not one whole picture: the file has {size} bytes, and pictures begin at {}",
-                        header.start
-                    ),
-                )
-                .at(Place::Byte(header.start))
-                .advice("Copy the recording again"),
+                Fault::new(name, problem).at(Place::Byte(header.start)).advice("Copy the recording again"),
             ));
         }
         let mut warnings = Vec::new();
-        let taken = |pictures: &[Recorded]| pictures.iter().map(|p| p.taken_us).collect::<Vec<u64>>();
-        let oldest = times::oldest(&taken(&pictures));
-        if oldest > 0 {
-            pictures.rotate_left(oldest);
-            warnings.push(format!("recorded in a ring: by the time stamps picture {oldest} of the file is the oldest; pictures are read from there on").into());
-        }
-        let tick_us = if header.has_microseconds { 1 } else { 1000 };
-        let times = match options.fps {
-            Some(fps) => times::Times {
-                time_base: clock::time_base(fps)?,
-                rate_hz: Some(fps),
-                rate_origin: RateOrigin::User,
-                ticks: None,
-                warnings: Vec::new(),
-            },
-            None => times::times(&taken(&pictures), tick_us, header.rate_hz)?,
-        };
-        warnings.extend(times.warnings);
+        let times = timed(&header, &mut pictures, options, &mut warnings)?;
         if header.mosaic {
             warnings.push("the sensor has a colour mosaic; its samples are taken as brightness".into());
         }
@@ -112,7 +91,15 @@ impl NorpixSource {
             Form::Jpeg => Stored::Plain,
         };
         let (pixel_aspect, pixel_aspect_origin) = options.aspect(PixelAspect::SQUARE);
-        let mut info = SourceInfo {
+        let file = RawFrames::new(file, name, stored);
+        let (format, depth_bits, converted_from) = match header.form {
+            Form::Raw { format, depth_bits, .. } => {
+                let coloured = matches!(stored, Stored::Colour { .. });
+                (format, depth_bits, coloured.then(|| "colours of 8 bit".to_owned()))
+            }
+            Form::Jpeg => (PixelFormat::Gray8, 8, converted_from(&file, &pictures)),
+        };
+        let info = SourceInfo {
             name: name.to_owned(),
             container: "NorPix sequence".into(),
             codec: codec(&header),
@@ -120,34 +107,18 @@ impl NorpixSource {
             height: header.height,
             pixel_aspect,
             pixel_aspect_origin,
-            format: PixelFormat::Gray8,
-            depth_bits: 8,
+            format,
+            depth_bits,
             declared_frames: (header.declared > 0).then_some(header.declared),
             time_base: times.time_base,
             rate_hz: times.rate_hz,
             rate_origin: times.rate_origin,
             claims: RateClaims::default(),
-            converted_from: None,
+            converted_from,
             size_bytes: Some(size),
             details: details(&header),
             warnings,
         };
-        let file = RawFrames::new(file, name, stored);
-        match header.form {
-            Form::Raw { format, depth_bits, .. } => {
-                (info.format, info.depth_bits) = (format, depth_bits);
-                info.converted_from =
-                    matches!(stored, Stored::Colour { .. }).then(|| "colours of 8 bit".to_owned());
-            }
-            Form::Jpeg => {
-                // The first that can be decoded says whether there are colours.
-                let first = pictures.iter().take(AHEAD).find_map(|p| {
-                    let bytes = file.copy(0, p.at, p.length).ok()?;
-                    picture_file::decode(bytes.bytes()).ok()
-                });
-                info.converted_from = first.and_then(|p| p.converted_from);
-            }
-        }
         Ok(Self {
             info,
             form: header.form,
@@ -186,6 +157,43 @@ impl NorpixSource {
             picture_file::decode(bytes.bytes()).ok().filter(|p| (p.width, p.height, p.depth_bits) == size);
         Ok(self.frame(index, self.info.width as usize, picture.map(|p| Box::new(p.samples) as _)))
     }
+}
+
+/// The times of the pictures, which are put into the order in which they were taken.
+fn timed(
+    header: &Header,
+    pictures: &mut [Recorded],
+    options: &OpenOptions,
+    warnings: &mut Vec<Message>,
+) -> Result<times::Times> {
+    let taken = |pictures: &[Recorded]| pictures.iter().map(|p| p.taken_us).collect::<Vec<u64>>();
+    let oldest = times::oldest(&taken(pictures));
+    if oldest > 0 {
+        pictures.rotate_left(oldest);
+        warnings.push(format!("recorded in a ring: by the time stamps picture {oldest} of the file is the oldest; pictures are read from there on").into());
+    }
+    let tick_us = if header.has_microseconds { 1 } else { 1000 };
+    let mut times = match options.fps {
+        Some(fps) => times::Times {
+            time_base: clock::time_base(fps)?,
+            rate_hz: Some(fps),
+            rate_origin: RateOrigin::User,
+            ticks: None,
+            warnings: Vec::new(),
+        },
+        None => times::times(&taken(pictures), tick_us, header.rate_hz)?,
+    };
+    warnings.append(&mut times.warnings);
+    Ok(times)
+}
+
+/// What JPEG pictures were before they were made brightness: the first that can be decoded says whether there are colours.
+fn converted_from(file: &RawFrames, pictures: &[Recorded]) -> Option<String> {
+    let first = pictures.iter().take(AHEAD).find_map(|p| {
+        let bytes = file.copy(0, p.at, p.length).ok()?;
+        picture_file::decode(bytes.bytes()).ok()
+    });
+    first?.converted_from
 }
 
 /// Pictures of equal size, with their times behind them.
