@@ -20,9 +20,9 @@ mod sample;
 mod slots;
 mod stamps;
 mod structure;
+mod words;
 
 use std::collections::VecDeque;
-use std::ffi::CStr;
 use std::sync::Arc;
 
 use ffmpeg_next::ffi;
@@ -38,26 +38,12 @@ use lost::Lost;
 use order::{Order, Sent};
 use stamps::Stamps;
 pub(crate) use stamps::display_times;
+use words::{codec_name, message};
 
 use super::{Input, Interlaced, OpenOptions};
 use crate::error::{Error, Fault, Result};
 use crate::frame::{Bytes, Ending, Frame, FrameSource, SourceInfo};
 use crate::gaps::Gaps;
-
-/// FFmpeg's words for an error code.
-fn message(code: i32) -> String {
-    // The binding knows FFmpeg's words only once it has been started; starting it again does nothing more.
-    match ffmpeg_next::init() {
-        Ok(()) => ffmpeg_next::Error::from(code).to_string(),
-        Err(e) => format!("FFmpeg's error {code}; {e}"),
-    }
-}
-
-/// FFmpeg's name of a codec.
-fn codec_name(id: ffi::AVCodecID) -> String {
-    // SAFETY: the call gives a static string for any value.
-    unsafe { CStr::from_ptr(ffi::avcodec_get_name(id)) }.to_string_lossy().into_owned()
-}
 
 /// A frame on its way out: its time, and its plane with the bytes of a row.
 struct Ready {
