@@ -27,7 +27,7 @@ pub mod pipeline;
 pub mod pixel_aspect;
 pub mod residual;
 pub mod rig;
-pub mod rigid;
+pub(crate) mod rigid;
 pub mod score;
 pub mod setup;
 pub mod source;

@@ -1,14 +1,26 @@
 //! The tracker's pure parsers, for fuzzing.
 
-#![allow(dead_code, missing_docs)]
+#![allow(dead_code, missing_docs, unused_imports)]
 
 #[path = "../../src/error.rs"]
 pub mod error;
 #[path = "../../src/frame.rs"]
 pub mod frame;
+#[path = "../../src/gaps.rs"]
+pub mod gaps;
+#[path = "../../src/kind.rs"]
+pub mod kind;
 #[path = "../../src/message.rs"]
 pub mod message;
+#[path = "../../src/name.rs"]
+pub mod name;
+#[path = "../../src/output.rs"]
+pub mod output;
+#[path = "../../src/pixel_aspect.rs"]
+pub mod pixel_aspect;
 #[path = "../../src/rig.rs"]
 pub mod rig;
+#[path = "../../src/timing/mod.rs"]
+pub mod timing;
 
 pub mod source;

@@ -2,7 +2,7 @@
 //!
 //! Owns: [`discover`], [`Discovery`]. Must not: name markers frame by frame (`track` does), or look at pixels.
 
-pub mod advice;
+pub(crate) mod advice;
 mod arrange;
 mod bodies;
 mod circle;
@@ -10,6 +10,6 @@ mod find;
 mod lone;
 mod median;
 mod sample;
-pub mod signature;
+mod signature;
 
 pub use find::{Discovery, discover};

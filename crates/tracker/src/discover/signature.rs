@@ -1,9 +1,8 @@
-//! The nearest-neighbour matrix and its columns, the paper's signatures (Section 8.2).
+//! Compares the columns of the nearest-neighbour matrix, the paper's signatures (Section 8.2).
 //!
-//! Owns: [`Signatures`], [`Named`]. Must not: know of poses; it compares distances only.
+//! Owns: [`Signatures`]. Must not: know of poses; it compares distances only.
 //!
-//! A node's signature is the list of its distances to the other nodes of its body, nearest first. While a node is
-//! missing, every reference to it is masked.
+//! A node's signature is the list of its distances to the other nodes of its body, nearest first.
 
 use nalgebra::Vector2;
 
@@ -12,17 +11,6 @@ use nalgebra::Vector2;
 pub struct Signatures {
     /// For each node the others, nearest first, with their distances in px.
     columns: Vec<Vec<(usize, f64)>>,
-}
-
-/// What a masked comparison says of a detection that appeared.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Named {
-    /// It is this node.
-    Node(usize),
-    /// Two missing nodes at least would fit: left open.
-    Open,
-    /// It is none of the missing nodes.
-    None,
 }
 
 impl Signatures {
@@ -39,36 +27,6 @@ impl Signatures {
             })
             .collect();
         Self { columns }
-    }
-
-    /// The nodes of a column, nearest first, those that are missing masked by `None`.
-    pub fn masked(&self, node: usize, seen: &[Option<Vector2<f64>>]) -> Vec<Option<usize>> {
-        self.columns[node].iter().map(|&(j, _)| seen[j].map(|_| j)).collect()
-    }
-
-    /// Compares a detection with the masked signatures of the missing nodes: it is the one whose distances to
-    /// the nodes seen it has, each within `reach_px`. At least two nodes must be seen.
-    pub fn name(&self, place: Vector2<f64>, seen: &[Option<Vector2<f64>>], reach_px: f64) -> Named {
-        let mut fits = None;
-        for (node, column) in self.columns.iter().enumerate() {
-            if seen[node].is_some() {
-                continue;
-            }
-            let mut compared = 0;
-            let agrees = column.iter().all(|&(j, distance)| {
-                seen[j].is_none_or(|p| {
-                    compared += 1;
-                    ((p - place).norm() - distance).abs() <= reach_px
-                })
-            });
-            if agrees && compared >= 2 {
-                if fits.is_some() {
-                    return Named::Open;
-                }
-                fits = Some(node);
-            }
-        }
-        fits.map_or(Named::None, Named::Node)
     }
 
     /// Pairs of nodes whose whole signatures agree within `reach_px`: with both missing, nothing but motion tells
@@ -100,25 +58,10 @@ mod tests {
     }
 
     #[test]
-    fn a_returning_node_is_named_with_others_masked() {
-        let places = layout();
-        let s = Signatures::new(&places);
-        let mut seen: Vec<_> = places.iter().map(|&p| Some(p)).collect();
-        seen[1] = None;
-        seen[3] = None;
-        assert_eq!(s.masked(0, &seen), [None, Some(2), None]);
-        assert_eq!(s.name(Vector2::new(30.1, 5.1), &seen, 0.5), Named::Node(1));
-        assert_eq!(s.name(Vector2::new(109.9, 4.0), &seen, 0.5), Named::Node(3));
-        assert_eq!(s.name(Vector2::new(50.0, 50.0), &seen, 0.5), Named::None);
-    }
-
-    #[test]
-    fn a_mirror_image_is_left_open() {
+    fn nodes_that_are_mirror_images_are_alike() {
         // Nodes 2 and 3 are mirror images about the line through 0 and 1.
         let places = [[0.0, 0.0], [100.0, 0.0], [40.0, 30.0], [40.0, -30.0]].map(Vector2::from);
         let s = Signatures::new(&places);
-        let seen = [Some(places[0]), Some(places[1]), None, None];
-        assert_eq!(s.name(places[2], &seen, 0.5), Named::Open);
         assert_eq!(s.alike(1.0), [(2, 3)]);
         assert!(Signatures::new(&layout()).alike(1.0).is_empty());
     }

@@ -63,11 +63,6 @@ impl Motion {
         Self { past, ..Self::default() }
     }
 
-    /// Whether no pose is known.
-    pub fn is_empty(&self) -> bool {
-        self.past.is_empty()
-    }
-
     /// Time of the newest pose, frames.
     pub fn newest(&self) -> Option<f64> {
         self.past.last().map(|p| p.0)
@@ -96,11 +91,6 @@ impl Motion {
     /// How many poses carry the prediction.
     pub fn depth(&self) -> usize {
         self.past.len()
-    }
-
-    /// The newest unwrapped angle, rad.
-    pub fn angle_rad(&self) -> Option<f64> {
-        self.past.last().map(|p| p.1)
     }
 
     /// Polynomial through the past poses at `time`.

@@ -111,32 +111,6 @@ impl<'a> DetectionIndex<'a> {
     }
 }
 
-/// For each place the detection that is its nearest within the place's gate and whose nearest place it is in
-/// turn (mutual nearest neighbours); `None` for a place without one.
-pub fn mutual(
-    index: &DetectionIndex<'_>,
-    places: &[(Vector2<f64>, f64)],
-    free: &dyn Fn(usize) -> bool,
-) -> Vec<Option<usize>> {
-    // The place that a detection is nearest to, of those that chose it.
-    let mut owner: Vec<Option<(usize, f64)>> = vec![None; index.len()];
-    for (k, &(place, gate)) in places.iter().enumerate() {
-        if let Some((d, distance)) = index.nearest(place, gate)
-            && free(d)
-            && owner[d].is_none_or(|(_, best)| distance < best)
-        {
-            owner[d] = Some((k, distance));
-        }
-    }
-    let mut out = vec![None; places.len()];
-    for (d, own) in owner.iter().enumerate() {
-        if let Some((k, _)) = own {
-            out[*k] = Some(d);
-        }
-    }
-    out
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -161,14 +135,5 @@ mod tests {
             straight.within(place, 11.0, &mut b);
             assert_eq!(a, b);
         }
-    }
-
-    #[test]
-    fn two_places_do_not_share_a_detection() {
-        let seen = [at(10.0, 10.0), at(30.0, 10.0)];
-        let index = DetectionIndex::new(&seen);
-        let places = [(Vector2::new(11.0, 10.0), 20.0), (Vector2::new(14.0, 10.0), 20.0)];
-        // Both are nearest to the first detection; only the nearer of them gets it.
-        assert_eq!(mutual(&index, &places, &|_| true), [Some(0), None]);
     }
 }

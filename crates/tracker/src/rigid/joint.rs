@@ -50,11 +50,6 @@ impl Shared {
         self.count += 1;
     }
 
-    /// Frames added.
-    pub fn count(&self) -> usize {
-        self.count
-    }
-
     /// The joint, if the bodies turned against each other by enough to tell it: the least eigenvalue of the
     /// normal matrix per frame is the spread of the relative direction, 0.003 for some 6 degrees.
     pub fn solve(&self) -> Option<Turning> {

@@ -2,15 +2,15 @@
 //!
 //! Owns: [`open`], [`OpenOptions`], [`Decoder`]. Must not: look at what is in a picture.
 
-pub mod cine;
-pub mod clock;
-pub mod ffmpeg;
-pub mod images;
+mod cine;
+mod clock;
+mod ffmpeg;
+mod images;
 mod input;
-pub mod mraw;
-pub mod norpix;
+mod mraw;
+mod norpix;
 mod open;
-pub mod opencv;
+mod opencv;
 mod options;
 mod raw;
 

@@ -13,12 +13,12 @@
 
 mod camera_raw;
 mod canvas;
-pub mod coverage;
+mod coverage;
 pub mod encode;
 mod film;
 mod motion;
 mod motion_file;
-pub mod noise;
+mod noise;
 mod presets;
 mod render;
 pub mod scene;

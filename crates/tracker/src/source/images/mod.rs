@@ -12,6 +12,5 @@ mod stack;
 mod tiff_layout;
 mod tiff_page;
 
-pub use picture::Picture;
 pub use sequence::SequenceSource;
 pub use stack::StackSource;
