@@ -68,7 +68,7 @@ def test_a_fit_of_two_recordings_writes_everything(folder: Path) -> None:
     assert set(fit["prediction"]) == {"0.5", "1", "2"}
     # Each of the paper's laws made these data; drag of the upper link shows most.
     assert set(fit["terms"]) == set(fit["coefficients"])
-    assert fit["terms"]["mu_q1"]["verdict"] == "asked for"
+    assert fit["terms"]["mu_q1"]["verdict"] == "asked_for"
     said = (folder / "said.txt").read_text()
     assert "mu_q1" in said
     assert "chi-square" in said

@@ -136,8 +136,8 @@ def test_terms_that_made_the_data_are_asked_for_and_others_rejected() -> None:
     recording = prepare(measured(released(3, 12.0, 500.0, truth), 3, 0.05), MODEL)
     terms = {t.name: t for t in compare_terms([recording], MODEL, ("mu_q1", "mu_q2", "tau_c1", "strip_drag"))}
     for name in ("mu_q1", "mu_q2", "tau_c1"):
-        assert terms[name].verdict == "asked for", terms[name].sentence
-    assert terms["strip_drag"].verdict != "asked for", terms["strip_drag"].sentence
+        assert terms[name].verdict == "asked_for", terms[name].sentence
+    assert terms["strip_drag"].verdict != "asked_for", terms["strip_drag"].sentence
 
 
 def test_profile_of_a_coefficient_inside_its_bounds_is_its_standard_error() -> None:

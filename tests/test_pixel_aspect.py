@@ -73,7 +73,7 @@ def squeezed(tmp_path_factory: pytest.TempPathFactory) -> Squeezed:
 
 
 def errors(nodes: dp.Nodes, truth: dp.Truth) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Errors of the angles (T, 2), rad, and over their stated sigmas; the zero is the truth of the reference picture."""
+    """Errors of the angles (T, 2), rad, and over their stated sigmas; the zero is the reference picture's truth."""
     reference = nodes.rig.reference_frame
     assert reference is not None
     found = dp.angles(nodes, zero=[float(v) for v in truth.phi_rad[reference]])

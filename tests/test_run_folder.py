@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from pydpend.analyse import Options, analyse
 from pydpend.analyse.contents import about, made_by
-from pydpend.analyse.folder import RunFolder, RunFolderError
+from pydpend.analyse.folder import RUN_SCHEMA, RunFolder, RunFolderError
 from pydpend.cli import main
 from pydpend.errors import PydpendError
 from pydpend.plots.folder import FigureError, chosen
@@ -62,7 +62,7 @@ def test_names_that_no_stage_makes_are_refused(tmp_path: Path, name: str) -> Non
     for stage in ("drop/angles", "../drop/angles", "fit"):
         if stage == "fit" and name.startswith("fit/") and ".." not in name:
             continue
-        record = {"schema": 3, "facts": {}, "stages": {stage: done}, "begun": {}}
+        record = {"schema": RUN_SCHEMA, "facts": {}, "stages": {stage: done}, "begun": {}}
         (folder / "run.json").write_text(json.dumps(record))
         with pytest.raises(RunFolderError, match="is no file that this stage makes") as caught:
             RunFolder.open(folder)
@@ -78,7 +78,7 @@ def test_a_folder_that_is_a_link_is_refused(tmp_path: Path, which: str) -> None:
     (elsewhere / "angles.json").write_text("mine")
     (folder / which).symlink_to(elsewhere)
     done = {"key": "", "files": {"drop/angles.json": ""}, "message": "", "seconds": 1.0}
-    record = {"schema": 3, "facts": {}, "stages": {"drop/angles": done}, "begun": {}}
+    record = {"schema": RUN_SCHEMA, "facts": {}, "stages": {"drop/angles": done}, "begun": {}}
     (folder / "run.json").write_text(json.dumps(record))
     with pytest.raises(RunFolderError, match="is a link to another place"):
         RunFolder.open(folder)
@@ -137,7 +137,7 @@ def test_an_odd_record_is_one_line(
 ) -> None:
     change, message = ODD[kind]
     done = {"key": "", "files": {}, "message": "", "seconds": 1.0}
-    record = {"schema": 3, "facts": {}, "stages": {"drop/angles": done}, "begun": {}}
+    record = {"schema": RUN_SCHEMA, "facts": {}, "stages": {"drop/angles": done}, "begun": {}}
     (tmp_path / "run.json").write_text(json.dumps(change(record)))
     assert main(["analyse", *demo_options.inputs, "-o", str(tmp_path)]) == 2
     said = capsys.readouterr().err

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from pydpend import _tracker
 from pydpend.coefficients import coefficients, parameters
 from pydpend.errors import FitError, Setting, fault
+from pydpend.fit_status import FitStatus
 from pydpend.information import check_errors, invert, undetermined
 from pydpend.model import Model
 
@@ -78,7 +79,7 @@ class EnergyFit:
     """Energy at the start of each profile, (R,)."""
     residual_j: Floats
     """Model minus measured, (T,), profiles one after the other."""
-    status: str
+    status: FitStatus
     message: str
     chi2: float = float("nan")
     """Mean squared residual over standard error, where the energies have one."""
@@ -185,7 +186,7 @@ def fit_profiles(profiles: Sequence[EnergyProfile], *, bounded: bool = True) -> 
         covariance[:laws, :laws],
         x[laws:],
         residual,
-        "converged" if result.success else "iteration_limit",
+        FitStatus.CONVERGED if result.success else FitStatus.ITERATION_LIMIT,
         f"held at zero: {', '.join(held)}" if held else "no coefficient at its bound",
         chi2 if known else float("nan"),
     )

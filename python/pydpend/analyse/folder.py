@@ -21,7 +21,7 @@ from pydpend.documents import Table, read_json
 from pydpend.errors import PydpendError, fault
 from pydpend.output import check_kept, results_folder, write_text
 
-RUN_SCHEMA = 3
+RUN_SCHEMA = 4
 """A folder of an older schema is done again, one of a newer is refused."""
 
 UNFINISHED = "unfinished"

@@ -18,16 +18,9 @@ from pydpend.analyse import provenance, stages
 from pydpend.analyse.folder import UNFINISHED, Digests, RunFolder, digest, write_whole
 from pydpend.analyse.options import Options, check_files
 from pydpend.analyse.recordings import Recording, check_options, recordings
+from pydpend.analyse.state import Progress, RunState, StageResult, StageState, Started, Tell
 from pydpend.errors import OptionError, PydpendError, Setting, fault
 from pydpend.output import keeping
-
-Progress = Callable[[int, int, str, str], None]
-"""Called as ``progress(stage number from 1, stages, title, what)``, ``what`` being ``start``, how far it is
-(``40 %``), ``kept``, ``done``, ``not done: why`` or ``does not apply: why``."""
-
-
-LEFT_OUT = ("not done", "does not apply")
-"""How what is said of a stage that gave nothing begins."""
 
 
 @dataclass(frozen=True)
@@ -44,20 +37,23 @@ class Stage:
     key: str
     needs: tuple[str, ...]
     into: str
-    action: Callable[[Path, stages.Tell, bool], str]
+    action: Callable[[Path, Tell, bool], str]
     in_place: tuple[str, ...] = ()
+    ends_the_run: bool = False
+    """Whether nothing is left to do where it cannot be done."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a run came to. ``status``: ``done``, or ``partly`` where a stage could not be done or the fit did not
-    converge."""
+    """What a run came to."""
 
     folder: Path
-    status: str
+    status: RunState
     message: str
-    stages: dict[str, str]
-    """For each stage ``done``, ``kept``, ``not done: why`` or ``does not apply: why``."""
+    stages: dict[str, StageState]
+    """What became of each stage."""
+    reasons: dict[str, str]
+    """Why, of each stage that gave nothing."""
     seconds: dict[str, float]
     """How long each stage took when it was done, the report included."""
 
@@ -65,9 +61,10 @@ class Outcome:
         """As plain values."""
         return {
             "folder": str(self.folder),
-            "status": self.status,
+            "status": str(self.status),
             "message": self.message,
-            "stages": self.stages,
+            "stages": {name: str(state) for name, state in self.stages.items()},
+            "reasons": self.reasons,
             "seconds": self.seconds,
             "report": str(self.folder / "report.html"),
         }
@@ -87,12 +84,13 @@ def plan(options: Options, folder: Path, digests: Digests | None = None) -> list
         needs: tuple[str, ...],
         into: str,
         parts: Any,
-        action: Callable[[Path, stages.Tell, bool], str],
+        action: Callable[[Path, Tell, bool], str],
         in_place: tuple[str, ...] = (),
+        ends_the_run: bool = False,
     ) -> None:
         before = {s.name: s.key for s in out if s.name in needs}
         key = digest([name, stages.version(), parts, before])
-        out.append(Stage(name, title, key, needs, into, action, in_place))
+        out.append(Stage(name, title, key, needs, into, action, in_place, ends_the_run))
 
     for r in found:
         _plan_recording(r, options, folder / r.name, known, add)
@@ -165,6 +163,7 @@ def _plan_recording(
             [r.digest, known.option(options.rig), options.fps, options.pixel_aspect],
             lambda into, tell, resume: stages.track(r, options, into, tell, resume),
             ("nodes.parquet",),
+            ends_the_run=True,
         )
         needs = (f"{r.name}/track",)
     add(
@@ -235,41 +234,49 @@ def analyse(options: Options, folder: str | Path, progress: Progress | None = No
 def _analyse(run: RunFolder, todo: list[Stage], options: Options, progress: Progress | None) -> Outcome:
     path = run.path
     run.save()
-    said: dict[str, str] = {}
+    found: dict[str, StageResult] = {}
     of = len(todo) + 1
-    tell = progress or (lambda number, of, title, what: None)
+    tell = progress or (lambda number, of, title, event: None)
     for number, stage in enumerate(todo, 1):
-        failed = [n for n in stage.needs if said[n].startswith(LEFT_OUT)]
-        if failed and len(failed) == len(stage.needs):
-            how = "does not apply" if all(said[n].startswith(LEFT_OUT[1]) for n in failed) else "not done"
-            said[stage.name] = f"{how}: it needs {' and '.join(run.facts['titles'][n] for n in failed)}"
+        missing = [name for name in stage.needs if not found[name].state.has_results]
+        if missing and len(missing) == len(stage.needs):
+            apart = all(found[name].state is StageState.DOES_NOT_APPLY for name in missing)
+            state = StageState.DOES_NOT_APPLY if apart else StageState.NOT_DONE
+            why = f"it needs {' and '.join(run.facts['titles'][name] for name in missing)}"
+            found[stage.name] = StageResult(state, why)
             run.stages.pop(stage.name, None)
         elif run.holds(stage.name, stage.key):
-            said[stage.name] = "kept"
+            found[stage.name] = StageResult(StageState.KEPT)
         else:
-            tell(number, of, stage.title, "start")
-            said[stage.name] = _do(run, stage, partial(tell, number, of, stage.title))
-        tell(number, of, stage.title, said[stage.name])
-    for key, how in zip(("not_done", "does_not_apply"), LEFT_OUT, strict=True):
-        run.facts[key] = {n: s.removeprefix(f"{how}: ") for n, s in said.items() if s.startswith(how)}
+            tell(number, of, stage.title, Started())
+            found[stage.name] = _do(run, stage, partial(tell, number, of, stage.title))
+        tell(number, of, stage.title, found[stage.name])
+    for state in (StageState.NOT_DONE, StageState.DOES_NOT_APPLY):
+        run.facts[str(state)] = {name: r.why for name, r in found.items() if r.state is state}
     run.save()
-    tell(of, of, "Report", "start")
+    tell(of, of, "Report", Started())
     begun = time.monotonic()
     stages.report(path)
     write_whole(path / "README.txt", provenance.readme(run))
     seconds = {name: float(done["seconds"]) for name, done in run.stages.items()}
     seconds["report"] = round(time.monotonic() - begun, 2)
-    tell(of, of, "Report", "done")
-    missing = sum(s.startswith("not done") for s in said.values())
-    problems = [f"{missing} of {len(said)} stages could not be done"] if missing else []
+    tell(of, of, "Report", StageResult(StageState.DONE))
+    failed = sum(r.state is StageState.NOT_DONE for r in found.values())
+    problems = [f"{failed} of {len(found)} stages could not be done"] if failed else []
     if "fit" in run.stages and not stages.converged(path):
         problems.append("the damping fit did not converge")
-    status = "partly" if problems else "done"
-    return Outcome(path, status, "; ".join(problems) or "every stage is done", said, seconds)
+    return Outcome(
+        path,
+        RunState.PARTLY if problems else RunState.DONE,
+        "; ".join(problems) or "every stage is done",
+        {name: r.state for name, r in found.items()},
+        {name: r.why for name, r in found.items() if r.why},
+        seconds,
+    )
 
 
-def _do(run: RunFolder, stage: Stage, tell: stages.Tell) -> str:
-    """Does one stage and records it. A film that cannot be tracked ends the run."""
+def _do(run: RunFolder, stage: Stage, tell: Tell) -> StageResult:
+    """Does one stage and records it. Raises what a stage raises without which there is nothing to do."""
     target = run.path / stage.into
     work = target if stage.in_place else run.path / UNFINISHED
     shutil.rmtree(run.path / UNFINISHED, ignore_errors=True)
@@ -280,17 +287,17 @@ def _do(run: RunFolder, stage: Stage, tell: stages.Tell) -> str:
         message = stage.action(work, tell, resume)
     except stages.DoesNotApply as reason:
         run.stages.pop(stage.name, None)
-        return f"does not apply: {reason}"
+        return StageResult(StageState.DOES_NOT_APPLY, str(reason))
     except PydpendError as error:
         run.stages.pop(stage.name, None)
-        if stage.name.endswith("/track"):
+        if stage.ends_the_run:
             run.save()
             raise
-        return f"not done: {error}"
+        return StageResult(StageState.NOT_DONE, str(error))
     if stage.in_place:
         files = [(target / name).relative_to(run.path).as_posix() for name in stage.in_place]
     else:
         files = run.take(stage.name, work, target)
         shutil.rmtree(work, ignore_errors=True)
     run.done(stage.name, stage.key, files, message, time.monotonic() - begun)
-    return "done"
+    return StageResult(StageState.DONE)

@@ -16,17 +16,16 @@ from typing import TYPE_CHECKING, Any
 
 from pydpend.analyse.folder import write_whole
 from pydpend.analyse.options import Options
+from pydpend.analyse.state import Going, Note, Tell
 from pydpend.documents import read_json
 from pydpend.errors import PydpendError
+from pydpend.fit_status import FitStatus
 from pydpend.output import whole
 
 if TYPE_CHECKING:
     from pydpend.analyse.recordings import Recording
     from pydpend.angles import LinkAngles
     from pydpend.nodes import Nodes
-
-Tell = Callable[[str], None]
-"""Called with how far a stage is, in words."""
 
 
 class DoesNotApply(PydpendError):
@@ -54,10 +53,10 @@ def _write_parquet(path: Path, columns: dict[str, Any]) -> None:
 
 
 def _share(tell: Tell) -> Callable[[str, int, int | None], None]:
-    """The tracker's progress in words."""
+    """The tracker's progress, told."""
 
     def progress(stage: str, done: int, total: int | None) -> None:
-        tell(f"{stage} {100 * done / total:.0f} %" if total else f"{stage}, {done} frames")
+        tell(Going(stage, done / total) if total else Going(f"{stage}, {done} frames"))
 
     return progress
 
@@ -85,7 +84,7 @@ def track(r: Recording, options: Options, into: Path, tell: Tell, resume: bool) 
         progress=_share(tell),
     )
     for note in nodes.meta.get("warnings", []):
-        tell(f"note: {note}")
+        tell(Note(str(note)))
     count = len(nodes.rig.nodes)
     return f"{nodes.frame.size} frames, {count} node{'s' if count > 1 else ''}"
 
@@ -260,7 +259,7 @@ def fit(found: tuple[Recording, ...], options: Options, folder: Path, into: Path
             model,
             chosen,
             progress=_steps(tell),
-            alone=lambda k: tell(f"recording {k + 1} alone"),
+            alone=lambda k: tell(Going(f"recording {k + 1} alone")),
         )
         fitted = trials.joint
         _write_json(into / "trials.json", trials.to_json())
@@ -280,11 +279,11 @@ def fit(found: tuple[Recording, ...], options: Options, folder: Path, into: Path
 
 def converged(folder: Path) -> bool:
     """Whether the fit of a run came to its end."""
-    return read_json(folder / "fit" / "fit.json", PydpendError).text("status") == "converged"
+    return read_json(folder / "fit" / "fit.json", PydpendError).text("status") == FitStatus.CONVERGED
 
 
 def _steps(tell: Tell) -> Callable[[int, int, float], None]:
-    return lambda step, most, chi2: tell(f"step {step}, chi-square {chi2:.4g}")
+    return lambda step, most, chi2: tell(Going(f"step {step}, chi-square {chi2:.4g}"))
 
 
 def prediction(found: tuple[Recording, ...], options: Options, folder: Path, into: Path, tell: Tell) -> str:
@@ -302,7 +301,7 @@ def prediction(found: tuple[Recording, ...], options: Options, folder: Path, int
         recordings, model = reduced(recordings, model, True)
     out = {}
     for i, one in enumerate(recordings):
-        tell(f"{i + 1} of {len(recordings)}")
+        tell(Going(f"{i + 1} of {len(recordings)}"))
         others = recordings[:i] + recordings[i + 1 :]
         fitted = fit_damping(others, model, options=options.fit.bare())
         stored = StoredFit.of(fitted)

@@ -80,7 +80,7 @@ def angles(
     if isinstance(ending, dict) and ending.get("kind") != "complete":
         why = nodes.damage or ending.get("reason") or ending.get("kind")
         notes.append(f"the node table is not of the whole recording ({why})")
-    phi = _unwrapped(nodes, raw.theta, markers, label, gaps, notes)
+    phi, left_out = _unwrapped(nodes, raw.theta, markers, label, gaps, notes)
     offset, zero_meta, doubts = zero_for(nodes, phi, raw, markers, zero, bodies, mirrored, label)
     notes += doubts
     phi = phi - offset
@@ -88,6 +88,7 @@ def angles(
         first = phi[np.flatnonzero(np.isfinite(phi[:, k]))[0], k]
         phi[:, k] -= 2 * np.pi * np.ceil((first - np.pi) / (2 * np.pi))
     meta = {"method": estimator, "mirrored": mirrored, **raw.meta, "zero": zero_meta, "notes": notes}
+    meta["left_out"] = left_out
     for key in ("source", "time"):
         if nodes.meta.get(key) is not None:
             meta[key] = nodes.meta[key]
@@ -254,8 +255,9 @@ def _unwrapped(
     label: str,
     gaps: Literal["error", "stop"],
     notes: list[str],
-) -> Floats:
-    phi = np.empty_like(theta)
+) -> tuple[Floats, int]:
+    """The angles counted over turns, (T, L), and how many are left out behind a gap in which one may be lost."""
+    phi, left_out = np.empty_like(theta), 0
     for k, body in enumerate(markers):
         if not np.isfinite(theta[:, k]).any():
             raise AnglesError(
@@ -281,6 +283,7 @@ def _unwrapped(
                     label, problem, "Cut the recording there, or use " + Setting("gaps", "stop"), place=place
                 )
             )
+        left_out += int(np.isfinite(phi[gap.after :, k]).sum())
         phi[gap.after :, k] = np.nan
         notes.append(f"{place}: {problem}; its angles are left out from there on")
-    return phi
+    return phi, left_out

@@ -145,7 +145,7 @@ def zero_for(
 
 
 def _given(zero: object, links: int) -> Floats | None:
-    """The links' angles (L,) in the reference picture that a caller gives, rad; ``None`` if it is a word or a recording.
+    """The links' angles (L,) in the reference picture that a caller gives, rad; ``None`` for a word or a recording.
 
     Raises :class:`AnglesError` if it is none of these, or not one finite angle per link.
     """

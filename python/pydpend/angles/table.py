@@ -86,6 +86,11 @@ class LinkAngles:
         """Median time between rows, s; NaN for a single row."""
         return float(np.median(np.diff(self.t_s))) if self.t_s.size > 1 else math.nan
 
+    @property
+    def left_out(self) -> int:
+        """How many angles or readings were left out on the way here; ``meta["notes"]`` says which and why."""
+        return int(self.meta.get("left_out", 0))
+
     def between(self, start_s: float | None = None, stop_s: float | None = None) -> LinkAngles:
         """The rows with ``start_s <= t <= stop_s``; raises :class:`AnglesError` if there are none."""
         keep = np.ones(self.t_s.size, dtype=bool)

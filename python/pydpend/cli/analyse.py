@@ -13,14 +13,16 @@ import argparse
 import json
 import sys
 import time
-from collections.abc import Callable
 from dataclasses import Field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pydpend.cli.flags import add_fields, given
 from pydpend.option_fields import meanings
 from pydpend.terminal import below, shown
+
+if TYPE_CHECKING:
+    from pydpend.analyse.state import Event, Progress
 
 HELP = "film, nodes or angles in, a run folder with a report out"
 
@@ -48,7 +50,7 @@ def _flagged() -> list[Field[Any]]:
 
 def run(args: argparse.Namespace) -> int:
     """Runs the stages."""
-    from pydpend.analyse import Options, analyse, plan, read_config, write_config
+    from pydpend.analyse import Options, RunState, analyse, plan, read_config, write_config
     from pydpend.analyse.folder import RunFolder
     from pydpend.errors import PydpendError, fault
 
@@ -79,37 +81,39 @@ def run(args: argparse.Namespace) -> int:
         print(json.dumps(outcome.to_json(), indent=1))
     else:
         print(f"{outcome.message}; report: {outcome.folder / 'report.html'}")
-    return 0 if outcome.status == "done" else 1
+    return 0 if outcome.status is RunState.DONE else 1
 
 
-def teller() -> Callable[[int, int, str, str], None]:
+def teller() -> Progress:
     """Progress on stderr: on a terminal one line that moves, else a line as each stage starts and ends."""
+    from pydpend.analyse.state import Going, Note, StageState, Started
+
     out = below(sys.stderr)
     moving = out.isatty()
     begun = time.monotonic()
 
-    def tell(number: int, of: int, title: str, what: str) -> None:
+    def tell(number: int, of: int, title: str, event: Event) -> None:
         nonlocal begun
         head = f"[{number}/{of}] {shown(title)}"
-        what = shown(what)
         wipe = "\x1b[K" if moving else ""
-        if what == "start":
+        if isinstance(event, Started):
             begun = time.monotonic()
             print(f"{head} ...", end="\r" if moving else "\n", file=out, flush=True)
-        elif what in ("done", "kept") or what.startswith(("not done", "does not apply")):
-            took = f" ({time.monotonic() - begun:.1f} s)" if what == "done" else ""
-            print(f"{wipe}{head}: {what}{took}", file=out, flush=True)
-        elif what.startswith("note: "):
-            print(f"{wipe}{head}: {what}", file=out, flush=True)
-        elif moving:
-            print(f"\x1b[K{head}: {what}{_left(what, begun)}", end="\r", file=out, flush=True)
+        elif isinstance(event, Note):
+            print(f"{wipe}{head}: note: {shown(event.text)}", file=out, flush=True)
+        elif isinstance(event, Going):
+            if moving:
+                left = _left(event.share, begun)
+                print(f"{wipe}{head}: {shown(str(event))}{left}", end="\r", file=out, flush=True)
+        else:
+            took = f" ({time.monotonic() - begun:.1f} s)" if event.state is StageState.DONE else ""
+            print(f"{wipe}{head}: {shown(str(event))}{took}", file=out, flush=True)
 
     return tell
 
 
-def _left(what: str, begun: float) -> str:
-    """Remaining time, where the words end in a percentage."""
-    number = what.removesuffix(" %").rpartition(" ")[2]
-    if not what.endswith(" %") or not number.isdigit() or int(number) == 0:
+def _left(share: float | None, begun: float) -> str:
+    """Remaining time, where the part that is done is known."""
+    if not share:
         return ""
-    return f", {(time.monotonic() - begun) * (100 - int(number)) / int(number):.0f} s left"
+    return f", {(time.monotonic() - begun) * (1 - share) / share:.0f} s left"

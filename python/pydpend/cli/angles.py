@@ -110,7 +110,7 @@ def run(args: argparse.Namespace) -> int:
         print(f"zero from {zero['from']}{known}; written to {args.output}")
     for note in found.meta["notes"]:
         print(f"note: {note}", file=sys.stderr)
-    return 1 if any("left out" in n for n in found.meta["notes"]) else 0
+    return 1 if found.left_out else 0
 
 
 def _zero(text: str) -> Any:

@@ -119,4 +119,4 @@ def run(args: argparse.Namespace) -> int:
         )
     for note in found.notes:
         print(f"note: {note}", file=sys.stderr)
-    return 1 if any("left out" in n for n in found.notes) else 0
+    return 1 if found.left_out else 0

@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING
 from pydpend.cli.flags import add_fields, given
 from pydpend.cli.writes import add_force, check_files
 from pydpend.fit_options import FitOptions
+from pydpend.fit_status import FitStatus
 from pydpend.terminal import below
 
 if TYPE_CHECKING:
@@ -160,7 +161,7 @@ def run(args: argparse.Namespace) -> int:
     else:
         for line in describe(fit):
             print(line)
-    return 0 if fit.status == "converged" else 1
+    return 0 if fit.status is FitStatus.CONVERGED else 1
 
 
 def describe(fit: DampingFit) -> list[str]:

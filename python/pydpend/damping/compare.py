@@ -19,6 +19,7 @@ from pydpend.damping.result import Term
 from pydpend.damping.shooting import Progress
 from pydpend.damping.trajectory import FLOOR, HUBER, SEGMENT_S, length_of
 from pydpend.damping.uncertainty import covariance
+from pydpend.fit_status import Verdict
 from pydpend.information import check_errors
 from pydpend.model import Model
 
@@ -32,15 +33,15 @@ WORSE = 2.0
 """Standard errors by which a prediction must differ to count."""
 
 
-def verdict(gain: float, prediction_z: float, correlation: float) -> str:
-    """The word for a term from its three numbers."""
+def verdict(gain: float, prediction_z: float, correlation: float) -> Verdict:
+    """What the data say of a term, from its three numbers."""
     if gain > ASKED and prediction_z > -WORSE:
-        return "asked for"
+        return Verdict.ASKED_FOR
     if abs(correlation) > 0.9:
-        return "cannot be told apart"
+        return Verdict.INSEPARABLE
     if gain < 1.0 and prediction_z < WORSE:
-        return "rejected"
-    return "not decided"
+        return Verdict.REJECTED
+    return Verdict.UNDECIDED
 
 
 def compare_terms(

@@ -166,6 +166,6 @@ def _energy(
             *(note for r, zero in zip(recordings, found, strict=True) for note in zero.notes(r.angles.name)),
             f"acceleration noise raises |N| by {100 * excess[0]:.1g} and {100 * excess[1]:.1g} % on average; "
             "taken off",
-            *(() if freed is None else (freed.warning,)),
+            *(() if freed is None else (f"warning: {freed.warning}",)),
         ),
     )

@@ -20,6 +20,7 @@ from pydpend.damping import shooting
 from pydpend.damping.result import Estimate, Interval
 from pydpend.damping.shooting import Progress, Solution, Track
 from pydpend.errors import FitError
+from pydpend.fit_status import FitStatus
 from pydpend.information import invert
 
 Floats = NDArray[np.float64]
@@ -81,14 +82,16 @@ class _Profile:
         values = self.best.parameters | start | {self.name: value}
         try:
             found = _solved(self.tracks, self.best, values, free, self.huber)
-            pressed = [] if found.status == "converged" else self._pressed(found, np.sqrt(np.diag(cov)))
+            pressed = (
+                [] if found.status is FitStatus.CONVERGED else self._pressed(found, np.sqrt(np.diag(cov)))
+            )
             if pressed:
                 values = found.parameters | dict.fromkeys(pressed, 0.0)
                 free = [n for n in free if n not in pressed]
                 found = _solved(self.tracks, found, values, free, self.huber)
         except FitError:
             return None
-        if found.status != "converged":
+        if found.status is not FitStatus.CONVERGED:
             return None
         self.known[value] = 2 * (found.cost - self.best.cost) / self.scale
         return self.known[value]

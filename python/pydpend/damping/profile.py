@@ -21,6 +21,7 @@ from pydpend.damping.shares import TERMS, cumulative
 from pydpend.damping.shooting import Progress, Segments, Track
 from pydpend.energy import EnergyFit, EnergyProfile, fit_profiles
 from pydpend.errors import FitError, fault
+from pydpend.fit_status import FitStatus
 from pydpend.model import Model
 
 Floats = NDArray[np.float64]
@@ -176,7 +177,7 @@ def fit_energy(
     few, whole, smoothed = along(values, corrected=True)
     few = linear(few)
     fit = fit_profiles(few)
-    return fit if change < CLOSE else replace(fit, status="iteration_limit"), few, whole, smoothed
+    return fit if change < CLOSE else replace(fit, status=FitStatus.ITERATION_LIMIT), few, whole, smoothed
 
 
 def _start(profile: EnergyProfile, values: Floats) -> Floats:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pydpend.coefficients import unit
+from pydpend.fit_status import FitStatus, Verdict
 
 Floats = NDArray[np.float64]
 
@@ -61,6 +62,10 @@ class Residuals:
     """(T, links), the standard deviation each was weighted by."""
 
 
+SHORT_S = 20.0
+"""A motion shorter than this does not separate laws that differ by their dependence on speed or load, s."""
+
+
 @dataclass(frozen=True)
 class Identifiability:
     """What the data determine and what they do not."""
@@ -69,8 +74,30 @@ class Identifiability:
     """Condition number of the correlation-scaled information matrix of coefficients and ratios."""
     correlations: dict[str, float]
     """``"a/b"``: correlation, for pairs beyond 0.9."""
-    sentences: tuple[str, ...]
-    """The same in words."""
+    duration_s: float
+    """Length of the motion that was fitted."""
+    remarks: tuple[str, ...]
+    """What the numbers say of single coefficients and of all, in words."""
+
+    @property
+    def too_short(self) -> bool:
+        """Whether the motion lasts too short a time to tell laws of like shape apart."""
+        return self.duration_s < SHORT_S
+
+    @property
+    def warning(self) -> str:
+        """What a motion that is `too_short` means, in words; empty for a longer one."""
+        if not self.too_short:
+            return ""
+        return (
+            f"The motion fitted lasts {self.duration_s:.1f} s: too short to separate laws that differ by their "
+            "dependence on speed or load; trust the shares and the prediction, not single coefficients."
+        )
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """Everything in words."""
+        return ((self.warning,) if self.too_short else ()) + self.remarks
 
 
 @dataclass(frozen=True)
@@ -87,20 +114,18 @@ class Term:
     partner: str
     """The term it is most correlated with."""
     correlation: float
-    verdict: str
-    """``asked for``, ``rejected``, ``cannot be told apart``, ``not decided``."""
+    verdict: Verdict
 
     def to_json(self) -> dict[str, Any]:
         """As in ``fit.json``."""
-        return {**asdict(self), "sentence": self.sentence}
+        return {**asdict(self), "verdict": str(self.verdict), "sentence": self.sentence}
 
     @property
     def sentence(self) -> str:
         """The verdict in words."""
-        word = self.verdict
-        if word == "cannot be told apart":
-            word += f" from {self.partner} (correlation {self.correlation:+.2f})"
-        said = word if word.startswith("cannot") else f"is {word}"
+        said = f"is {self.verdict.words}"
+        if self.verdict is Verdict.INSEPARABLE:
+            said = f"{self.verdict.words} from {self.partner} (correlation {self.correlation:+.2f})"
         return (
             f"{self.name} {said}: without it twice the log-likelihood falls by {self.gain:.1f} and the mean square "
             f"of the prediction of unused data changes by {100 * self.prediction:+.2f} % "
@@ -171,7 +196,7 @@ class TenCoefficients:
             for name, e in self.rmu.items()
         )
         return (
-            f"warning: of the ten coefficients these energies determine {self.rank} combinations (condition number "
+            f"of the ten coefficients these energies determine {self.rank} combinations (condition number "
             f"{self.condition:.2g}). The six mu_c are r mu of two joints times known masses and lengths, so only these "
             f"sums are physical: {sums}. The split of a joint's sum among its three is arbitrary: it may depart from "
             "the model's ratios by noise or where the model is wrong, and where the energies do not determine it, the "
@@ -185,9 +210,9 @@ class DampingFit:
 
     method: str
     """``trajectory`` or ``energy``."""
-    status: str
-    """``converged``, ``iteration_limit``, ``stalled``."""
+    status: FitStatus
     message: str
+    """How it ended and how well the model describes the angles, in words."""
     chi2: float
     """Mean squared standardised residual with only the noise's own slack at the joints: 1 for a model that is
     right. NaN where it is not defined (energy fit)."""
@@ -209,6 +234,9 @@ class DampingFit:
     energy: tuple[EnergyCurve, ...] = field(default=(), repr=False)
     residuals: tuple[Residuals, ...] = field(default=(), repr=False)
     """Of each recording; ``residuals.csv`` in the fit's folder."""
+    within_noise: bool | None = None
+    """Whether the model describes the angles to within their noise; where it does not, the standard errors carry its
+    errors. None where the fit does not tell (energy)."""
     prediction: dict[str, dict[str, Any]] = field(default_factory=dict)
     """Window in s: RMS per link in degrees of data the fit did not see."""
     terms: tuple[Term, ...] = ()
@@ -234,8 +262,9 @@ class DampingFit:
         """``fit.json``: plain numbers and text, null for what is not defined."""
         out = {
             "method": self.method,
-            "status": self.status,
+            "status": str(self.status),
             "message": self.message,
+            "within_noise": self.within_noise,
             "chi2": self.chi2,
             "n": self.n,
             "coefficients": {k: v.to_json() for k, v in self.coefficients.items()},
@@ -249,6 +278,8 @@ class DampingFit:
             "identifiability": {
                 "condition": self.identifiability.condition,
                 "correlations": self.identifiability.correlations,
+                "duration_s": self.identifiability.duration_s,
+                "too_short": self.identifiability.too_short,
                 "sentences": list(self.identifiability.sentences),
             },
             "terms": {t.name: t.to_json() for t in self.terms},

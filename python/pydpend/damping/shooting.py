@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pydpend import _tracker
 from pydpend.damping.result import Residuals
 from pydpend.errors import FitError, fault
+from pydpend.fit_status import FitStatus
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -120,7 +121,7 @@ class Solution:
     """Derivatives of each segment's end with respect to its start, (K, 4, 4)."""
     stuck: int
     iterations: int
-    status: str
+    status: FitStatus
     clock_scale: float
 
     @property
@@ -240,7 +241,7 @@ def solve(
         out["transfer"],
         out["stuck"],
         out["iterations"],
-        out["status"],
+        FitStatus(out["status"]),
         out["clock_scale"],
     )
 

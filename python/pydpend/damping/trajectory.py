@@ -18,6 +18,7 @@ from pydpend.damping.shooting import Progress, Solution, Track
 from pydpend.damping.uncertainty import covariance, identifiability
 from pydpend.errors import FitError, fault
 from pydpend.fit_options import FitOptions
+from pydpend.fit_status import FitStatus
 from pydpend.information import check_errors
 from pydpend.model import Model
 
@@ -100,7 +101,7 @@ def fit_trajectory(
             segments, start, zeros = solution.segments, solution.parameters, solution.zeros_rad
             if pass_ == 2:
                 break
-    if solution.status in ("stalled", "iteration_limit") and length > 1.01 * shooting.PIECE_S:
+    if solution.status is not FitStatus.CONVERGED and length > 1.01 * shooting.PIECE_S:
         return fit_trajectory(
             recordings,
             model,
@@ -221,6 +222,7 @@ def _judge(
         method="trajectory",
         status=solution.status,
         message=_message(solution, strict, relative),
+        within_noise=_within_noise(solution, strict, relative),
         chi2=strict.chi2,
         n=int(solution.counts.sum()),
         coefficients=estimates(names, values, sigma),
@@ -281,11 +283,16 @@ def fitted_model(model: Model, values: dict[str, float]) -> Model:
     )
 
 
-def _message(solution: Solution, strict: Solution, relative: Floats) -> str:
-    words = f"{solution.status} in {solution.iterations} steps; chi-square {strict.chi2:.3f}"
+def _within_noise(solution: Solution, strict: Solution, relative: Floats) -> bool:
+    """Whether what is left of the angles is no more than their noise."""
     # Chi-square scatters by sqrt(2/n); a few of these, or three percent, are no evidence against the model.
     n = float(solution.counts.sum())
-    if relative.max() <= 0.2 or strict.chi2 < 1 + max(0.03, 4 * (2 / n) ** 0.5):
+    return bool(relative.max() <= 0.2 or strict.chi2 < 1 + max(0.03, 4 * (2 / n) ** 0.5))
+
+
+def _message(solution: Solution, strict: Solution, relative: Floats) -> str:
+    words = f"{solution.status.words} in {solution.iterations} steps; chi-square {strict.chi2:.3f}"
+    if _within_noise(solution, strict, relative):
         return words + ": the model describes the angles to within their noise"
     return (
         words + f" without slack, {solution.chi2:.3f} with the slack that makes the joints' chi-square 1 (up "

@@ -86,14 +86,8 @@ def identifiability(
     for name, s in zip(names, sigma, strict=True):
         if name in RATIOS and s > 0.02 * abs(values[name]):
             sentences.append(f"The ratio {name}/psi is known to {100 * s / abs(values[name]):.1f} % only.")
-    if duration_s < 20:
-        sentences.insert(
-            0,
-            f"The motion fitted lasts {duration_s:.1f} s: too short to separate laws that differ by their "
-            "dependence on speed or load; trust the shares and the prediction, not single coefficients.",
-        )
     sentences.append(
         "The scale of the inertias is not observable in free motion: all coefficients are proportional to "
         "psi, which is the model's, and its relative uncertainty is a common factor on all of them."
     )
-    return Identifiability(condition, pairs, tuple(sentences))
+    return Identifiability(condition, pairs, duration_s, tuple(sentences))

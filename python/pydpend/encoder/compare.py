@@ -73,6 +73,8 @@ class Comparison:
     video_noise_rad: float
     encoder_noise_rad: float
     notes: tuple[str, ...]
+    left_out: int
+    """How many of the video's angles and the encoder's readings were left out, by the regression too."""
 
     def to_json(self) -> str:
         """All numbers, angles in degrees too where people read them."""
@@ -122,6 +124,7 @@ class Comparison:
             },
             "own_noise_rad": {"encoder": self.encoder_noise_rad, "video": self.video_noise_rad},
             "notes": list(self.notes),
+            "left_out": self.left_out,
         }
         return json.dumps(_plain(value), indent=2) + "\n"
 
@@ -253,6 +256,7 @@ def compare(
         highpass_noise(video.phi_rad[:, link]),
         highpass_noise(encoder.phi_rad[:, 0]),
         tuple(notes),
+        video.left_out + encoder.left_out + sync.left_out,
     )
 
 

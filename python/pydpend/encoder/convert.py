@@ -45,7 +45,12 @@ def encoder_angles(signal: EncoderSignal, calibration: Calibration | None = None
         phi = signal.value
         if (np.abs(np.diff(phi))[np.diff(signal.t_s) <= 1.5 * signal.step_s] > np.pi).any():
             phi = _counted(signal, phi)
-        meta = {"source": "encoder, in angle", "notes": list(signal.notes), "sigma_rad": float(sigma[0, 0])}
+        meta = {
+            "source": "encoder, in angle",
+            "notes": list(signal.notes),
+            "left_out": signal.left_out,
+            "sigma_rad": float(sigma[0, 0]),
+        }
         return LinkAngles(signal.t_s, phi[:, None], sigma, None, meta, signal.name)
     if calibration is None:
         raise EncoderError(
@@ -97,6 +102,7 @@ def encoder_angles(signal: EncoderSignal, calibration: Calibration | None = None
         "readings_while_jumping": int(jumping.sum()),
         "systematic_rad": float(np.nanmax(np.where(good, calibration.systematic_rad(counted), np.nan))),
         "notes": notes,
+        "left_out": signal.left_out + int(bad.sum()),
     }
     return LinkAngles(signal.t_s, phi[:, None], sigma[:, None], None, meta, signal.name)
 

@@ -29,7 +29,7 @@ class EncoderSignal:
     """``t_s`` (T,): s on the encoder's clock, increasing. ``value`` (T,): V, or rad if ``unit`` is ``"rad"``.
     Times of ``datetime64`` become seconds from the first.
 
-    Samples without a value are not in it; ``notes`` says how many were left out, and of gaps and uneven
+    Samples without a value are not in it: ``left_out`` of them; ``notes`` says which, and of gaps and uneven
     steps.
     """
 
@@ -38,6 +38,7 @@ class EncoderSignal:
     unit: Literal["v", "rad"] = "v"
     name: str = "encoder"
     notes: tuple[str, ...] = ()
+    left_out: int = 0
 
     def __post_init__(self) -> None:
         t = seconds_of_numpy(np.asarray(self.t_s))
@@ -256,4 +257,4 @@ def _checked(
             notes.append(
                 f"uneven steps, {even.min():.4g} to {even.max():.4g} s; the times are used as they are"
             )
-    return EncoderSignal(t, value, unit, path.stem, tuple(notes))
+    return EncoderSignal(t, value, unit, path.stem, tuple(notes), int((~keep).sum()))

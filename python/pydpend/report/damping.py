@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pydpend.coefficients import RATIO_UNITS
 from pydpend.documents import read_json
 from pydpend.errors import PydpendError, Setting
+from pydpend.fit_status import FitStatus, Verdict
 from pydpend.plots.damping import coefficients_figure, shares_figure
 from pydpend.plots.folder import AGAIN, read_table, table_of_fit
 from pydpend.plots.style import inline_svg
@@ -76,9 +77,9 @@ def meaning(name: str, links: int) -> str:
 def warnings(fit: dict[str, Any]) -> list[str]:
     """What a reader must know before the numbers."""
     out = []
-    if fit["status"] != "converged":
-        out.append(f"The damping fit did not converge, its numbers are where it stopped: {_message(fit)}")
-    elif "beyond the noise" in fit["message"]:
+    if FitStatus(fit["status"]) is not FitStatus.CONVERGED:
+        out.append(f"The damping fit did not converge, its numbers are where it stopped: {fit['message']}")
+    elif fit["within_noise"] is False:
         out.append(
             "The model or the angles have errors beyond the noise, and the standard errors of the damping carry them: "
             f"{_left(fit)}"
@@ -103,12 +104,9 @@ def warnings(fit: dict[str, Any]) -> list[str]:
                 "of its own. The damping is free of that; the angles above are not."
             )
     # The sentence on the whole recording; those on single coefficients stand with them.
-    out += [s for s in fit["identifiability"]["sentences"] if "too short" in s]
+    if fit["identifiability"]["too_short"]:
+        out.append(fit["identifiability"]["sentences"][0])
     return out
-
-
-def _message(fit: dict[str, Any]) -> str:
-    return str(fit["message"]).replace(fit["status"], fit["status"].replace("_", " "), 1)
 
 
 def _left(fit: dict[str, Any]) -> str:
@@ -168,7 +166,7 @@ def _energy_sentence(fit: dict[str, Any]) -> str:
 def _trust(fit: dict[str, Any], prediction: dict[str, Any] | None) -> list[str]:
     """How well the model describes the angles, and how well it predicts angles that it has not seen."""
     out = []
-    if "within their noise" in fit["message"]:
+    if fit["within_noise"]:
         out.append(
             f"The equations of motion describe the angles to within their noise (chi-square {fit['chi2']:.3f}; 1 is "
             "what noise alone would give)."
@@ -282,7 +280,7 @@ def _energy(path: Path, group: str, title: str) -> list[Block]:
 
 def sections(folder: Path, fit: dict[str, Any], prediction: dict[str, Any] | None) -> list[Section]:
     """Energy, identifiability, trials and prediction."""
-    blocks: list[Block] = [Text(sentence(_message(fit)))]
+    blocks: list[Block] = [Text(sentence(fit["message"]))]
     blocks += [Listing(tuple(sentence(n) for n in fit["notes"]))] if fit.get("notes") else []
     blocks.append(
         Figure(
@@ -352,7 +350,7 @@ def _ten(fit: dict[str, Any]) -> list[Block]:
     )
     return [
         Heading("The paper's ten coefficients"),
-        Text(sentence(ten["warning"].removeprefix("warning: "))),
+        Text(sentence(ten["warning"])),
         Table(("coefficient", "value"), rows, numbers=frozenset({1})),
     ]
 
@@ -365,8 +363,9 @@ def _told(fit: dict[str, Any]) -> list[Block]:
     if terms:
         rows = []
         for name, t in terms.items():
-            said = t["verdict"]
-            if said == "cannot be told apart":
+            verdict = Verdict(t["verdict"])
+            said = verdict.words
+            if verdict is Verdict.INSEPARABLE:
                 said += f" from {t['partner']} (correlation {signed(t['correlation'], 2)})"
             shown = t["gain"] > 0
             rows.append(

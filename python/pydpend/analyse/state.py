@@ -1,0 +1,80 @@
+"""What becomes of a stage of a run, and what is told of it while it is done."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from pydpend.worded import Words
+
+
+class StageState(Words):
+    """What became of a stage."""
+
+    DONE = "done", "done"
+    KEPT = "kept", "kept"
+    """Its results are there from an earlier run of the same."""
+    NOT_DONE = "not_done", "not done"
+    """These data do not allow it."""
+    DOES_NOT_APPLY = "does_not_apply", "does not apply"
+    """It has no meaning for these recordings; nothing is wrong with them."""
+
+    @property
+    def has_results(self) -> bool:
+        """Whether the stage's files are there."""
+        return self in (StageState.DONE, StageState.KEPT)
+
+
+class RunState(Words):
+    """What became of a run."""
+
+    DONE = "done", "done"
+    PARTLY = "partly", "partly done"
+    """A stage could not be done, or the fit did not converge."""
+
+
+@dataclass(frozen=True)
+class StageResult:
+    """What became of a stage, and why where it gave nothing."""
+
+    state: StageState
+    why: str = ""
+
+    def __str__(self) -> str:
+        """In words."""
+        return f"{self.state.words}: {self.why}" if self.why else self.state.words
+
+
+@dataclass(frozen=True)
+class Started:
+    """A stage begins."""
+
+
+@dataclass(frozen=True)
+class Going:
+    """How far a stage is: what it does, and its part from 0 to 1 where that is known."""
+
+    what: str
+    share: float | None = None
+
+    def __str__(self) -> str:
+        """In words."""
+        return self.what if self.share is None else f"{self.what} {100 * self.share:.0f} %"
+
+
+@dataclass(frozen=True)
+class Note:
+    """Something that should be known of what a stage does."""
+
+    text: str
+
+
+Event: TypeAlias = Started | Going | Note | StageResult
+"""What is told of a stage."""
+
+Progress: TypeAlias = Callable[[int, int, str, Event], None]
+"""Called as ``progress(stage's number from 1, number of stages, title, event)``."""
+
+Tell: TypeAlias = Callable[[Going | Note], None]
+"""Called by a stage with how far it is."""
