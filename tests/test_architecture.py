@@ -19,6 +19,7 @@ GROUPS: tuple[tuple[str, ...], ...] = (
         "worded",
         "errors",
         "crossing",
+        "_typing",
         "_tracker",
         "kinds",
         "documents",
@@ -29,7 +30,7 @@ GROUPS: tuple[tuple[str, ...], ...] = (
         "arrays",
         "series",
     ),
-    ("nodes", "tracking", "filming", "scoring", "export", "components", "bearings"),
+    ("nodes", "live", "tracking", "filming", "scoring", "export", "components", "bearings"),
     ("coefficients", "model", "fit_options", "fit_status", "information"),
     ("angles",),
     ("encoder",),
@@ -90,7 +91,7 @@ def assert_right(graph: Graph, groups: tuple[tuple[str, ...], ...]) -> None:
 
 def test_python_arrows_go_right() -> None:
     graph = python_graph()
-    assert {n for n in top_modules() if not n.startswith("_") and n != "py"} == {m[0] for m in graph if m} - {
+    assert {n for n in top_modules() if n not in ("_tracker", "py")} == {m[0] for m in graph if m} - {
         "__main__"
     }
     graph.pop(("__main__",), None)

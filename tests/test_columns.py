@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import datetime
-import zoneinfo
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from nptdms import ChannelObject, TdmsWriter
-from pydpend.angles import LinkAngles, read_angles
+from pydpend.angles import read_angles
 from pydpend.columns import Columns, read_columns
-from pydpend.encoder import EncoderSignal, calibrate, read_encoder, read_holds
+from pydpend.encoder import calibrate, read_encoder, read_holds
 from pydpend.errors import AnglesError, EncoderError
 
 HEAD = "time_s,voltage_v\n"
@@ -208,154 +205,6 @@ def test_times_of_whole_seconds_are_not_cut_of_their_decimals(tmp_path: Path) ->
         assert found.value.tolist() == [125.0, 126.0]
 
 
-UNITS = {
-    # text, time's column, encoder's column, times in s, values in V or rad, which
-    "row ms, mV": ("t,U\nms,mV\n0,650\n2,1650\n", "t", "U", [0.65, 1.65], "v"),
-    "row [ms], (V)": ("t;U\n[ms];(V)\n0;0,65\n2;1,65\n", "t", "U", [0.65, 1.65], "v"),
-    "row us, deg": ("t,phi\nµs,°\n0,90\n2000,180\n", "t", "phi", [np.pi / 2, np.pi], "rad"),
-    "row ns, mrad": ("t,phi\nns,mrad\n0,500\n2000000,1500\n", "t", "phi", [0.5, 1.5], "rad"),
-    "row under names": (
-        "time_ms,voltage_mv\nms,mV\n0,650\n2,1650\n",
-        "time_ms",
-        "voltage_mv",
-        [0.65, 1.65],
-        "v",
-    ),
-    "names": ("time_ms,voltage_mv\n0,650\n2,1650\n", "time_ms", "voltage_mv", [0.65, 1.65], "v"),
-    "capitals": ("TIME_MS,VOLTAGE_MV\n0,650\n2,1650\n", "TIME_MS", "VOLTAGE_MV", [0.65, 1.65], "v"),
-    "brackets": ("t (ms),U [mV]\n0,650\n2,1650\n", "t (ms)", "U [mV]", [0.65, 1.65], "v"),
-    "slashes": ("t/ms,U / V\n0,0.65\n2,1.65\n", "t/ms", "U / V", [0.65, 1.65], "v"),
-    "camel case": ("timeMs,voltageMv\n0,650\n2,1650\n", "timeMs", "voltageMv", [0.65, 1.65], "v"),
-    "mrad": ("time_us,phi1_mrad\n0,500\n2000,1500\n", "time_us", "phi1_mrad", [0.5, 1.5], "rad"),
-    "deg in brackets": (
-        "time_s,phi1 (deg)\n0,90\n0.002,180\n",
-        "time_s",
-        "phi1 (deg)",
-        [np.pi / 2, np.pi],
-        "rad",
-    ),
-    "degrees": (
-        "time_s,angle_degrees\n0,90\n0.002,180\n",
-        "time_s",
-        "angle_degrees",
-        [np.pi / 2, np.pi],
-        "rad",
-    ),
-    "degree sign": ("time_s,angle°\n0,90\n0.002,180\n", "time_s", "angle°", [np.pi / 2, np.pi], "rad"),
-    "none": ("Zeit,Kanal (1)\n0,0.65\n0.002,1.65\n", "Zeit", "Kanal (1)", [0.65, 1.65], "v"),
-}
-
-
-@pytest.mark.parametrize("kind", UNITS)
-def test_units_in_names_and_under_the_header_are_scaled(tmp_path: Path, kind: str) -> None:
-    text, time, column, value, unit = UNITS[kind]
-    path = tmp_path / "t.csv"
-    path.write_text(text, encoding="utf-8")
-    found = read_encoder(path, column=column, time_column=time)
-    assert found.t_s == pytest.approx([0.0, 0.002], abs=1e-15)
-    assert found.value == pytest.approx(value, abs=1e-15)
-    assert found.unit == unit
-    if "\n0," not in text or text.count("\n") != 3:
-        return
-    names = [n.strip() for n in text.split("\n")[0].split(",")]
-    rows = np.array([[float(f) for f in line.split(",")] for line in text.split("\n")[1:3]])
-    pq.write_table(pa.table(dict(zip(names, rows.T, strict=True))), tmp_path / "t.parquet")
-    same = read_encoder(tmp_path / "t.parquet", column=column, time_column=time)
-    assert same.t_s.tolist() == found.t_s.tolist()
-    assert same.value.tolist() == found.value.tolist()
-
-
-@pytest.mark.parametrize(
-    ("header", "message"),
-    [
-        ("t,U\ns,counts", "line 2, column U: the unit 'counts' is not known"),
-        ("t,U\nfortnights,V", "line 2, column t: the unit 'fortnights' is not known"),
-        ("t,U\nV,s", "column t: 'V' is no known unit of time"),
-        ("t,U\ns,ms", "column U: 'ms' is no known unit of voltage or angle"),
-        ("t,U\ns,MV", "the unit 'MV' is not known"),
-        ("t (ticks),U", r"column t \(ticks\): 'ticks' is no known unit of time"),
-        ("t,U [counts]", "'counts' is no known unit of voltage or angle"),
-        ("t,omega_rad/s", "'s' is no known unit of voltage or angle"),
-    ],
-)
-def test_units_that_are_not_known_are_refused(tmp_path: Path, header: str, message: str) -> None:
-    path = tmp_path / "t.csv"
-    path.write_text(header + "\n0,0.65\n2,1.65\n")
-    time, column = header.split("\n")[0].split(",")
-    with pytest.raises(EncoderError, match=message):
-        read_encoder(path, column=column, time_column=time)
-
-
-def test_a_unit_that_is_given_and_another_in_the_name_are_refused(tmp_path: Path) -> None:
-    path = tmp_path / "t.csv"
-    path.write_text("time_s,voltage_mv,v_min\n0,650,0.65\n2,1650,1.65\n")
-    with pytest.raises(EncoderError, match="the unit is to be v, the column's is 'mv'"):
-        read_encoder(path, column="voltage_mv", unit="v")
-    assert read_encoder(path, column="v_min", unit="v").value.tolist() == [0.65, 1.65]
-
-
-def test_holds_and_angles_have_their_units_too(tmp_path: Path) -> None:
-    path = tmp_path / "t.csv"
-    path.write_text("angle_deg,U_mV\n0,5000\n360,5650\n")
-    assert [hold.mean_v for hold in read_holds([path], column="U_mV")] == [5.0, 5.65]
-    path.write_text("time_s,phi1_rad\nms,rad\n0,0.5\n2,0.6\n")
-    with pytest.raises(AnglesError, match="line 2, column time_s: the unit is 'ms'"):
-        read_angles(path)
-    path.write_text("time_ms,theta_deg\n0,0.5\n2,0.6\n")
-    with pytest.raises(AnglesError, match="column time_ms: its unit is 'ms', and time_s is in s"):
-        read_angles(path, columns={"time_s": "time_ms", "phi1_deg": "theta_deg"})
-
-
-def test_units_of_tdms_channels(tmp_path: Path) -> None:
-    path = tmp_path / "t.tdms"
-    with TdmsWriter(path) as writer:
-        writer.write_segment(
-            [
-                ChannelObject("g", "t_ms", np.array([0.0, 2.0])),
-                ChannelObject("g", "U", np.array([650.0, 1650.0]), {"unit_string": "mV"}),
-                ChannelObject("g", "on", np.array([True, False])),
-            ]
-        )
-    found = read_encoder(path, column="U", time_column="t_ms")
-    assert found.t_s.tolist() == [0.0, 0.002]
-    assert found.value.tolist() == [0.65, 1.65]
-    with pytest.raises(EncoderError, match="channel on: the channel holds truth values, not numbers"):
-        read_encoder(path, column="on", time_column="t_ms")
-
-
-@pytest.mark.parametrize(
-    ("first", "step", "what"),
-    [
-        (1714564800.0, 0.002, "since 1970"),
-        (1714564800000.0, 2.0, "since 1970"),
-        (1714564800000000.0, 2000.0, "since 1970"),
-        (20240501120000.0, 1.0, "a date as 20240501120000"),
-        (45413.5, 0.002 / 86400, "days since 1900 as spreadsheets store them"),
-    ],
-)
-def test_stamps_written_as_numbers_are_not_taken_for_seconds(
-    tmp_path: Path, first: float, step: float, what: str
-) -> None:
-    times = first + step * np.arange(50)
-    rows = "".join(f"{t!r},0.65\n" for t in times.tolist())
-    path = tmp_path / "t.csv"
-    path.write_text("time_s,voltage_v\n" + rows)
-    with pytest.raises(EncoderError, match=f"line 2, column time_s: the time .* may be .*{what}"):
-        read_encoder(path)
-    path.write_text("time_s,phi1_rad\n" + rows)
-    with pytest.raises(AnglesError, match=f"line 2, column time_s: the time .* may be .*{what}"):
-        read_angles(path)
-    pq.write_table(pa.table({"time_s": times, "voltage_v": np.zeros(50)}), tmp_path / "t.parquet")
-    with pytest.raises(EncoderError, match=f"row 0, column time_s: the time .* may be .*{what}"):
-        read_encoder(tmp_path / "t.parquet")
-
-
-def test_seconds_since_midnight_are_seconds(tmp_path: Path) -> None:
-    path = tmp_path / "t.csv"
-    path.write_text(HEAD + "".join(f"{43200 + k / 500:.3f},0.65\n" for k in range(500)))
-    assert read_encoder(path).t_s[-1] == 43200.998
-
-
 def test_whole_numbers_of_64_bits_and_truth_values_in_parquet(tmp_path: Path) -> None:
     path = tmp_path / "t.parquet"
     stamps = pa.array([1714564800000000001, 1714564800002000001], pa.int64())
@@ -383,129 +232,12 @@ def test_volts_of_a_calibration_are_never_cut(tmp_path: Path, delimiter: str) ->
         assert found.slope_v_per_rad * 2 * np.pi == pytest.approx(0.65, abs=1e-12)
 
 
-STAMPS = {
-    "UTC": ("2024-05-01T12:00:00.250Z", "2024-05-01T12:00:00.251Z"),
-    "no zone": ("2024-05-01 12:00:00.250", "2024-05-01 12:00:00.251"),
-    "an offset": ("2024-05-01T12:00:00.250+02:00", "2024-05-01T12:00:00.251+02:00"),
-    "the end of summer time": ("2024-10-27T02:59:59.999500+02:00", "2024-10-27T02:00:00.000500+01:00"),
-    "nanoseconds": ("2024-05-01T12:00:00.249999900", "2024-05-01T12:00:00.250999900"),
-    "a time of day": ("12:00:00.250", "12:00:00.251"),
-    "pandas' duration": ("0 days 00:00:00.250000", "0 days 00:00:00.251000"),
-}
-
-
-@pytest.mark.parametrize("kind", STAMPS)
-def test_dates_in_text_become_seconds(tmp_path: Path, kind: str) -> None:
-    first, second = STAMPS[kind]
-    found = read(tmp_path, HEAD + f"{first},0.65\n{second},1.65\n")
-    # A float64 holds times of day to 1e-11 s.
-    assert np.diff(found.values["time_s"]) == pytest.approx([0.001], abs=1e-10)
-    if "day" not in kind and "duration" not in kind:
-        assert found.values["time_s"][0] == 0.0
-        assert found.first_stamp == first
-
-
-@pytest.mark.parametrize(
-    ("rows", "message"),
-    [
-        (
-            "2024-05-01T12:00:00Z,1\n2024-05-01T12:00:01,2\n",
-            "line 3, column time_s: some dates have an offset",
-        ),
-        (
-            "2024-05-01T12:00:00,1\n05/01/2024 12:00:01,2\n",
-            "line 3, column time_s: '05/01/2024 12:00:01' is no date",
-        ),
-        ("05/01/2024 12:00:01,2\n", "line 2, column time_s: '05/01/2024 12:00:01' is not a number"),
-        ("2024-05-01T12:00:00,1\n3.5,2\n", "'3.5' is no date and time"),
-        ("12:00:00,1\n3.5,2\n", "'3.5' is no time as hours:minutes:seconds"),
-        ("0,2024-05-01T12:00:00\n", "line 2, column voltage_v: '2024-05-01T12:00:00' is not a number"),
-    ],
-)
-def test_dates_that_say_no_instant_are_refused(tmp_path: Path, rows: str, message: str) -> None:
-    with pytest.raises(EncoderError) as caught:
-        read(tmp_path, HEAD + rows)
-    assert message in str(caught.value)
-
-
-def test_clocks_that_go_back_are_refused(tmp_path: Path) -> None:
-    """Local time without its zone, over the end of summer time: the hour that comes twice is not guessed at."""
-    path = tmp_path / "t.csv"
-    path.write_text(HEAD + "2024-10-27T02:59:59,1\n2024-10-27T02:00:00,2\n")
-    with pytest.raises(EncoderError, match="line 3, column time_s: the time -3599 s does not come after 0 s"):
-        read_encoder(path)
-
-
-TIMES = pd.to_datetime(["2024-05-01T12:00:00.250", "2024-05-01T12:00:00.251", "2024-05-01T12:00:00.252"])
-ARROW = {
-    "timestamp[ns]": pa.array(TIMES.astype("datetime64[ns]")),
-    "timestamp[us]": pa.array(TIMES.astype("datetime64[us]")),
-    "timestamp[ms]": pa.array(TIMES.astype("datetime64[ms]")),
-    "timestamp[ns, tz]": pa.array(TIMES.astype("datetime64[ns]").tz_localize("Europe/Berlin")),
-    "time64[us]": pa.array([t.time() for t in TIMES], pa.time64("us")),
-    "time32[ms]": pa.array([t.time() for t in TIMES], pa.time32("ms")),
-    "duration[us]": pa.array(TIMES - TIMES[0], pa.duration("us")),
-    "float": pa.array([0.0, 0.001, 0.002]),
-    "decimal": pa.array([0, 0.001, 0.002]).cast(pa.decimal128(10, 6)),
-}
-
-
-@pytest.mark.parametrize("kind", ARROW)
-def test_dates_in_parquet_become_seconds(tmp_path: Path, kind: str) -> None:
-    path = tmp_path / "t.parquet"
-    phi = np.zeros(3)
-    pq.write_table(pa.table({"time_s": ARROW[kind], "voltage_v": phi, "phi1_rad": phi}), path)
-    found = read_encoder(path, column="voltage_v")
-    # A time of day of 43 200 s has a resolution of 7e-12 s.
-    assert np.diff(found.t_s) == pytest.approx([0.001, 0.001], abs=2e-11)
-    assert np.diff(read_angles(path).t_s) == pytest.approx([0.001, 0.001], abs=2e-11)
-    if kind.startswith("timestamp"):
-        assert found.t_s[0] == 0.0
-        assert "counted in s from the first, 2024-05-01T1" in found.notes[0]
-    swapped = tmp_path / "s.parquet"
-    if not kind.startswith(("float", "decimal")):
-        pq.write_table(pa.table({"time_s": np.arange(3.0), "voltage_v": ARROW[kind]}), swapped)
-        with pytest.raises(EncoderError, match=r"column voltage_v: the column is of type .* not numbers"):
-            read_encoder(swapped)
-
-
 def test_a_name_twice_in_parquet(tmp_path: Path) -> None:
     path = tmp_path / "t.parquet"
     twice = pa.Table.from_arrays([pa.array([0.0])] * 3, ["time_s", "phi1_rad", "phi1_rad"])
     pq.write_table(twice, path)
     with pytest.raises(AnglesError, match="the column phi1_rad is there 2 times"):
         read_angles(path)
-
-
-def test_stamps_in_tdms_become_seconds_to_their_resolution(tmp_path: Path) -> None:
-    path = tmp_path / "t.tdms"
-    first = np.datetime64("2026-01-01T00:00:00.250", "us")
-    stamps = first + np.arange(5) * np.timedelta64(20, "us")
-
-    def made(name: str, **properties: object) -> ChannelObject:
-        return ChannelObject("g", name, np.arange(5) / 10, properties=properties)
-
-    with TdmsWriter(path) as writer:
-        writer.write_segment(
-            [
-                ChannelObject("g", "when", stamps),
-                made("voltage_v", wf_increment=np.datetime64("2026-01-01T00:00:00")),
-                made("late", wf_increment=0.001, wf_start_offset="soon"),
-                made("still", wf_increment=0.0),
-            ]
-        )
-    found = read_encoder(path, column="voltage_v", time_column="when")
-    # The file keeps 2^-64 s, a float64 of 1e-4 s 1e-20 s.
-    assert found.t_s == pytest.approx(np.arange(5) * 20e-6, abs=1e-12)
-    assert "counted in s from the first, 2026-01-01T00:00:00.250000 UTC" in found.notes[0]
-    for channel, message in (
-        ("when", "channel when: the channel holds time stamps, not numbers"),
-        ("voltage_v", r"channel voltage_v: wf_increment is 2026-01-01T00:00:00.* not a number of seconds"),
-        ("late", "channel late: wf_start_offset is soon, not a number of seconds"),
-        ("still", r"channel still: its waveform increment \(wf_increment\) is 0 s"),
-    ):
-        with pytest.raises(EncoderError, match=message):
-            read_encoder(path, column=channel, time_column="late" if channel == "when" else None)
 
 
 def test_a_tdms_file_that_is_cut_says_so_and_nothing_else(
@@ -527,15 +259,3 @@ def test_a_tdms_file_that_is_cut_says_so_and_nothing_else(
     assert "\n" not in str(caught.value)
     # npTDMS prints what it meets.
     assert capfd.readouterr() == ("", "")
-
-
-def test_dates_given_as_arrays_become_seconds() -> None:
-    for unit in ("ms", "us", "ns"):
-        found = EncoderSignal(TIMES.to_numpy().astype(f"datetime64[{unit}]"), np.zeros(3))
-        assert found.t_s == pytest.approx([0.0, 0.001, 0.002], abs=1e-15)
-    berlin = zoneinfo.ZoneInfo("Europe/Berlin")
-    night = [datetime.datetime(2024, 10, 27, 2, 59, 59, tzinfo=berlin, fold=fold) for fold in (0, 1)]
-    utc = np.array([stamp.astimezone(datetime.UTC) for stamp in night])
-    assert LinkAngles(utc, np.zeros((2, 1)), np.zeros((2, 1)) + 1e-3).t_s.tolist() == [0.0, 3600.0]
-    spans = np.array([datetime.timedelta(milliseconds=k) for k in (5, 6)], dtype="timedelta64[us]")
-    assert EncoderSignal(spans, np.zeros(2)).t_s == pytest.approx([0.005, 0.006], abs=1e-15)

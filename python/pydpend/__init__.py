@@ -40,12 +40,13 @@ from pydpend.export import export
 from pydpend.filming import Film, Truth, film
 from pydpend.fit_options import FitOptions
 from pydpend.linear import lyapunov, modes, poincare
+from pydpend.live import NodeRow, Tracker, detect
 from pydpend.model import Damping, Model, derived, published, read_model
 from pydpend.nodes import Nodes, Rig, read_nodes
 from pydpend.scoring import Score, score
 from pydpend.simulate import Simulation, simulate, simulate_many
 from pydpend.states import LinkStates, savitzky_golay, states
-from pydpend.tracking import NodeRow, OverlayFilm, Setup, Tracker, detect, info, overlay, setup, track
+from pydpend.tracking import OverlayFilm, Setup, info, overlay, setup, track
 
 __all__ = [
     "AnglesError",

@@ -1,4 +1,4 @@
-"""Recordings to nodes: whole files, single images, a camera's live images.
+"""Recordings to nodes: what is in a file, its rig, its nodes, and the film with these drawn in.
 
 The work is done in Rust with the GIL released; here arguments get their words and results their names.
 """
@@ -8,44 +8,21 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pydpend import _tracker
-from pydpend.crossing import Found
+from pydpend._typing import Centroid, Decoder, Interlaced, PixelAspect, Polarity, Progress
 from pydpend.errors import ArgumentError, fault
+from pydpend.live import aspect_text
 from pydpend.nodes import Nodes, Rig, nodes_of, read_nodes
 from pydpend.output import AnyPath
 
 Path: TypeAlias = AnyPath
-Progress: TypeAlias = Callable[[str, int, int | None], object] | bool | None
-"""A callback ``(stage, done, total)``; None is a bar on a terminal or in a notebook, False is nothing."""
-
-Polarity: TypeAlias = Literal["auto", "bright", "dark"]
-Centroid: TypeAlias = Literal["weighted", "contour"]
-Decoder: TypeAlias = Literal["auto", "ffmpeg", "opencv"]
-Interlaced: TypeAlias = Literal["refuse", "as-frames"]
-PixelAspect: TypeAlias = tuple[int, int] | str
-"""Width to height of a pixel: ``(16, 15)`` or ``"16:15"``."""
-
-DETECTION = np.dtype(
-    [
-        ("x_px", np.float64),
-        ("y_px", np.float64),
-        ("sigma_px", np.float32),
-        ("area_px", np.float32),
-        ("peak", np.float32),
-        ("elongation", np.float32),
-        ("flags", np.uint8),
-    ]
-)
-"""One detection: centre (x right, y down), standard uncertainty of each coordinate, area, height above the
-background in the image's units, longer over shorter axis, and flags: 1 saturated, 2 at the border, 4 merged, 8 partial.
-"""
 
 
 def _frames(frames: tuple[int, int | None] | range | None) -> tuple[int, int | None] | None:
@@ -75,19 +52,6 @@ def _threads(threads: int | None) -> int:
             fault("threads", f"{threads} is out of range", "Give 1 or more, or None for one a core")
         )
     return int(threads)
-
-
-def _aspect(aspect: PixelAspect | None) -> str | None:
-    """As the compiled half takes it; it knows what makes sense."""
-    if aspect is None or isinstance(aspect, str):
-        return aspect
-    try:
-        width, height = aspect
-    except (TypeError, ValueError):
-        raise ArgumentError(
-            fault("pixel_aspect", f"{aspect!r} is no width and height", "Give (16, 15) or '16:15'")
-        ) from None
-    return f"{width}:{height}"
 
 
 def _count(name: str, value: int) -> int:
@@ -207,7 +171,7 @@ def track(
             _rig(rig),
             _frames(frames),
             (threshold, polarity, centroid),
-            (fps, decoder, interlaced, allow_protocol, _threads(threads), _aspect(pixel_aspect)),
+            (fps, decoder, interlaced, allow_protocol, _threads(threads), aspect_text(pixel_aspect)),
             None if output is None else os.fsdecode(output),
             existing,
             safe_csv,
@@ -276,7 +240,7 @@ def setup(
             os.fsdecode(path),
             _frames(frames),
             (threshold, polarity, "weighted"),
-            (fps, decoder, interlaced, allow_protocol, _threads(threads), _aspect(pixel_aspect)),
+            (fps, decoder, interlaced, allow_protocol, _threads(threads), aspect_text(pixel_aspect)),
             None if output is None else os.fsdecode(output),
             None if picture is None else os.fsdecode(picture),
             force,
@@ -387,133 +351,6 @@ def info(
     Raises:
         SourceError: if it cannot be opened, or its time stamps stand still.
     """
-    opened = (fps, decoder, "as-frames", allow_protocol, 0, _aspect(pixel_aspect))
+    opened = (fps, decoder, "as-frames", allow_protocol, 0, aspect_text(pixel_aspect))
     known: dict[str, Any] = json.loads(_tracker.info(os.fsdecode(path), opened))
     return known
-
-
-def _detections(found: Found) -> NDArray[np.void]:
-    xy_px, rest, flags = found
-    out = np.empty(len(flags), dtype=DETECTION)
-    out["x_px"], out["y_px"] = xy_px.T
-    for i, name in enumerate(("sigma_px", "area_px", "peak", "elongation")):
-        out[name] = rest[:, i]
-    out["flags"] = flags
-    return out
-
-
-def detect(
-    image: NDArray[Any],
-    *,
-    threshold: float | None = None,
-    polarity: Polarity = "auto",
-    centroid: Centroid = "weighted",
-    min_area_px: float | None = None,
-    max_area_px: float | None = None,
-    depth_bits: int | None = None,
-    pixel_aspect: PixelAspect | None = None,
-) -> NDArray[np.void]:
-    """Detects the markers of one image.
-
-    Args:
-        image: (H, W), uint8 or uint16, of any strides.
-        threshold: in the image's units; None is learned from the image.
-        polarity, centroid: as in `track`.
-        min_area_px, max_area_px: limits of a marker's area; None is learned.
-        depth_bits: significant bits of a sample, for example 12 in a uint16; None is all.
-        pixel_aspect: width to height of a pixel, (16, 15) or "16:15": discs are as much narrower; None is square.
-
-    Returns:
-        One entry per detection, of dtype `DETECTION`, ordered by y, then x.
-
-    Raises:
-        ArgumentError: if the image has the wrong type or shape.
-        DetectError: if no threshold can be learned.
-    """
-    area = (min_area_px, max_area_px)
-    return _detections(
-        _tracker.detect(image, (threshold, polarity, centroid), area, depth_bits, _aspect(pixel_aspect))
-    )
-
-
-@dataclass(frozen=True, eq=False)
-class NodeRow:
-    """N nodes in one image; what is not seen is NaN.
-
-    Attributes:
-        frame: number of the image.
-        xy_px: centres in px, (N, 2); x right, y down.
-        sigma_px: standard uncertainty of each coordinate in square px, (N,), as `Nodes.sigma_px`.
-        area_px: blob area in px, (N,).
-        status: as `Nodes.status`, (N,).
-    """
-
-    frame: int
-    xy_px: NDArray[np.float64]
-    sigma_px: NDArray[np.float32]
-    area_px: NDArray[np.float32]
-    status: NDArray[np.uint8]
-
-
-class Tracker:
-    """Follows the markers of a known rig image by image, for a camera's live loop.
-
-    It does not look ahead: what a whole recording would settle later stays ambiguous.
-
-    Args:
-        rig: nodes, bodies and joints, or a file of them.
-        threshold, polarity, centroid: as in `track`.
-        depth_bits: significant bits of a sample; None is all.
-
-    Raises:
-        RigError: if the rig is wrong.
-        ArgumentError: if an argument makes no sense.
-    """
-
-    def __init__(
-        self,
-        rig: Rig | Path,
-        *,
-        threshold: float | None = None,
-        polarity: Polarity = "auto",
-        centroid: Centroid = "weighted",
-        depth_bits: int | None = None,
-    ) -> None:
-        self.rig = rig if isinstance(rig, Rig) else Rig.read(rig)
-        self._next = 0
-        self._live = _tracker.LiveTracker(self.rig.to_json(), (threshold, polarity, centroid), depth_bits)
-
-    def learn(self, images: Iterable[NDArray[Any]]) -> None:
-        """Learns thresholds and noise from some images of the scene; else the first image tracked is all there is.
-
-        Args:
-            images: each (H, W), uint8 or uint16.
-
-        Raises:
-            ArgumentError: if an image has the wrong type, shape or size, or there is none.
-            DetectError: if no threshold can be learned.
-        """
-        self._live.learn(list(images))
-
-    def step(self, image: NDArray[Any], frame: int | None = None) -> NodeRow:
-        """The nodes in the next image.
-
-        Args:
-            image: (H, W), uint8 or uint16, of any strides, of the rig's size.
-            frame: its number, larger than that of the one before it; None is the next. Leave numbers out where the
-                camera lost images.
-
-        Raises:
-            ArgumentError: if the image has the wrong type, shape or size, or `frame` does not grow.
-        """
-        number = self._next if frame is None else int(frame)
-        if number < 0:
-            raise ArgumentError(fault("frame", f"{number} is below 0", "Count frames from 0"))
-        xy_px, sigma_px, area_px, status = self._live.step(image, number)
-        self._next = number + 1
-        return NodeRow(number, xy_px, sigma_px, area_px, status)
-
-    @property
-    def detections(self) -> NDArray[np.void]:
-        """What was detected in the last image, of dtype `DETECTION`."""
-        return _detections(self._live.detections())
