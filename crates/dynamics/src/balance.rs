@@ -1,4 +1,4 @@
-//! The two equations at one state: what does not depend on the accelerations, evaluated once, and their solution.
+//! Solves the two equations of motion at one state: what does not depend on the accelerations is evaluated once.
 
 use crate::parameters::{Field, Parameters};
 use crate::scalar::Real;

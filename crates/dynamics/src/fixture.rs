@@ -1,4 +1,4 @@
-//! The paper's pendulum with the corrected constants, for tests.
+//! Makes the paper's pendulum with the corrected constants, for tests.
 
 use crate::parameters::{Field, Fixed, Parameters};
 

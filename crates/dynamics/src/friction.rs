@@ -1,4 +1,4 @@
-//! Stick and slip: which contact each joint is in, what ends it, and what follows.
+//! Decides stick and slip: which contact each joint is in, what ends it, and what follows.
 
 use crate::motion::flow;
 use crate::parameters::{Field, Parameters};

@@ -1,4 +1,4 @@
-//! Accelerations, normal forces and energies.
+//! Computes accelerations, normal forces and energies of a state.
 //!
 //! Dry friction depends on the normal forces, these on the accelerations, and these on the friction. The two
 //! equations are solved together: Newton's method in `f64`, then one step in the scalar wanted, which carries the

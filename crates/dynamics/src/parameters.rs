@@ -1,4 +1,4 @@
-//! The numbers a pendulum is: reduced constants, what the normal forces and the drag need, and the coefficients.
+//! Holds the model parameters: inertial constants, constants of the normal forces and drag, damping coefficients.
 
 use crate::scalar::Real;
 

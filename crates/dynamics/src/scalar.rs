@@ -1,4 +1,4 @@
-//! The scalar the equations are written in: `f64`, or a forward-mode dual number with `N` directions.
+//! Defines the scalar of the equations: `f64`, or a forward-mode dual number with `N` directions.
 
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 

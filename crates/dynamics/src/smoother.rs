@@ -1,4 +1,4 @@
-//! Angle, rate and acceleration from noisy angles: Kalman filter and smoother of a Wiener process.
+//! Estimates angle, rate and acceleration from noisy angles: Kalman filter and smoother of a Wiener process.
 //!
 //! The highest derivative carried is driven by white noise: with three components (angle, rate, acceleration) the
 //! jerk is white noise of intensity `q` (rad^2/s^5), with four the jerk is carried and its derivative is white. The

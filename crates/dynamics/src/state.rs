@@ -1,4 +1,4 @@
-//! The state of the pendulum, how its joints' dry friction acts in it, and what the equations give for it.
+//! Defines the state of the pendulum, the contact of its joints, and what the equations give for them.
 
 /// `[phi1, phi2, w1, w2]`, rad and rad/s.
 pub type State<S> = [S; 4];

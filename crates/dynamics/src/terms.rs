@@ -1,4 +1,4 @@
-//! The one table of terms: each law of damping or driving with its generalised forces, its power and its parameter.
+//! Lists the laws in one table: each law of damping or driving with its generalised forces, its power and its parameter.
 //!
 //! Every force is linear in its coefficient: `Q = -coefficient * unit_force`, and the power it takes out of the
 //! motion is `coefficient * unit_force · w`. A moment of joint 2 acts on both links (erratum 13), which the unit

@@ -1,4 +1,4 @@
-//! The double pendulum's compiled half: converts, releases the GIL, maps errors; no algorithm.
+//! Passes the equations and the trajectory fit to Python: converts, releases the GIL, maps errors; no algorithm.
 //!
 //! Parameters cross as dictionaries of the names of `dynamics::Field`; arrays as NumPy float64.
 

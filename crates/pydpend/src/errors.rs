@@ -1,4 +1,4 @@
-//! Each error of the tracker as its own Python exception, those of `pydpend.errors`.
+//! Raises each error of the tracker as its own Python exception, those of `pydpend.errors`.
 //!
 //! Must not: define exceptions; Python does, so that they have one home.
 

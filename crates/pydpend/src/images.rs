@@ -1,4 +1,4 @@
-//! NumPy images as frames.
+//! Takes NumPy images as frames.
 //!
 //! Owns: what an image may be: (H, W), uint8 or uint16, any strides. A frame owns its bytes, so they are copied once.
 

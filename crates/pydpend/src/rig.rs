@@ -1,4 +1,4 @@
-//! A rig between Python, where it is JSON, and its file.
+//! Converts a rig between Python, where it is JSON, and its file.
 //!
 //! Owns: the JSON and TOML forms of a rig.
 

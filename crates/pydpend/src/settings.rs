@@ -1,4 +1,4 @@
-//! Settings of a run as keyword arguments.
+//! Converts keyword arguments to the settings of a run.
 //!
 //! Owns: their words. Words are those of the command line.
 

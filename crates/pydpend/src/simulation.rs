@@ -1,4 +1,4 @@
-//! Simulation, ensembles, sections, exponents and smoothing: conversions only.
+//! Passes simulation, ensembles, sections and exponents to Python: conversions only.
 
 use std::collections::HashMap;
 

@@ -1,4 +1,4 @@
-//! The smoother: conversions only.
+//! Passes the smoother to Python: conversions only.
 
 use dynamics::smoother::{Measured, Noise, Search, calibrate, learn, smooth};
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, ToPyArray};

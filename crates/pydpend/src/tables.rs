@@ -1,4 +1,4 @@
-//! Node tables to and from NumPy and Arrow.
+//! Converts node tables to and from NumPy and Arrow.
 //!
 //! Owns: how columns cross. Columns read here reach NumPy without a copy; what Python holds is copied once on its
 //! way to a file or to Arrow, because it is Python's and may change.

@@ -1,4 +1,4 @@
-//! A run as Python watches it: a progress callback, Ctrl-C.
+//! Lets Python watch a run: a progress callback, Ctrl-C.
 //!
 //! Owns: [`Watch`]. The interpreter is asked for ten times a second at most, so a run costs nothing for it.
 

@@ -1,4 +1,4 @@
-//! Text cells of CSV files.
+//! Writes and reads the text cells of CSV files.
 //!
 //! Owns: [`Cells`], [`split`], [`read_cell`].
 //!

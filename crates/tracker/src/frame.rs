@@ -1,4 +1,4 @@
-//! A frame, its time, and where frames come from.
+//! Defines the frame, its time, and the trait of whatever frames come from.
 //!
 //! Owns: [`Frame`], [`PixelFormat`], [`TimeBase`], [`SourceInfo`], [`RateClaims`], [`Ending`], the trait [`FrameSource`].
 //! Must not: decode, or look at a pixel's value beyond unpacking it.

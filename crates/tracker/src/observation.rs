@@ -1,4 +1,4 @@
-//! The observation of a node: its place in one frame, and how certain its name is.
+//! Holds the observation of a node: its place in one frame, and how certain its name is.
 //!
 //! Owns: [`Observation`], [`Status`]. Must not: know how it was made.
 

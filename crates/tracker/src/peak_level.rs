@@ -1,4 +1,4 @@
-//! The greatest sample of a frame, at the speed at which memory can be read.
+//! Finds the greatest sample of a frame at the speed of memory.
 //!
 //! Owns: [`peak_level`]. Must not: unpack a frame. Written so that the compiler makes vector instructions of it, once for
 //! every machine of the kind and once for those with AVX2.

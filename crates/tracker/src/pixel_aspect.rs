@@ -1,4 +1,4 @@
-//! How wide a recorded pixel is for its height, and the way from recorded pixels to square ones and back.
+//! Holds the pixel aspect (width to height) and converts recorded pixels to square ones and back.
 //!
 //! Owns: [`PixelAspect`], [`AspectOrigin`]. Must not: know where a recording says it.
 //!

@@ -1,4 +1,4 @@
-//! How well the nodes of a table keep their places in their bodies, and how they move.
+//! Computes how well the nodes of a table keep their places in their bodies, and how they move.
 //!
 //! Owns: [`NodeMotion`], [`residuals`]. Must not: change a table.
 

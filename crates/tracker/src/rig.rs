@@ -1,4 +1,4 @@
-//! The rig: nodes, bodies, joints, reference picture; and its TOML form.
+//! Defines the rig (nodes, bodies, joints, reference picture) and its TOML form.
 //!
 //! Owns: [`Rig`] and what makes one valid. Must not: look at a recording (`discover` does).
 

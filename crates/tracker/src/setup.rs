@@ -1,4 +1,4 @@
-//! A recording in, its rig out, with an annotated picture and advice.
+//! Finds the rig of a recording, with an annotated picture and advice.
 //!
 //! Owns: [`find`], [`Setup`]. Must not: find markers, bodies or places itself, or write files.
 

@@ -1,4 +1,4 @@
-//! The wish to stop, heard by long work that does not know whose wish it is.
+//! Carries the user's wish to stop to long work, which does not know who the user is.
 //!
 //! Owns: [`Stop`]. Must not: know of signals or of observers.
 

@@ -1,4 +1,4 @@
-//! Many motions at once, on all cores; the results do not depend on how many there are.
+//! Simulates many motions at once, on all cores; the results do not depend on how many there are.
 
 use rayon::prelude::*;
 

@@ -1,4 +1,4 @@
-//! The largest Lyapunov exponent, by the growth of an exactly carried tangent vector.
+//! Computes the largest Lyapunov exponent by the growth of an exactly carried tangent vector.
 
 use crate::analysis::simulate::Failure;
 use crate::integrate::dop853::{Step, next_factor};

@@ -1,4 +1,4 @@
-//! Poincaré sections: where a motion passes a given angle of one link, in a given direction.
+//! Computes Poincaré sections: where a motion passes a given angle of one link, in a given direction.
 
 use std::f64::consts::TAU;
 

@@ -1,4 +1,4 @@
-//! A motion with exact dry friction: DOP853 between located events, energies and works beside the state.
+//! Simulates a motion with exact dry friction: DOP853 between located events, energies and works beside the state.
 
 use crate::integrate::flight::{Flight, SIZE, state};
 use crate::motion::{energies, flow};

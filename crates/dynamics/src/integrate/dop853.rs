@@ -1,4 +1,4 @@
-//! One step of DOP853 (order 8, error estimates of orders 5 and 3) and its dense output (order 7), for autonomous
+//! Takes one step of DOP853 (order 8, error estimates of orders 5 and 3) and its dense output (order 7), for autonomous
 //! equations over any [`Real`] scalar.
 
 use crate::integrate::tableau::{A, ALL_STAGES, B, D as DENSE_WEIGHTS, DENSE, E3, E5, STAGES};

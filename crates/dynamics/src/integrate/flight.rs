@@ -1,4 +1,4 @@
-//! A pendulum on its way: DOP853 steps between located changes of contact.
+//! Integrates a motion: DOP853 steps between located changes of contact.
 
 use crate::friction::{Friction, Joints, rate};
 use crate::integrate::dop853::{Dense, Step, next_factor};

@@ -1,4 +1,4 @@
-//! Coefficients of DOP853: Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I (2nd ed., Springer
+//! Lists the coefficients of DOP853: Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I (2nd ed., Springer
 //! 1993), program `dop853.f`. Rows are sparse: `(stage, coefficient)`.
 
 /// Stages of one step; the derivative at its end is stage [`STAGES`] (first same as last).

@@ -1,8 +1,8 @@
-//! What the errors of the common unknowns are made of: whose errors the information carries, and the scores.
+//! Computes the parts of the shared parameters' covariance: whose errors the information carries, and the scores.
 //!
 //! Take the solution as linear in its residuals. Each residual, of an angle or of a jump, has a derivative with respect
-//! to the shared parameters when the states follow it as they do at the minimum; with these derivatives `J` and weights `W` the
-//! shared parameters' error is `-(J' W J)^-1 J' W e`. So the covariance of the shared parameters is a sum over the sources of `e`, whatever
+//! to the shared parameters when the states follow them as they do at the minimum; with these derivatives `J` and weights
+//! `W` the shared parameters' error is `-(J' W J)^-1 J' W e`. So their covariance is a sum over the sources of `e`, whatever
 //! the weights are: the noise of the angles and the jumps count each with the variance they have, not with the one
 //! they were allowed.
 

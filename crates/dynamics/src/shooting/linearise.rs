@@ -1,4 +1,4 @@
-//! One segment's residuals, its part of the normal equations, and its end, with exact derivatives.
+//! Linearises one segment: residuals, its part of the normal equations, and its end, with exact derivatives.
 
 use nalgebra::{DMatrix, DVector, Matrix4, Matrix4xX, Vector4};
 

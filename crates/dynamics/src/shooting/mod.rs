@@ -1,4 +1,4 @@
-//! The trajectory fit: multiple shooting on the equations of motion.
+//! Fits trajectories: multiple shooting on the equations of motion.
 //!
 //! A recording is cut into short segments, each with its own free state at its start. The residuals are measured
 //! minus integrated angles, and the jumps from one segment's end to the next one's start. Sensitivities are exact

@@ -1,4 +1,4 @@
-//! One segment of motion in any scalar: fixed-order steps sized by the rates, samples from a quintic Hermite
+//! Integrates one segment of motion in any scalar: fixed-order steps sized by the rates, samples from a quintic Hermite
 //! interpolant, and exact crossings of the dry-friction switches.
 //!
 //! Where a joint's rate changes sign the step is cut at the crossing. The crossing's time is itself a scalar with

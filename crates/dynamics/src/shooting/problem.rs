@@ -1,4 +1,4 @@
-//! What is fitted: recordings cut into segments, and what is free.
+//! Defines the fit's problem: recordings cut into segments, and what is free.
 
 use crate::parameters::Field;
 

@@ -1,4 +1,4 @@
-//! A first guess of the state somewhere in a recording: local cubics through the angles.
+//! Guesses the state somewhere in a recording: local cubics through the angles.
 
 use nalgebra::{Matrix4, Vector4};
 

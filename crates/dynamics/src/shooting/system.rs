@@ -1,4 +1,4 @@
-//! The whole problem: cost, normal equations, the step within the bounds.
+//! Assembles and solves the whole problem: cost, normal equations, the step within the bounds.
 
 use nalgebra::{DMatrix, DVector, Matrix4, Matrix4xX, Vector4};
 use rayon::prelude::*;

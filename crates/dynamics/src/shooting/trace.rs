@@ -1,4 +1,4 @@
-//! The fitted motion at every sample, and the power of each term along it.
+//! Traces the fitted motion at every sample, and the power of each term along it.
 
 use rayon::prelude::*;
 

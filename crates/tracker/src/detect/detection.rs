@@ -1,4 +1,4 @@
-//! A detection: the centre of one blob that may be a marker, with what makes it less trustworthy.
+//! Holds a detection: the centre of one blob that may be a marker, with what makes it less trustworthy.
 //!
 //! Owns: [`Detection`], [`Flags`]. Must not: know how a centre is found.
 

@@ -1,4 +1,4 @@
-//! One frame in, detections out; the stages in order.
+//! Detects the markers of one frame: label, fit, flag, undo the lens, in that order.
 //!
 //! Owns: [`Detector`] and its scratch. Must not: learn from the frames it sees: each frame's result depends on
 //! that frame alone, so frames can be spread over threads in any way.
@@ -6,6 +6,7 @@
 use std::sync::Arc;
 
 use super::centre::contours::contour_centres;
+use super::centre::disc::Disc;
 use super::centre::disc_fit::{DiscFit, Fitted};
 use super::centre::edge_table::EdgeTable;
 use super::centre::normal_equations::DiscModel;
@@ -23,6 +24,21 @@ use super::settings::{Centroid, DetectSettings};
 use super::side::Side;
 use crate::error::{Error, Fault, Place, Result};
 use crate::frame::Frame;
+
+/// Least area of a neighbouring blob that is kept out of a fit, px.
+const LEAST_NEIGHBOUR_PX: u64 = 4;
+/// Rounds of fitting two touching discs, each with the other kept out of it.
+const SPLIT_ROUNDS: usize = 3;
+/// Relative difference of a split disc's radius from a marker's that is allowed: in spreads of the radii, and at least.
+const SPLIT_SPREADS: f64 = 4.0;
+const SPLIT_RADIUS_SLACK: f64 = 0.12;
+/// Least distance of two split discs, in radii.
+const SPLIT_APART_RADII: f64 = 0.8;
+/// Longer over shorter axis from which a blob is no disc: it is smeared over more than its radius.
+const DISC_ELONGATION: f64 = 1.6;
+/// Pixels beyond the blurred edge, on both sides, that tell base and height: where markers stand out, and in noise.
+const BAND_PX: f64 = 0.5;
+const NOISY_BAND_PX: f64 = 2.0;
 
 /// Finds the markers of one frame at a time. One for each thread.
 #[derive(Debug)]
@@ -133,8 +149,8 @@ impl Detector {
     }
 
     /// Discs of the two blobs nearest to blob `i` that reach into its window.
-    fn neighbours(&self, i: usize) -> [[f64; 3]; 2] {
-        let mut near = [[0.0; 3]; 2];
+    fn neighbours(&self, i: usize) -> [Option<Disc>; 2] {
+        let mut near = [None; 2];
         let Some(table) = &self.table else { return near };
         let blob = &self.blobs[i];
         let reach = table.reach_px.ceil() * 2.0 + 4.0;
@@ -147,10 +163,10 @@ impl Detector {
         let mut n = 0;
         for b in before.chain(after) {
             let meets = b.x0 <= right && b.x1 >= left && b.y0 <= below && b.y1 >= above;
-            if meets && b.area >= 4 && n < 2 {
-                let [x, y] = b.mean();
-                near[n] =
-                    [x, y, (b.area as f64 / std::f64::consts::PI).sqrt() * b.elongation(self.sides).sqrt()];
+            if meets && b.area >= LEAST_NEIGHBOUR_PX && n < 2 {
+                // As large as its longer axis.
+                let disc = Disc::of_area(b.mean(), b.area as f64);
+                near[n] = Some(Disc { radius_px: disc.radius_px * b.elongation(self.sides).sqrt(), ..disc });
                 n += 1;
             }
         }
@@ -163,21 +179,20 @@ impl Detector {
         let (Some(table), Some(marker)) = (&self.table, self.levels.marker) else { return false };
         let fit = disc_fit(table, &self.levels);
         let mut found = None;
-        for _ in 0..3 {
+        for _ in 0..SPLIT_ROUNDS {
             // Each with the other kept out of it, then again with the better places.
             let fa = self.window.fit_beside(pixels, blob, &fit, a, b);
             let fb = self.window.fit_beside(pixels, blob, &fit, b, a);
             let (Some(fa), Some(fb)) = (fa, fb) else { return false };
-            a = [fa.x_px, fa.y_px, fa.radius_px];
-            b = [fb.x_px, fb.y_px, fb.radius_px];
+            (a, b) = (fa.disc(), fb.disc());
             found = Some([fa, fb]);
         }
         let Some(found) = found else { return false };
-        let slack = (4.0 * marker.radius_spread).max(0.12);
+        let slack = (SPLIT_SPREADS * marker.radius_spread).max(SPLIT_RADIUS_SLACK);
         let good = found.iter().all(|f| {
             f.chi2 < shape::misfit_limit(&self.levels) && (f.radius_px / marker.radius_px - 1.0).abs() < slack
-        }) && ((a[0] - b[0]) * self.sides[0]).hypot((a[1] - b[1]) * self.sides[1])
-            > 0.8 * marker.radius_px;
+        }) && ((a.x_px - b.x_px) * self.sides[0]).hypot((a.y_px - b.y_px) * self.sides[1])
+            > SPLIT_APART_RADII * marker.radius_px;
         if !good {
             return false;
         }
@@ -190,16 +205,17 @@ impl Detector {
                 area_px: (std::f64::consts::PI * f.radius_px * f.radius_px) as f32,
                 peak: centre.peak as f32,
                 elongation: 1.0,
-                flags: Flags(Flags::MERGED | if f.saturated >= 3 { Flags::SATURATED } else { 0 }),
+                flags: Flags(
+                    Flags::MERGED | if f.saturated >= shape::SATURATED_PIXELS { Flags::SATURATED } else { 0 },
+                ),
             });
         }
         true
     }
 
-    fn centre(&mut self, pixels: &Pixels<'_>, blob: &Blob, avoid: [[f64; 3]; 2]) -> Centre {
-        // A disc smeared over more than its radius is no disc any more.
+    fn centre(&mut self, pixels: &Pixels<'_>, blob: &Blob, avoid: [Option<Disc>; 2]) -> Centre {
         if let Some(table) = &self.table
-            && blob.elongation(self.sides) < 1.6
+            && blob.elongation(self.sides) < DISC_ELONGATION
         {
             let fit = disc_fit(table, &self.levels);
             if let Some(f) = self.window.fit(pixels, blob, &fit, avoid)
@@ -268,7 +284,7 @@ fn is_sound(d: &Detection) -> bool {
 
 fn disc_fit<'a>(table: &'a EdgeTable, levels: &Levels) -> DiscFit<'a> {
     // In much noise more pixels beside the edge are worth their time.
-    let band_px = if levels.clear() { 0.5 } else { 2.0 };
+    let band_px = if levels.high_contrast() { BAND_PX } else { NOISY_BAND_PX };
     let model = DiscModel { table, noise: levels.noise, side: levels.side, saturation: levels.saturation };
     DiscFit { model, band_px, usual_chi2: levels.marker.map_or(1.0, |m| m.chi2) }
 }

@@ -1,4 +1,4 @@
-//! Lens correction of centres.
+//! Corrects centres for the lens's distortion.
 //!
 //! Owns: [`Undistort`]. Must not: touch images.
 

@@ -1,4 +1,4 @@
-//! The levels of a recording: polarity, background, threshold, noise, limits of area, typical marker.
+//! Holds the levels of a recording: polarity, background, threshold, noise, limits of area, typical marker.
 //!
 //! Owns: [`Levels`]. Must not: learn them (`learn` does).
 
@@ -9,6 +9,9 @@ use super::marker::Marker;
 use super::noise::Noise;
 use super::side::Side;
 use crate::pixel_aspect::PixelAspect;
+
+/// Contrast, in standard deviations of the background's noise, above which a misfit of one pixel shows.
+const HIGH_CONTRAST_SIGMA: f64 = 30.0;
 
 /// What was learned of a recording. Written into the table's metadata.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -48,9 +51,9 @@ pub struct Levels {
 }
 
 impl Levels {
-    /// Whether markers stand out so far that a misfit of one pixel shows.
-    pub(crate) fn clear(&self) -> bool {
-        self.contrast > 30.0 * self.noise.variance(self.noise.dark).sqrt()
+    /// Whether one wrong pixel of a marker is significant: contrast above 30 sigma of the background's noise.
+    pub(crate) fn high_contrast(&self) -> bool {
+        self.contrast > HIGH_CONTRAST_SIGMA * self.noise.variance(self.noise.dark).sqrt()
     }
 
     /// The threshold at a place, raw units: a pixel of a bright marker is at least this, of a dark one at most.

@@ -1,4 +1,4 @@
-//! The typical marker of a recording: radius, blur of its edge, misfit of its disc.
+//! Holds the typical marker of a recording: radius, blur of its edge, misfit of its disc.
 //!
 //! Owns: [`Marker`]. Must not: learn it (`learn_marker` does).
 

@@ -1,4 +1,4 @@
-//! From a frame to the centres of its markers.
+//! Detects markers: from a frame to the centres of its markers.
 //!
 //! Owns: [`Detection`], [`DetectSettings`], [`Levels`] (what was learned of the recording) and [`Detector`].
 //! Must not: know of nodes, bodies or other frames.

@@ -1,4 +1,4 @@
-//! The noise of a sample: its variance as a function of its value.
+//! Models the noise of a sample: its variance as a function of its value.
 //!
 //! Owns: [`Noise`]. Must not: measure it (`learn` does).
 

@@ -1,4 +1,4 @@
-//! Reading a frame's samples whatever their format.
+//! Reads a frame's samples whatever their format.
 //!
 //! Owns: [`Pixels`]. Must not: judge a sample.
 

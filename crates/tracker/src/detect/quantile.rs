@@ -1,4 +1,4 @@
-//! Quantiles of a set of values.
+//! Computes quantiles of a set of values.
 //!
 //! Owns: [`sorted`], [`quantile`]. Must not: know what the values are.
 

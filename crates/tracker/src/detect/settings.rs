@@ -1,4 +1,4 @@
-//! The settings of detection: threshold, polarity, kind of centre, limits of area, region, lens.
+//! Defines the settings of detection: threshold, polarity, kind of centre, limits of area, region, lens.
 //!
 //! Owns: [`DetectSettings`], [`Threshold`], [`Polarity`], [`Centroid`]. Must not: learn what a setting leaves open
 //! (`learn` does).

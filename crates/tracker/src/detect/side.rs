@@ -1,4 +1,4 @@
-//! The side on which markers stand out from their surroundings: brighter or darker.
+//! Holds the polarity that was found: markers brighter or darker than their surroundings.
 //!
 //! Owns: [`Side`]. Must not: find out which side it is (`learn` does).
 

@@ -1,4 +1,4 @@
-//! What a user should change about a rig, a camera or a recording before trusting it.
+//! Advises what to change about a rig, a camera or a recording before trusting it.
 //!
 //! Owns: [`advise`]. Must not: look at pixels.
 

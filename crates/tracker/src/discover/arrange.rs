@@ -1,4 +1,4 @@
-//! Joints between bodies, their order from the pivot outwards, and names.
+//! Finds the joints between bodies, orders the bodies from the pivot outwards, and names them.
 //!
 //! Owns: [`Found`], [`arrange`]. Must not: look for bodies.
 

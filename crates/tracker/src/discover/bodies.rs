@@ -1,4 +1,4 @@
-//! Rigid bodies from the constancy of distances over the whole recording.
+//! Finds rigid bodies by the constancy of distances over the whole recording.
 //!
 //! Owns: [`find_bodies`], [`poses`]. Must not: link frames by nearness: a marker may go any way between two of
 //! them, only distances count.

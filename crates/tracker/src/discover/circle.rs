@@ -1,4 +1,4 @@
-//! The circle on which a marker goes about a joint that has none.
+//! Fits the circle on which a marker goes about a joint that has no marker.
 //!
 //! Owns: [`Circle`]. A lone marker has no angle of its own; that it keeps its distance from a point of the image or of
 //! another body shows where its link turns.

@@ -1,4 +1,4 @@
-//! Markers that belong to no body of three: alone, or the only one of their link.
+//! Finds markers that belong to no body of three: alone, or the only one of their link.
 //!
 //! Owns: [`find_lone`]. Here frames are linked by nearness, since there are no distances to go by.
 

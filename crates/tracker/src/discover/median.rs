@@ -1,4 +1,4 @@
-//! The median of points, coordinate by coordinate.
+//! Computes the median of points, coordinate by coordinate.
 //!
 //! Owns: [`middle`]. Must not: know what the points are.
 

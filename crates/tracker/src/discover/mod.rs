@@ -1,4 +1,4 @@
-//! The rig of a recording, found in its detections: nodes, bodies, joints, reference picture.
+//! Finds the rig of a recording in its detections: nodes, bodies, joints, reference picture.
 //!
 //! Owns: [`discover`], [`Discovery`]. Must not: name markers frame by frame (`track` does), or look at pixels.
 

@@ -1,4 +1,4 @@
-//! Frames that differ from each other, and what stands still in them.
+//! Takes frames that differ from each other, and finds what stands still in them.
 //!
 //! Owns: [`Sample`]. Must not: know of bodies.
 

@@ -1,4 +1,4 @@
-//! The film with the drawings.
+//! Writes the recording as a film with nodes and bodies drawn into it.
 //!
 //! Owns: [`film`], [`FilmSettings`]. Must not: draw.
 

@@ -1,4 +1,4 @@
-//! The recording with nodes, names, bodies, trails and gaps drawn into it, as pictures and as a film.
+//! Draws nodes, names, bodies, trails and gaps into a recording, as pictures and as a film.
 //!
 //! Owns: [`Overlay`], [`still`], [`film`]. Must not: track: it draws what a table says.
 

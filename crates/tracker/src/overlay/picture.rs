@@ -1,4 +1,4 @@
-//! Frames as OpenCV's pictures, and pictures as bytes and files.
+//! Converts frames to OpenCV's pictures, and pictures to bytes and files.
 //!
 //! Owns: [`colour`], [`rgb`], [`size`], [`save`]. Must not: draw.
 

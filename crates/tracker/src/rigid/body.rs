@@ -1,4 +1,4 @@
-//! The rig as the tracker uses it: templates in body coordinates, hinges, the order from the pivot outwards.
+//! Holds the rig as the tracker uses it: templates in body coordinates, hinges, the order from the pivot outwards.
 //!
 //! Owns: [`Link`], [`Hinge`], [`Mechanism`]. Must not: look at detections.
 

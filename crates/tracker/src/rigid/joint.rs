@@ -1,4 +1,4 @@
-//! The point that a body turns about, or that two bodies share, from their poses.
+//! Finds the point that a body turns about, or that two bodies share, from their poses.
 //!
 //! Owns: [`Turning`], [`Shared`]. Must not: know which bodies a rig says are joined.
 //!

@@ -1,4 +1,4 @@
-//! Pose of a rigid body in the image by weighted least squares.
+//! Fits the pose of a rigid body in the image by weighted least squares.
 //!
 //! Owns: [`Pair`], [`PoseFit`], [`fit_pose`]. Must not: decide which detection is which node.
 //!

@@ -19,7 +19,7 @@ use super::pose::{Pair, PoseFit, fit_pose, place, pose_at};
 pub const REACH_SIGMA: f64 = 5.1;
 /// Pairs of nodes from which a free body is sought.
 pub const PAIRS: usize = 60;
-/// Rounds of picking detections and fitting the pose; most hypotheses repeat their picks after two.
+/// Rounds of picking detections and fitting the pose, at most.
 const REFINE_ROUNDS: usize = 6;
 /// Distance of two anchors that fix the pose alone, in their standard uncertainties: the angle is then known to 1/20 rad.
 const LEAST_BASE_SIGMA: f64 = 20.0;

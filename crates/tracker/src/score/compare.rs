@@ -1,4 +1,4 @@
-//! The comparison itself: which node stands for which marker, and what follows from it.
+//! Compares a table with the truth: which node stands for which marker, and what follows from it.
 //!
 //! Owns: [`Comparison`]. Must not: read tables.
 

@@ -1,4 +1,4 @@
-//! How good a node table is, measured against the truth of a film.
+//! Measures how good a node table is against the truth of a film.
 //!
 //! Owns: [`Tracked`], [`Score`], [`score`]. Must not: know how the table was made.
 //!

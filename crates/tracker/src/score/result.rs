@@ -1,4 +1,4 @@
-//! The places that are compared with a film's truth, and the figures of the comparison.
+//! Holds the places that are compared with a film's truth, and the figures of the comparison.
 //!
 //! Owns: [`Tracked`], [`Score`] and its parts. Must not: compare.
 

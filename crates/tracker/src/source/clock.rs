@@ -1,4 +1,4 @@
-//! The clock of a rate that is given.
+//! Makes the time base of a rate that the user gives.
 //!
 //! Owns: [`time_base`]. Must not: read anything.
 

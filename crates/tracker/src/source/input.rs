@@ -1,4 +1,4 @@
-//! What the name of a recording stands for: a file, a pipe, an address.
+//! Tells what the name of a recording stands for: a file, a pipe, an address.
 //!
 //! Owns: [`Input`], [`is_read_once`]. Must not: open a recording.
 

@@ -1,4 +1,4 @@
-//! Where frames come from: one file per container, told apart by their first bytes.
+//! Opens recordings and reads their frames: one folder or file per container, told apart by their first bytes.
 //!
 //! Owns: [`open`], [`OpenOptions`], [`Decoder`]. Must not: look at what is in a picture.
 

@@ -1,4 +1,4 @@
-//! Compressed film through OpenCV's `VideoCapture`: a second, independent decoder to check the first against.
+//! Decodes compressed film through OpenCV's `VideoCapture`: a second, independent decoder to check the first against.
 //!
 //! Owns: [`OpencvSource`]. OpenCV makes blue, green and red of every picture and we make brightness of these,
 //! so it costs more and gives 8 bits only. Its times of frames are wrong at the end of streams with reordered

@@ -1,4 +1,4 @@
-//! What a user may say about reading a recording.
+//! Defines the options of reading a recording.
 
 use crate::message::Message;
 use crate::pixel_aspect::{AspectOrigin, PixelAspect};

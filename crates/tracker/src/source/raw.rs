@@ -1,4 +1,4 @@
-//! Frames that lie in a file as they are: each is read when its pixels are first looked at, by whoever looks.
+//! Lends frames that lie in a file as they are: each is read when its pixels are first looked at, by whoever looks.
 //!
 //! Owns: [`RawFrames`], [`Stored`]. Read and not mapped into memory: where another program cuts a file that is mapped, the
 //! system ends this program by a signal; a read says how much there was. Must not: know what a header says.

@@ -1,4 +1,4 @@
-//! A run of consecutive frames with their detections, and its form on disk.
+//! Holds a run of consecutive frames with their detections, and writes and reads its form on disk.
 //!
 //! Owns: [`Block`], its bytes. Must not: open a file.
 

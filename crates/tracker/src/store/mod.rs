@@ -1,4 +1,4 @@
-//! The detections of a whole recording, kept while the rig is found and the markers are followed.
+//! Keeps the detections of a whole recording while the rig is found and the markers are followed.
 //!
 //! Owns: [`FrameStamp`], [`DetectionStore`]. A recording is decoded once; its detections are small, yet those of
 //! an hour are not: past a bound they go to disk, in blocks, and memory does not grow with the recording.

@@ -1,4 +1,4 @@
-//! The file behind a store: blocks with checksums, so that what a killed run left is known to be good.
+//! Writes and reads the file behind a store: blocks with checksums, so that what a killed run left is known to be good.
 //!
 //! Owns: [`Spool`]. Form: `PDSPOOL1`, then records of an 8-byte head `kind (4 bytes), payload length (u32)`, the
 //! CRC-32 of kind, length and payload (u32), and the payload. Kinds: `HEAD` (text of the run's settings, first),

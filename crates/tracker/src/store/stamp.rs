@@ -1,4 +1,4 @@
-//! The stamp of a frame: its index and time, without its pixels.
+//! Holds the stamp of a frame: its index and time, without its pixels.
 //!
 //! Owns: [`FrameStamp`]. Must not: hold detections.
 

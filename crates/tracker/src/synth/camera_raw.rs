@@ -1,4 +1,4 @@
-//! Photron recordings: pixels in `.mraw`, facts in `.cih`. For trying out and testing; layouts as read by `source`.
+//! Writes Photron recordings: pixels in `.mraw`, facts in `.cih`. For trying out and testing; layouts as read by `source`.
 
 use std::fs::File;
 use std::io::{BufWriter, Write};

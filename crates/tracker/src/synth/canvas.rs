@@ -1,4 +1,4 @@
-//! An image being painted, in levels.
+//! Paints discs, bars and light into an image of levels.
 //!
 //! Owns: [`Canvas`], [`ground`].
 

@@ -1,4 +1,4 @@
-//! Exact areas: how much of a pixel a disc or a turned rectangle covers.
+//! Computes exactly how much of a pixel a disc or a turned rectangle covers.
 //!
 //! Owns: [`disc_rectangle_area`], [`Quad`]. Must not: know of images, light or markers.
 

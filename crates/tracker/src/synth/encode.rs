@@ -1,4 +1,4 @@
-//! Gray frames into a video file through FFmpeg's libraries.
+//! Encodes gray frames into a video file through FFmpeg's libraries.
 //!
 //! Owns: [`Codec`], [`VideoWriter`], [`encode_image`]. Must not: know of scenes; whoever has gray frames may use it.
 

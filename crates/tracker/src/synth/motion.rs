@@ -1,4 +1,4 @@
-//! Where every link is at a time.
+//! Computes the pose of every link at a time.
 //!
 //! Owns: [`MotionTable`], `Mechanism`. Must not: know any physics; a pendulum's motion comes as a table.
 

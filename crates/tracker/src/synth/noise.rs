@@ -1,4 +1,4 @@
-//! From the expected level of a pixel to the number that the camera writes.
+//! Draws the number that the camera writes from the expected level of a pixel.
 //!
 //! The model, per pixel and frame, all in grey levels of the recording:
 //!

@@ -1,4 +1,4 @@
-//! Scenes that come with the program: the paper's layout and the eight scenes by which tracking is judged.
+//! Makes the scenes that come with the program: the paper's layout and the eight scenes by which tracking is judged.
 //!
 //! The layout follows Fig. 5: three markers on the upper link, six on the lower, some of them beside the bar so that
 //! most are seen when the lower link passes behind the upper.

@@ -1,4 +1,4 @@
-//! What is filmed: camera, light, links, markers and mishaps; and the TOML form of it.
+//! Defines the scene: camera, light, links, markers and mishaps; and the TOML form of it.
 //!
 //! Owns: [`Scene`] and what makes one valid. Must not: move or draw anything.
 //!

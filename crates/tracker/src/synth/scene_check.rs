@@ -1,4 +1,4 @@
-//! Whether a scene makes sense.
+//! Checks that a scene makes sense.
 //!
 //! Owns: [`Scene::check`]. Must not: change a scene.
 

@@ -1,4 +1,4 @@
-//! The files that the frames of a film are written to, each by the ending of its name.
+//! Writes frames to the file or files of a film, whose form the ending of the name says.
 //!
 //! Owns: [`Sink`], [`files`]. Must not: make frames.
 

@@ -1,4 +1,4 @@
-//! A scene as a recording, without a file: what tests and benches read.
+//! Reads a scene as a recording without a file, for tests and benches.
 
 use std::sync::Arc;
 

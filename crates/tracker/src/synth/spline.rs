@@ -1,4 +1,4 @@
-//! Cubic splines through a table of angles or places.
+//! Interpolates a table of angles or places with cubic splines.
 
 /// A cubic spline through points of increasing time; twice continuously differentiable.
 ///

@@ -1,4 +1,4 @@
-//! What is true of a frame: where every marker is and how much of it can be seen.
+//! Computes the truth of a frame: where every marker is and how much of it can be seen.
 //!
 //! Owns: [`NodeTruth`], [`FrameTruth`], `visible_part`. The table's form is in [`super::truth_table`].
 

@@ -1,4 +1,4 @@
-//! The table of what is true of a film, Parquet or CSV by the ending.
+//! Writes and reads the truth of a film as a table, Parquet or CSV by the ending.
 //!
 //! One row per frame and marker, ordered by frame, then marker:
 //!

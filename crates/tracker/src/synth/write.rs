@@ -1,4 +1,4 @@
-//! A film into a file, or into many.
+//! Writes a film into a file, or into many.
 //!
 //! | name ends in | what is written |
 //! |---|---|

@@ -1,4 +1,4 @@
-//! What makes a node table valid, for whoever reads one and for whoever writes one.
+//! Checks that a node table is valid, for whoever reads one and for whoever writes one.
 //!
 //! Owns: [`NodeTable::check`], [`first_fault`]. Must not: read or write.
 

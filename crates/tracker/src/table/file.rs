@@ -1,4 +1,4 @@
-//! A table's file: its form by the ending, a temporary name until it is whole.
+//! Writes and reads a table's file: its form by the ending, a temporary name until it is whole.
 //!
 //! Owns: [`Form`], [`TableWriter`], [`read_table`]. Must not: know how a form looks inside.
 

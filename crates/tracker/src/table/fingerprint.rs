@@ -1,4 +1,4 @@
-//! What tells one recording from another without reading all of it.
+//! Computes a fingerprint that tells one recording from another without reading all of it.
 //!
 //! Owns: [`Fingerprint`], [`changed`].
 

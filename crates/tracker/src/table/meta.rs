@@ -1,4 +1,4 @@
-//! Where a node table comes from: rig, recording, settings, ending. No clock, no host, no folder, so that the
+//! Holds a node table's metadata: rig, recording, settings, ending. No clock, no host, no folder, so that the
 //! same recording and settings give the same bytes.
 //!
 //! Owns: [`TableMeta`] and its text forms. Must not: open the recording's pixels.

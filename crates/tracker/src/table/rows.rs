@@ -1,4 +1,4 @@
-//! Rows of a node table held in memory, column by column.
+//! Holds the rows of a node table in memory, column by column.
 //!
 //! Owns: [`Rows`], [`NodeTable`], the names of the columns, the words of the column `status`. Must not: read or write files.
 

@@ -1,4 +1,4 @@
-//! What the writers and readers of both forms share.
+//! Shares between the writers and readers of both forms what they have in common.
 //!
 //! Owns: the length of a row group, the name of a CSV's metadata file, the errors of reading and of writing a table.
 

@@ -1,4 +1,4 @@
-//! What became of each node, counted as the rows go by.
+//! Counts what became of each node as the rows go by.
 //!
 //! Owns: [`Tally`], [`NodeSummary`]. Must not: keep rows.
 

@@ -1,4 +1,4 @@
-//! The paper's centre: OpenCV's `findContours` and `moments` (Section 5.2).
+//! Computes the paper's centre: OpenCV's `findContours` and `moments` (Section 5.2).
 //!
 //! Owns: [`contour_centres`]. It is what `--centroid contour` uses, and the oracle of the tests.
 

@@ -1,4 +1,4 @@
-//! The centre of a disc by weighted least squares on the pixels of its edge: maximum likelihood for the noise
+//! Fits the centre of a disc by weighted least squares on the pixels of its edge: maximum likelihood for the noise
 //! that was learned.
 //!
 //! Owns: [`DiscFit`], [`Fitted`]. Must not: decide what is a marker.
@@ -10,6 +10,7 @@
 
 use std::array::from_fn;
 
+use super::disc::Disc;
 use super::edge_pixels::{Patch, Ring};
 use super::normal_equations::{DiscModel, Factor, MOVING, Normal, STILL};
 use crate::detect::side::Side;
@@ -40,6 +41,13 @@ pub(crate) struct Fitted {
     pub smear_px: [f64; 2],
 }
 
+impl Fitted {
+    /// The disc.
+    pub fn disc(&self) -> Disc {
+        Disc { x_px: self.x_px, y_px: self.y_px, radius_px: self.radius_px }
+    }
+}
+
 /// The fit of a disc: its model, and which pixels it takes.
 #[derive(Clone, Copy)]
 pub(crate) struct DiscFit<'a> {
@@ -53,12 +61,14 @@ pub(crate) struct DiscFit<'a> {
 /// Where a fit begins and what it leaves alone.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Start {
-    /// `[x, y, radius, base, height]`.
-    pub disc: [f64; 5],
+    pub disc: Disc,
+    /// Brightness outside and its change to the inside, raw units.
+    pub base: f64,
+    pub height: f64,
     /// Path of the centre during the exposure, px.
     pub smear_px: [f64; 2],
-    /// Discs of neighbours, `[x, y, radius]`; a radius of 0 is none.
-    pub avoid: [[f64; 3]; 2],
+    /// Discs of neighbours.
+    pub avoid: [Option<Disc>; 2],
 }
 
 /// A path shorter than this cannot be told from none, px.
@@ -83,16 +93,16 @@ impl DiscFit<'_> {
 
     fn settle<const N: usize>(&self, patch: &Patch<'_>, start: &Start, ring: &mut Ring) -> Option<Fitted> {
         let sign = self.model.side.sign();
-        let [x, y, first_radius, base, height] = start.disc;
+        let Disc { x_px: x, y_px: y, radius_px: first_radius } = start.disc;
         let [path_x, path_y] = start.smear_px;
-        // Where the pixels were chosen: x, y, radius, length of the path.
-        let mut origin = [x, y, first_radius, path_x.hypot(path_y)];
+        // Where the pixels were chosen, and for a path of which length.
+        let (mut origin, mut origin_path) = (start.disc, path_x.hypot(path_y));
         // Relative to it x and y, as they are radius, base, height and path.
-        let all = [0.0, 0.0, first_radius, sign * base, sign * height, path_x, path_y];
+        let all = [0.0, 0.0, first_radius, sign * start.base, sign * start.height, path_x, path_y];
         let mut p: [f64; N] = from_fn(|i| all[i]);
         let length = |x: f64, y: f64| (x * x + y * y).sqrt();
         let path = |p: &[f64; N]| if N == MOVING { length(p[N - 2], p[N - 1]) } else { 0.0 };
-        self.choose(patch, &origin, &start.avoid, ring);
+        self.choose(patch, origin, origin_path, &start.avoid, ring);
         let (mut round, mut chosen) = (0, 1);
         loop {
             if ring.used < 12 {
@@ -107,7 +117,7 @@ impl DiscFit<'_> {
             for (v, s) in p.iter_mut().zip(&step) {
                 *v += s * scale;
             }
-            let at = [origin[0] + p[0], origin[1] + p[1]];
+            let at = [origin.x_px + p[0], origin.y_px + p[1]];
             let strayed = length(at[0] - x, at[1] - y) > 0.5 * first_radius + 1.0
                 || p[2] < 0.5 * first_radius
                 || p[2] > 1.6 * first_radius
@@ -116,12 +126,14 @@ impl DiscFit<'_> {
             if strayed || p.iter().any(|v| !v.is_finite()) {
                 return None;
             }
-            let off = length(p[0], p[1]) + (p[2] - origin[2]).abs() + (0.5 * (path(&p) - origin[3])).max(0.0);
+            let off = length(p[0], p[1])
+                + (p[2] - origin.radius_px).abs()
+                + (0.5 * (path(&p) - origin_path)).max(0.0);
             if off > SLACK_PX && chosen < 4 {
-                origin = [at[0], at[1], p[2], path(&p)];
+                (origin, origin_path) = (Disc { x_px: at[0], y_px: at[1], radius_px: p[2] }, path(&p));
                 p[0] = 0.0;
                 p[1] = 0.0;
-                self.choose(patch, &origin, &start.avoid, ring);
+                self.choose(patch, origin, origin_path, &start.avoid, ring);
                 chosen += 1;
                 continue;
             }
@@ -153,22 +165,30 @@ impl DiscFit<'_> {
         }
     }
 
-    /// Chooses the pixels near the edge of a disc, `[x, y, radius, length of its path]`.
-    fn choose(&self, patch: &Patch<'_>, disc: &[f64; 4], avoid: &[[f64; 3]; 2], ring: &mut Ring) {
-        let [cx, cy, r, path] = *disc;
-        let reach = self.model.table.reach_px + SLACK_PX + path / 2.0 + self.band_px;
+    /// Chooses the pixels near the edge of a disc that moved along a path of `path_px`.
+    fn choose(
+        &self,
+        patch: &Patch<'_>,
+        disc: Disc,
+        path_px: f64,
+        avoid: &[Option<Disc>; 2],
+        ring: &mut Ring,
+    ) {
+        let Disc { x_px: cx, y_px: cy, radius_px: r } = disc;
+        let reach = self.model.table.reach_px + SLACK_PX + path_px / 2.0 + self.band_px;
         let (outer, inner) = (r + reach, (r - reach).max(0.0));
         ring.choose(patch, [cx, cy], inner, outer);
         let filled = ring.used.next_multiple_of(LANES);
         if self.model.side == Side::Dark {
             ring.value[..filled].iter_mut().for_each(|v| *v = -*v);
         }
-        if avoid.iter().any(|a| a[2] > 0.0) {
+        if avoid.iter().any(Option::is_some) {
             // A pixel that shows, in part, a neighbour's disc.
             let near = self.model.table.reach_px + SLACK_PX;
             for i in 0..ring.used {
                 let (x, y) = (cx + f64::from(ring.x[i]), cy + f64::from(ring.y[i]));
-                if avoid.iter().any(|a| a[2] > 0.0 && (x - a[0]).hypot(y - a[1]) < a[2] + near) {
+                let covers = |a: &Disc| (x - a.x_px).hypot(y - a.y_px) < a.radius_px + near;
+                if avoid.iter().flatten().any(covers) {
                     ring.live[i] = 0.0;
                 }
             }

@@ -1,4 +1,4 @@
-//! The pixels near the edge of a disc, packed one after another.
+//! Packs the pixels near the edge of a disc one after another.
 //!
 //! Owns: [`Patch`], [`Ring`]. Must not: judge them.
 

@@ -1,4 +1,4 @@
-//! How much of a pixel a disc with a blurred edge covers, as a table.
+//! Tabulates how much of a pixel a disc with a blurred edge covers.
 //!
 //! Owns: [`EdgeTable`]. Must not: fit anything.
 

@@ -1,6 +1,7 @@
 //! Finds the centre of a blob: the fit of a disc, the centroid by intensity, or the paper's contour.
 
 pub(super) mod contours;
+pub(super) mod disc;
 pub(super) mod disc_fit;
 pub(super) mod edge_pixels;
 pub(super) mod edge_table;

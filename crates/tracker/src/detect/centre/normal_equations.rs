@@ -1,4 +1,4 @@
-//! The normal equations of a disc's fit and their solution.
+//! Sums and solves the normal equations of a disc's fit.
 //!
 //! Owns: [`DiscModel`], [`Normal`], [`Factor`]. Must not: choose pixels, or take a step.
 
@@ -10,14 +10,14 @@ use crate::detect::noise::Noise;
 use crate::detect::side::Side;
 use crate::detect::simd::lanes::{Eight, Job, LANES, work};
 
-/// Free numbers of a disc that stands still and of one that moves.
+/// Number of free parameters of a disc that stands still, and of one that moves during the exposure.
 pub(crate) const STILL: usize = 5;
 pub(crate) const MOVING: usize = 7;
 
-/// Distance of the places along a path whose mean stands for it, px, and how many there may be: closer ones
+/// Step (px) and maximum number of samples along the motion-blur path, whose mean stands for it: finer steps
 /// cannot be told from a line.
-const SHIFT_PX: f64 = 0.45;
-const MOST_SHIFTS: usize = 32;
+const PATH_STEP_PX: f64 = 0.45;
+const MAX_PATH_SAMPLES: usize = 32;
 /// The model of a disc's pixels: the edge's coverage, the noise of a sample, and the value at which samples saturate.
 #[derive(Clone, Copy)]
 pub(crate) struct DiscModel<'a> {
@@ -194,7 +194,7 @@ impl<const N: usize> Job for Equations<'_, N> {
         if N == MOVING {
             // A smeared disc is the mean of discs along its path, each by the part of the path to there.
             let path = [p[N - 2], p[N - 1]];
-            let count = ((path[0].hypot(path[1]) / SHIFT_PX).ceil() as usize).clamp(3, MOST_SHIFTS);
+            let count = ((path[0].hypot(path[1]) / PATH_STEP_PX).ceil() as usize).clamp(3, MAX_PATH_SAMPLES);
             let share = all(1.0 / count as f32);
             found.iter_mut().for_each(|f| f.sums = Default::default());
             for k in 0..count {

@@ -1,10 +1,11 @@
-//! The sub-pixel centre of a blob and how sure it is.
+//! Computes the sub-pixel centre of a blob and its uncertainty from the pixels around it.
 //!
 //! Owns: [`Centre`], [`Window`]. Must not: decide what is a marker.
 //!
 //! A disc is a circle in the world, not in pixels that are wider than high: places are in recorded pixels, but lengths
 //! (radii, paths, uncertainties) are in units of the square of a pixel's area.
 
+use super::disc::Disc;
 use super::disc_fit::{DiscFit, Fitted, LEAST_PATH_PX, Start};
 use super::edge_pixels::{Patch, Ring};
 use crate::detect::label::components::Blob;
@@ -47,9 +48,18 @@ pub(crate) struct Window {
     ring: Ring,
 }
 
-/// What an unknown shape adds to the uncertainty of its weighted centre: about what edges that fall on pixels in
-/// different ways move the centre of a small sharp blob, px.
+/// Floor of the centroid's uncertainty, px: pixel-phase bias of a small sharp blob (measured in `tests/accuracy`).
 const SHAPE_PX: f64 = 0.01;
+/// Distance, px, and part of the radius within which the moments' disc must agree with the blob to begin the fit from it.
+const NEAR_PX: f64 = 0.5;
+const NEAR_RADIUS: f64 = 0.2;
+/// Ratio of chi-square to the usual one from which a path is tried: five standard deviations of chi-square over some
+/// hundred pixels, and worth the time.
+const SMEARED_CHI2: f64 = 1.6;
+/// Ratio of chi-square with a path to that without below which the path is believed.
+const SMEARED_GAIN: f64 = 0.7;
+/// Distance beyond the blurred edge, on both sides, at which base and top are first looked at, px.
+const BEYOND_EDGE_PX: f64 = 0.7;
 
 /// Longer over shorter axis from which a blob may be two beside each other.
 const LONG: f64 = 1.6;
@@ -57,6 +67,9 @@ const LONG: f64 = 1.6;
 const GAP: f64 = 0.6;
 /// Stretches along a blob.
 const STRETCHES: usize = 48;
+
+/// Rounds of the centroid, each about the centre of the one before.
+const CENTROID_ROUNDS: usize = 3;
 
 /// Pixels that the window reaches beyond the blob: two for the edge's foot, two for the background.
 const MARGIN: usize = 4;
@@ -128,8 +141,8 @@ impl Window {
         (n > 0).then(|| f64::from(values[(n - 1) / 2] + values[n / 2]) / 2.0)
     }
 
-    /// The disc with the window's first moments above the base, and of that height: `[x, y, radius]`.
-    fn moments(&self, base: f64, height: f64) -> [f64; 3] {
+    /// The disc with the window's first moments above the base, and of that height.
+    fn moments(&self, base: f64, height: f64) -> Disc {
         let values = &self.heights[..self.height * self.stride];
         let [sum, sum_x, sum_y] = work(Sums { values, width: self.width, stride: self.stride });
         let (w, h) = (self.width as f64, self.height as f64);
@@ -137,40 +150,43 @@ impl Window {
         let light = sum - ground;
         let x = (sum_x - ground * (w - 1.0) / 2.0) / light;
         let y = (sum_y - ground * (h - 1.0) / 2.0) / light;
-        [self.x0 as f64 + x, self.y0 as f64 + y, (light / height / std::f64::consts::PI).max(0.0).sqrt()]
+        Disc {
+            x_px: self.x0 as f64 + x,
+            y_px: self.y0 as f64 + y,
+            radius_px: (light / height / std::f64::consts::PI).max(0.0).sqrt(),
+        }
     }
 
     /// A disc fitted to a blob's edge, smeared along a path where that explains it better; `None` where none
-    /// fits. `avoid` are discs of neighbours, `[x, y, radius]`.
+    /// fits. `avoid` are discs of neighbours.
     pub fn fit(
         &mut self,
         pixels: &Pixels<'_>,
         blob: &Blob,
         fit: &DiscFit<'_>,
-        avoid: [[f64; 3]; 2],
+        avoid: [Option<Disc>; 2],
     ) -> Option<Fitted> {
         self.load(pixels, blob, (fit.model.table.reach_px + fit.band_px + 1.0).ceil() as usize);
-        let [cx, cy] = blob.mean();
-        let radius = (blob.area as f64 / std::f64::consts::PI).sqrt();
-        let mut start = self.start(fit, [cx, cy, radius], avoid)?;
+        let whole = Disc::of_area(blob.mean(), blob.area as f64);
+        let mut start = self.start(fit, whole, avoid)?;
         // Of a disc alone on its ground moments are so near that one round is enough.
-        let [_, _, _, base, height] = start.disc;
-        let [x, y, r] = self.moments(base, height);
-        let near = (x - cx).abs() < 0.5 && (y - cy).abs() < 0.5 && (r / radius - 1.0).abs() < 0.2;
-        if near && avoid == [[0.0; 3]; 2] {
-            start.disc = [x, y, r, base, height];
+        let found = self.moments(start.base, start.height);
+        let near = (found.x_px - whole.x_px).abs() < NEAR_PX
+            && (found.y_px - whole.y_px).abs() < NEAR_PX
+            && (found.radius_px / whole.radius_px - 1.0).abs() < NEAR_RADIUS;
+        if near && avoid == [None; 2] {
+            start.disc = found;
         }
         let sharp = self.run(fit, &start)?;
-        // Five standard deviations of chi-square over some hundred pixels, and worth the time.
-        if sharp.chi2 < 1.6 * fit.usual_chi2.max(1.0) {
+        if sharp.chi2 < SMEARED_CHI2 * fit.usual_chi2.max(1.0) {
             return Some(sharp);
         }
         let Some(smear_px) = self.smear(&sharp) else { return Some(sharp) };
         let path = smear_px[0].hypot(smear_px[1]);
         self.load(pixels, blob, (fit.model.table.reach_px + fit.band_px + path / 2.0 + 1.0).ceil() as usize);
-        let disc = [sharp.x_px, sharp.y_px, sharp.radius_px, sharp.base, sharp.height];
-        match self.run(fit, &Start { disc, smear_px, avoid }) {
-            Some(smeared) if smeared.chi2 < 0.7 * sharp.chi2 => Some(smeared),
+        let start = Start { disc: sharp.disc(), base: sharp.base, height: sharp.height, smear_px, avoid };
+        match self.run(fit, &start) {
+            Some(smeared) if smeared.chi2 < SMEARED_GAIN * sharp.chi2 => Some(smeared),
             _ => Some(sharp),
         }
     }
@@ -181,11 +197,11 @@ impl Window {
         pixels: &Pixels<'_>,
         blob: &Blob,
         fit: &DiscFit<'_>,
-        disc: [f64; 3],
-        other: [f64; 3],
+        disc: Disc,
+        other: Disc,
     ) -> Option<Fitted> {
         self.load(pixels, blob, (fit.model.table.reach_px + fit.band_px + 1.0).ceil() as usize);
-        let start = self.start(fit, disc, [other, [0.0; 3]])?;
+        let start = self.start(fit, disc, [Some(other), None])?;
         self.run(fit, &start)
     }
 
@@ -200,21 +216,19 @@ impl Window {
             sides: self.sides,
         };
         let [wide, high] = self.sides;
-        let scaled = |[x, y, radius]: [f64; 3]| [x * wide, y * high, radius];
-        let [x, y, radius, base, height] = start.disc;
-        let [x, y, radius] = scaled([x, y, radius]);
-        let start = Start { disc: [x, y, radius, base, height], avoid: start.avoid.map(scaled), ..*start };
+        let scaled = |d: Disc| Disc { x_px: d.x_px * wide, y_px: d.y_px * high, ..d };
+        let start = Start { disc: scaled(start.disc), avoid: start.avoid.map(|d| d.map(scaled)), ..*start };
         let mut fitted = fit.fit(&patch, &start, &mut self.ring)?;
         fitted.x_px /= wide;
         fitted.y_px /= high;
         Some(fitted)
     }
 
-    fn start(&self, fit: &DiscFit<'_>, disc: [f64; 3], avoid: [[f64; 3]; 2]) -> Option<Start> {
-        let [cx, cy, radius] = disc;
-        let base = self.around(cx, cy, radius + fit.model.table.reach_px + 0.7)?;
-        let top = self.around(cx, cy, (radius - fit.model.table.reach_px - 0.7).max(0.0))?;
-        Some(Start { disc: [cx, cy, radius, base, top - base], smear_px: [0.0; 2], avoid })
+    fn start(&self, fit: &DiscFit<'_>, disc: Disc, avoid: [Option<Disc>; 2]) -> Option<Start> {
+        let Disc { x_px: cx, y_px: cy, radius_px: radius } = disc;
+        let base = self.around(cx, cy, radius + fit.model.table.reach_px + BEYOND_EDGE_PX)?;
+        let top = self.around(cx, cy, (radius - fit.model.table.reach_px - BEYOND_EDGE_PX).max(0.0))?;
+        Some(Start { disc, base, height: top - base, smear_px: [0.0; 2], avoid })
     }
 
     /// The path that would give a disc its second moments: along the longer axis the variance grows by a
@@ -329,7 +343,7 @@ impl Window {
         let mut result = Centre::default();
         let threshold = levels.threshold(cx, cy);
         let mut ground = std::mem::take(&mut self.ground);
-        for _ in 0..3 {
+        for _ in 0..CENTROID_ROUNDS {
             // The background is the mean of a ring just outside.
             ground.clear();
             for (j, row) in self.rows().enumerate() {

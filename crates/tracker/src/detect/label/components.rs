@@ -1,11 +1,11 @@
-//! Connected components in one pass: runs of pixels beyond the threshold, joined to the row above.
+//! Labels connected components in one pass: runs of pixels beyond the threshold, joined to the row above.
 //!
 //! Owns: [`Blob`], [`Labeller`]. Must not: know where the threshold comes from, or find a centre.
 //!
 //! Pixels are neighbours along sides and corners (8-connected).
 
 use super::plan::{CELL_PX, Plan, Segment};
-use super::prefilter::{MANY, Sample, Skip};
+use super::prefilter::{MASK_BITS, Prefilter, Sample};
 use crate::detect::pixels::Pixels;
 use crate::detect::side::Side;
 use crate::frame::PixelFormat;
@@ -120,7 +120,7 @@ pub(crate) struct Labeller {
     parents: Vec<u32>,
     blobs: Vec<Blob>,
     row: Vec<u16>,
-    skip: Skip,
+    prefilter: Prefilter,
 }
 
 impl Labeller {
@@ -131,11 +131,11 @@ impl Labeller {
         self.blobs.clear();
         self.above.clear();
         self.here.clear();
-        let mut skip = std::mem::take(&mut self.skip);
-        skip.find(pixels, plan, side);
+        let mut prefilter = std::mem::take(&mut self.prefilter);
+        prefilter.find(pixels, plan, side);
         let mut row = None;
-        let mut ahead = skip.marks().skip(AHEAD);
-        for (y, column) in skip.marks() {
+        let mut ahead = prefilter.marks().skip(AHEAD);
+        for (y, column) in prefilter.marks() {
             if let Some((y, column)) = ahead.next() {
                 pixels.fetch(y as usize, (column * CELL_PX) as usize, CELL_PX as usize);
             }
@@ -155,7 +155,7 @@ impl Labeller {
         }
         drop(ahead);
         self.next_row(true);
-        self.skip = skip;
+        self.prefilter = prefilter;
         for i in 0..self.blobs.len() {
             if self.parents[i] as usize == i {
                 out.push(self.blobs[i]);
@@ -193,14 +193,14 @@ impl Labeller {
         let Some(limit) = T::limit(s.threshold, side) else { return };
         let mut open: Option<u32> = None;
         let mut x = s.start;
-        let (many, rest) = row.as_chunks::<MANY>();
-        let mut last = [limit; MANY];
+        let (many, rest) = row.as_chunks::<MASK_BITS>();
+        let mut last = [limit; MASK_BITS];
         last[..rest.len()].copy_from_slice(rest);
         for many in many.iter().chain((!rest.is_empty()).then_some(&last)) {
             let mask = T::beyond(many, limit, side);
             // What begins or ends: beyond here and not just before, or the other way round.
             let mut turns = mask ^ (mask << 1 | u64::from(open.is_some()));
-            if x + MANY as u32 > s.end {
+            if x + MASK_BITS as u32 > s.end {
                 turns &= (1 << (s.end - x)) - 1;
             }
             while turns != 0 {
@@ -214,7 +214,7 @@ impl Labeller {
                     }
                 };
             }
-            x += MANY as u32;
+            x += MASK_BITS as u32;
         }
         if let Some(x0) = open {
             self.run(x0, s.end, edge_row || (s.edge.0 && x0 == s.start) || s.edge.1);

@@ -1,4 +1,4 @@
-//! Where to look: the region of interest as spans of rows.
+//! Turns the region of interest into spans of rows.
 //!
 //! Owns: [`Spans`]. Must not: read a pixel.
 

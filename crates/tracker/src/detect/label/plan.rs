@@ -1,4 +1,4 @@
-//! What to look at in a frame and with which threshold.
+//! Plans which cells of a frame are looked at, and with which threshold.
 //!
 //! Owns: [`Plan`], [`Segment`], [`Cell`]. Must not: read a pixel, or know where the threshold comes from.
 

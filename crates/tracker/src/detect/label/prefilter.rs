@@ -1,6 +1,7 @@
-//! Passing over background at the speed of memory: which cells may hold a pixel beyond the threshold.
+//! Marks the row cells that may hold a pixel beyond the threshold, at the speed of memory (the prefilter); only those are
+//! labelled.
 //!
-//! Owns: [`Skip`], the trait [`Sample`]. Must not: say where in a cell. The extreme of many samples, or saturating
+//! Owns: [`Prefilter`], the trait [`Sample`]. Must not: say where in a cell. The extreme of many samples, or saturating
 //! differences or-ed together, and one test at the end.
 
 use std::array::from_fn;
@@ -14,8 +15,8 @@ use crate::detect::pixels::{Pixels, fetch};
 use crate::detect::side::Side;
 use crate::frame::PixelFormat;
 
-/// Samples whose bits are found together.
-pub(crate) const MANY: usize = 64;
+/// Samples per bit mask.
+pub(crate) const MASK_BITS: usize = 64;
 
 /// A sample that can be compared with a threshold many at a time.
 pub(crate) trait Sample: Copy {
@@ -24,7 +25,7 @@ pub(crate) trait Sample: Copy {
     /// Whether any sample in blocks of little-endian bytes is beyond the limit.
     fn any(blocks: &[Block], limit: Self, side: Side) -> bool;
     /// Which of many samples are beyond the limit, as bits from the lowest on.
-    fn beyond(many: &[Self; MANY], limit: Self, side: Side) -> u64;
+    fn beyond(many: &[Self; MASK_BITS], limit: Self, side: Side) -> u64;
 }
 
 macro_rules! sample {
@@ -56,7 +57,7 @@ macro_rules! sample {
             }
 
             #[inline(always)]
-            fn beyond(many: &[Self; MANY], limit: Self, side: Side) -> u64 {
+            fn beyond(many: &[Self; MASK_BITS], limit: Self, side: Side) -> u64 {
                 $beyond(many, limit, side)
             }
         }
@@ -70,7 +71,7 @@ const BLOCK: usize = 32;
 type Block = [u8; BLOCK];
 
 #[inline(always)]
-fn beyond_u8(many: &[u8; MANY], limit: u8, side: Side) -> u64 {
+fn beyond_u8(many: &[u8; MASK_BITS], limit: u8, side: Side) -> u64 {
     let limit = u8x16::splat(limit);
     let within = many.as_chunks().0.iter().enumerate().fold(0, |bits, (i, few)| {
         let values = u8x16::new(*few);
@@ -84,7 +85,7 @@ fn beyond_u8(many: &[u8; MANY], limit: u8, side: Side) -> u64 {
 }
 
 #[inline(always)]
-fn beyond_u16(many: &[u16; MANY], limit: u16, side: Side) -> u64 {
+fn beyond_u16(many: &[u16; MASK_BITS], limit: u16, side: Side) -> u64 {
     let limit = u16x8::splat(limit);
     let within = many.as_chunks().0.iter().enumerate().fold(0, |bits, (i, few)| {
         let values = u16x8::new(*few);
@@ -198,8 +199,8 @@ fn pass_u16<'a>(pixels: &Pixels<'a>, plan: &Plan, side: Side, marks: &mut Marks)
     }
 }
 
-/// Bytes or words that are worked on together.
-const FEW: usize = 32;
+/// Bytes or words per vector.
+const VECTOR_LANES: usize = 32;
 
 /// For a packed format: at each byte of a cell's a big-endian word holds one whole sample or none; there are `N` words
 /// at even and as many at odd bytes. `keep` takes the neighbours' upper bits away, `limit` is the threshold shifted to
@@ -248,11 +249,12 @@ impl<const N: usize> Coarse<N> {
     #[inline(always)]
     fn any<const BRIGHT: bool>(&self, bytes: &[u8]) -> bool {
         let (keep, limit) = (self.keep.as_flattened(), self.limit.as_flattened());
-        let mut beyond = [0; FEW];
-        for few in 0..(2 * N).div_ceil(FEW) {
+        let mut beyond = [0; VECTOR_LANES];
+        for few in 0..(2 * N).div_ceil(VECTOR_LANES) {
             // The last ones may be looked at twice.
-            let at = (few * FEW).min(2 * N - FEW);
-            let (bytes, keep, limit) = (&bytes[at..at + FEW], &keep[at..at + FEW], &limit[at..at + FEW]);
+            let at = (few * VECTOR_LANES).min(2 * N - VECTOR_LANES);
+            let (bytes, keep, limit) =
+                (&bytes[at..at + VECTOR_LANES], &keep[at..at + VECTOR_LANES], &limit[at..at + VECTOR_LANES]);
             for (i, beyond) in beyond.iter_mut().enumerate() {
                 let v = bytes[i] & keep[i];
                 *beyond |= if BRIGHT { v.saturating_sub(limit[i]) } else { limit[i].saturating_sub(v) };
@@ -290,13 +292,17 @@ impl<const N: usize> Words<N> {
     // Written so that the compiler makes one vector of what is beyond.
     #[inline(always)]
     fn any<const BRIGHT: bool>(&self, bytes: &[u8]) -> bool {
-        let mut beyond = [0; FEW];
+        let mut beyond = [0; VECTOR_LANES];
         for (phase, (keep, limit)) in self.keep.iter().zip(&self.limit).enumerate() {
             let words: &[[u8; 2]] = bytes[phase..phase + 2 * N].as_chunks().0;
-            for few in 0..N.div_ceil(FEW) {
+            for few in 0..N.div_ceil(VECTOR_LANES) {
                 // The last ones may be looked at twice.
-                let at = (few * FEW).min(N - FEW);
-                let (words, keep, limit) = (&words[at..at + FEW], &keep[at..at + FEW], &limit[at..at + FEW]);
+                let at = (few * VECTOR_LANES).min(N - VECTOR_LANES);
+                let (words, keep, limit) = (
+                    &words[at..at + VECTOR_LANES],
+                    &keep[at..at + VECTOR_LANES],
+                    &limit[at..at + VECTOR_LANES],
+                );
                 for (i, beyond) in beyond.iter_mut().enumerate() {
                     let v = u16::from_be_bytes(words[i]) & keep[i];
                     *beyond |= if BRIGHT { v.saturating_sub(limit[i]) } else { limit[i].saturating_sub(v) };
@@ -341,7 +347,7 @@ impl<const N: usize, const BRIGHT: bool> Test for Packed<'_, N, BRIGHT> {
         });
         let words = &self.known[i].1;
         let start = line.bit + cell.start as usize * self.bits;
-        // What is next but one in this stream: a cell takes so long that a processor does not look that far ahead.
+        // Prefetch two cells ahead: the hardware prefetcher does not reach that far here.
         if let Some(next) = line.bytes.get(start / 8 + 4 * N..start / 8 + 6 * N) {
             next.chunks(64).for_each(fetch);
         }
@@ -394,7 +400,7 @@ const fn words_of(bits: usize) -> usize {
 
 /// Finds the cells of a frame that may hold a pixel beyond the threshold; owns its scratch.
 #[derive(Debug, Default)]
-pub(crate) struct Skip {
+pub(crate) struct Prefilter {
     marks: Marks,
     known_10: Known<{ words_of(10) }>,
     known_12: Known<{ words_of(12) }>,
@@ -402,7 +408,7 @@ pub(crate) struct Skip {
     side: Option<Side>,
 }
 
-impl Skip {
+impl Prefilter {
     /// The cells that may hold a pixel beyond their threshold, row by row. None is left out that does; pixels just
     /// beside a cell may be the reason that it is there.
     pub fn find(&mut self, pixels: &Pixels<'_>, plan: &Plan, side: Side) {
@@ -419,7 +425,7 @@ impl Skip {
         }
     }
 
-    /// What [`Skip::find`] found, in order.
+    /// What [`Prefilter::find`] found, in order.
     pub fn marks(&self) -> impl Iterator<Item = Mark> {
         self.marks.iter().flatten().copied()
     }
@@ -448,19 +454,22 @@ mod tests {
                         values[y * w + x] = t;
                         let bytes = crate::detect::pixels::pack(&values, bits);
                         let pixels = Pixels::of_samples(&bytes, w, h, format);
-                        let mut skip = Skip::default();
-                        skip.find(&pixels, &Plan::uniform(w, h, t, side), side);
+                        let mut prefilter = Prefilter::default();
+                        prefilter.find(&pixels, &Plan::uniform(w, h, t, side), side);
                         let mark = (y as u32, x as u32 / CELL_PX);
-                        assert!(skip.marks().any(|m| m == mark), "{format:?} {side:?} {x} {y}");
+                        assert!(prefilter.marks().any(|m| m == mark), "{format:?} {side:?} {x} {y}");
                         // The pixel's own cell, one beside it, and of packed rows the last one.
-                        assert!(skip.marks().count() <= 3, "{format:?} {side:?} {x} {y}");
+                        assert!(prefilter.marks().count() <= 3, "{format:?} {side:?} {x} {y}");
                         // A step farther and nothing is beyond.
                         let farther = match side {
                             Side::Bright => t + 1,
                             Side::Dark => t - 1,
                         };
-                        skip.find(&pixels, &Plan::uniform(w, h, farther, side), side);
-                        assert!(skip.marks().all(|m| m == (6, 2)), "{format:?} {side:?} {x} {y} farther");
+                        prefilter.find(&pixels, &Plan::uniform(w, h, farther, side), side);
+                        assert!(
+                            prefilter.marks().all(|m| m == (6, 2)),
+                            "{format:?} {side:?} {x} {y} farther"
+                        );
                     }
                 }
             }

@@ -1,4 +1,4 @@
-//! The background of a recording and its noise, robust against the markers on it.
+//! Learns the background of a recording and its noise, robust against the markers on it.
 //!
 //! Owns: [`Background`]. Must not: know which side markers are on.
 

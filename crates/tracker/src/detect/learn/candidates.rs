@@ -1,4 +1,4 @@
-//! Which polarity and which height make markers out of a recording: tried, and judged by the blobs that come.
+//! Chooses polarity and threshold: tries both and judges them by the blobs that come.
 //!
 //! Owns: the choice. Must not: find centres.
 
@@ -24,7 +24,7 @@ pub(crate) struct Field<'a> {
 }
 
 impl Field<'_> {
-    /// Every how manieth image is tried.
+    /// Stride over the sample images.
     fn step(&self) -> usize {
         self.images.len().div_ceil(FRAMES).max(1)
     }

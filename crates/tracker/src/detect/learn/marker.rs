@@ -61,9 +61,7 @@ pub(crate) fn learn(
             .into_par_iter()
             .map_init(
                 || Window::new(sides),
-                |window, i| {
-                    window.fit(&samples[i].pixels, &samples[i].blob, &fit, [[0.0; 3]; 2]).map(|f| (i, f))
-                },
+                |window, i| window.fit(&samples[i].pixels, &samples[i].blob, &fit, [None; 2]).map(|f| (i, f)),
             )
             .flatten()
             .filter(|(_, f)| f.rms < LARGEST_MISFIT * f.height.abs() + 2.0 * read.sqrt())

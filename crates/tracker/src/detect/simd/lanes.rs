@@ -1,4 +1,4 @@
-//! Eight single-precision numbers worked on together: on every processor, and by AVX2 where that is found at run time.
+//! Computes with eight single-precision numbers at once: on every processor, and by AVX2 where that is found at run time.
 //!
 //! Owns: [`Eight`], [`Job`], [`work`]. Must not: round differently from one processor to another; there are only operations
 //! that IEEE 754 defines to the bit.

@@ -1,3 +1,3 @@
-//! Vector arithmetic with the same bits on every processor.
+//! Does vector arithmetic with the same bits on every processor.
 
 pub(super) mod lanes;

@@ -1,4 +1,4 @@
-//! What a Phantom CINE file says of itself: rate, exposure, and a time stamp for each frame.
+//! Parses the header of a Phantom CINE file: rate, exposure, and a time stamp for each frame.
 //!
 //! Owns: [`Header`], [`Stamps`]. Must not: read pixels. All numbers are little-endian; places are checked
 //! before they are read, because a header may point anywhere.

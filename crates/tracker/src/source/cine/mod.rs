@@ -1,4 +1,4 @@
-//! Phantom CINE: pixels through FFmpeg's demuxer, times from the file's own stamps.
+//! Reads Phantom CINE: pixels through FFmpeg's demuxer, times from the file's own stamps.
 //!
 //! Owns: [`CineSource`].
 

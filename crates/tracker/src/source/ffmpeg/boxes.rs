@@ -1,4 +1,4 @@
-//! What boxes of an MP4 or QuickTime file say that FFmpeg does not pass on.
+//! Reads what the boxes of an MP4 or QuickTime file say and FFmpeg does not pass on.
 //!
 //! Owns: [`Boxes`]: whether the edit list stretches or joins pieces, and a camera's XML. Must not: follow an offset
 //! out of the file, or believe a length.

@@ -1,4 +1,4 @@
-//! What a file's metadata say of the rate at which the camera took the frames.
+//! Reads what a file's metadata say of the rate at which the camera took the frames.
 //!
 //! Owns: [`claims`]. Only tags whose meaning is published are believed: Android's capture rate
 //! (`MediaFormat.KEY_CAPTURE_RATE`, kept as `com.android.capture.fps`) and Sony's `captureFps`.

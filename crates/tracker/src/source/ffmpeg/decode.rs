@@ -1,4 +1,4 @@
-//! A decoder with its own threads, and the frames it lends.
+//! Decodes packets on FFmpeg's own threads and lends the pictures.
 //!
 //! Owns: [`Decoder`], [`Picture`]. Must not: know of files, or convert pixels.
 

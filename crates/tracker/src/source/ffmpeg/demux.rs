@@ -1,4 +1,4 @@
-//! Reading packets of the one video stream out of a container.
+//! Reads the packets of the one video stream out of a container.
 //!
 //! Owns: [`Demuxer`], [`Packet`]. Must not: decode, or decide what a lost packet means.
 

@@ -1,4 +1,4 @@
-//! What a container and its stream say of a recording.
+//! Describes a recording by what its container and stream say.
 //!
 //! Owns: [`describe`]. Must not: decode.
 

@@ -1,4 +1,4 @@
-//! Which of FFmpeg's formats are opened, and what the others are.
+//! Lists which of FFmpeg's formats are opened, and names the others.
 //!
 //! Owns: [`READ`], [`not_read`], [`is_address`]. A format that is not listed is refused before its demuxer sees the file:
 //! some open other files or addresses that the file names, and one takes any text for a film. Must not: open a demuxer.

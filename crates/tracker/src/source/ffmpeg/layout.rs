@@ -1,4 +1,4 @@
-//! From a decoder's picture to one plane of brightness: lent where it can be, converted once where not.
+//! Turns a decoder's picture into one plane of brightness: lent where it can be, converted once where not.
 //!
 //! Owns: [`Layout`], [`Orientation`]. Must not: change a value where the recording has a luma plane.
 

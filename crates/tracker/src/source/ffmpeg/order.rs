@@ -1,4 +1,4 @@
-//! Which packets became pictures, and which did not.
+//! Matches pictures to the packets that they came from, and finds packets that became none.
 //!
 //! Owns: [`Order`]. A decoder says nothing about a packet that gives no picture; it is found out here, because
 //! pictures come in display order: once a later one is out, an earlier one is lost. Pure bookkeeping.

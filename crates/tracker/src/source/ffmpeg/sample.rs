@@ -1,4 +1,4 @@
-//! Frames spread over a recording, for statistics, without disturbing the reading of it.
+//! Reads frames spread over a recording, for statistics, without disturbing the reading of it.
 
 use std::sync::Arc;
 

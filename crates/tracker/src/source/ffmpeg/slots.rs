@@ -1,4 +1,4 @@
-//! The slots of an AVI file by its own index: which of them a packet is, and which are empty.
+//! Reads the slots of an AVI file from its index: which of them a packet is, and which are empty.
 //!
 //! Owns: [`Slots`]. In AVI a frame's time is its slot, and a demuxer that passes over damage counts on without it, so
 //! all later frames would come too early. The index (`idx1`) tells the place of each.

@@ -1,4 +1,4 @@
-//! When frames are shown: by their packets' display times, or, in a stream without, by the decoding times.
+//! Computes when frames are shown: from their packets' display times, or, in a stream without, by the decoding times.
 //!
 //! Owns: [`Stamps`], [`display_times`]. Must not: decode.
 

@@ -1,4 +1,4 @@
-//! FFmpeg's words for its errors and its codecs.
+//! Names FFmpeg's errors and codecs in words.
 //!
 //! Owns: [`message`], [`codec_name`].
 

@@ -1,4 +1,4 @@
-//! Pictures as a recording: a folder, a pattern, or the pages of a TIFF file.
+//! Reads pictures as a recording: a folder, a pattern, or the pages of a TIFF file.
 //!
 //! Owns: [`SequenceSource`], [`StackSource`].
 

@@ -1,4 +1,4 @@
-//! Which files make up a sequence of pictures, and in what order.
+//! Lists the files of a picture sequence in the order of their numbers.
 //!
 //! Owns: [`list`], [`Numbered`]. Must not: open a picture.
 

@@ -1,4 +1,4 @@
-//! A decoded picture and the frame that it becomes.
+//! Holds a decoded picture and turns it into a frame.
 //!
 //! Owns: [`Picture`]. Must not: decode.
 

@@ -1,4 +1,4 @@
-//! How large a pixel is by the resolutions that a picture file says.
+//! Computes the pixel aspect from the resolutions that a picture file says.
 //!
 //! Owns: [`of_file`], [`of_tiff`], [`aspect`]. Must not: read samples.
 

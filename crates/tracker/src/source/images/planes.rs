@@ -1,4 +1,4 @@
-//! Pictures that lie one after another behind the only page of a TIFF file, and who says so: ImageJ (always above 4 GB),
+//! Finds pictures that lie one after another behind the only page of a TIFF file, as a program declares them: ImageJ (always above 4 GB),
 //! MetaMorph, tifffile.
 //!
 //! Owns: [`Declared`], [`declared`], [`Planes`]. Must not: read pixels.

@@ -1,4 +1,4 @@
-//! The pages of one TIFF file as frames; or, where it has one page and says that there are more pictures, those behind it.
+//! Reads the pages of one TIFF file as frames; or, where it has one page and says that there are more pictures, those behind it.
 
 use std::fs::File;
 use std::io::BufReader;

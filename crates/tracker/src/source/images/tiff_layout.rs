@@ -1,4 +1,4 @@
-//! What the directory of a TIFF page says of its samples, and whether they are read.
+//! Reads the directory of a TIFF page and decides whether its samples can be read.
 //!
 //! Owns: [`Layout`], [`is_reduced`]. Must not: read samples, or guess a scale: what has none (floating point, signed) is
 //! refused. Errors are clauses without a full stop.

@@ -1,4 +1,4 @@
-//! Photron's text header: `Key : Value` lines.
+//! Parses Photron's text header: `Key : Value` lines.
 //!
 //! Must not: open files. Layout verified on real files with line ends of both kinds; the separator is mostly
 //! space, colon, space, sometimes a colon alone.

@@ -1,4 +1,4 @@
-//! Photron's newer header: XML inside a binary envelope.
+//! Parses Photron's newer header: XML inside a binary envelope.
 //!
 //! Must not: open files, or rely on the envelope's offsets; what counts is what lies between `<cih>` and
 //! `</cih>`. Elements are read by their path, because names such as `resolution` occur several times.

@@ -1,4 +1,4 @@
-//! The facts that a Photron header gives, whichever of its two forms it is in.
+//! Holds the facts of a Photron header, whichever of its two forms it is in.
 //!
 //! Owns: [`Header`], [`Packing`], the names of the entries. Must not: open files, or know how a form is written.
 

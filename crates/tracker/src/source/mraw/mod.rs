@@ -1,4 +1,4 @@
-//! Photron MRAW: a file of pixels without a header, and beside it a `.cih` or `.cihx` that explains it.
+//! Reads Photron MRAW: a file of pixels without a header, and beside it a `.cih` or `.cihx` that explains it.
 //!
 //! Owns: [`MrawSource`]. Must not: unpack pixels; frames are handed out as they lie in the file.
 //! The one exception is 16-bit with the significant bits on top, which is moved down.

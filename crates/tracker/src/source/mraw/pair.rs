@@ -1,4 +1,4 @@
-//! The two files of a Photron recording: the header and the pixels.
+//! Finds the two files of a Photron recording: the header and the pixels.
 //!
 //! Owns: [`Pair`], [`pair`], [`is_photron`]. Must not: read pixels.
 

@@ -1,4 +1,4 @@
-//! What a NorPix sequence (`.seq`, StreamPix) says of itself.
+//! Parses the header of a NorPix sequence (`.seq`, StreamPix).
 //!
 //! Owns: [`Header`], [`Form`], [`is_norpix`]. From public readers (pims' `norpix_reader`, Dollar's `seqReaderPlugin`,
 //! `ReadJpegSEQ`): all numbers are little-endian; pixels begin at byte 1024, or at 8192 from version 5 on where they are

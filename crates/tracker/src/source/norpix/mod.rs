@@ -1,4 +1,4 @@
-//! NorPix sequences (`.seq`, StreamPix): uncompressed pictures as they lie in the file, or JPEG pictures, each with the time
+//! Reads NorPix sequences (`.seq`, StreamPix): uncompressed pictures as they lie in the file, or JPEG pictures, each with the time
 //! at which it was taken.
 //!
 //! Owns: [`NorpixSource`].

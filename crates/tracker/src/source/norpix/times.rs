@@ -1,4 +1,4 @@
-//! When the pictures of a NorPix sequence were taken: by their time stamps where these make sense.
+//! Computes the times of the pictures of a NorPix sequence from their time stamps, where these make sense.
 //!
 //! Owns: [`Times`], [`times`], [`oldest`]. Must not: read anything.
 

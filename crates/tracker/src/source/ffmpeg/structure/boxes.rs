@@ -1,4 +1,4 @@
-//! MP4 and QuickTime: boxes that fill the file, and in a fragmented film fragments that are numbered (ISO/IEC 14496-12).
+//! Walks MP4 and QuickTime: boxes that fill the file, and in a fragmented film fragments that are numbered (ISO/IEC 14496-12).
 
 use super::bytes::Bytes;
 use super::{Fit, Walk};

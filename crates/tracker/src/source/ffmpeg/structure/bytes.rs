@@ -1,4 +1,4 @@
-//! Numbers at places of a file, read through a buffer.
+//! Reads numbers at places of a file through a buffer.
 
 use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};

@@ -1,4 +1,4 @@
-//! GIF: blocks one after the other, each with a length or a chain of lengths (GIF89a).
+//! Walks GIF: blocks one after the other, each with a length or a chain of lengths (GIF89a).
 
 use super::bytes::Bytes;
 use super::{Fit, Walk};

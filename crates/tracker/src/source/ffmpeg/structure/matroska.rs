@@ -1,4 +1,4 @@
-//! Matroska and WebM: elements of an identity, a length and what they hold, nested three deep (RFC 8794, RFC 9559).
+//! Walks Matroska and WebM: elements of an identity, a length and what they hold, nested three deep (RFC 8794, RFC 9559).
 
 use super::bytes::Bytes;
 use super::{Fit, Walk};

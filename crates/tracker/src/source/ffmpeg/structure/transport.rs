@@ -1,4 +1,4 @@
-//! MPEG transport streams: packets of one length, each with a mark, the number of its stream and a counter
+//! Walks MPEG transport streams: packets of one length, each with a mark, the number of its stream and a counter
 //! (ISO/IEC 13818-1, 2.4.3.2).
 
 use super::bytes::Bytes;

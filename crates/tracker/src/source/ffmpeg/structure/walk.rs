@@ -1,4 +1,4 @@
-//! The walk through one container's elements, and how what it finds fits together.
+//! Defines the walk through one container's elements, and how elements fit together.
 //!
 //! Owns: [`Walk`], [`Fit`].
 
