@@ -51,7 +51,7 @@ def top_modules() -> list[str]:
 # The same for the crates. A crate that is not listed has no rooms but files beside each other.
 RUST_GROUPS: dict[str, tuple[tuple[str, ...], ...]] = {
     "tracker": (
-        ("message", "name", "csv_text", "error", "stop", "output", "kind"),
+        ("message", "name", "csv_text", "error", "stop", "output", "packed", "kind"),
         ("pixel_aspect", "gaps", "frame", "observation", "timing", "peak_level", "rig"),
         ("source",),
         ("detect",),

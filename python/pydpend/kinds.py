@@ -25,6 +25,7 @@ Kind: TypeAlias = Literal[
     "fit",
     "page",
     "spreadsheet",
+    "compressed",
     "unknown",
 ]
 """Of each, `Kind` in ``crates/tracker/src/kind.rs`` says what it is."""

@@ -459,6 +459,17 @@ fn frames_that_cannot_be_decoded_are_named_and_have_a_status_of_their_own() {
     }
     let (status, text, _) = said(&["info", "--count", &input]);
     assert!(status == 1 && text.contains("damaged: frame"), "{text}");
+    // The rig of what can be read is written, and the status is that of the film.
+    let rig = case.text("damaged.toml");
+    let (status, text, error) = said(&["setup", &input, "-o", &rig]);
+    assert!(status == 1 && error.contains("damaged: frame") && Path::new(&rig).exists(), "{text}{error}");
+    let cut = case.text("early.avi");
+    let whole = fs::read(film("film.avi")).unwrap();
+    fs::write(&cut, &whole[..whole.len() * 8 / 10]).unwrap();
+    let (status, text, error) = said(&["setup", &cut, "-o", &rig, "--force", "--quiet"]);
+    assert!(status == 1 && error.contains("the recording ended early"), "{text}{error}");
+    let (status, _, error) = said(&["setup", &film("film.mp4"), "-o", &rig, "--force"]);
+    assert_eq!(status, 0, "{error}");
     let (status, json, _) = said(&["info", "--count", "--json", &input]);
     let value: serde_json::Value = serde_json::from_str(&json).unwrap();
     assert_eq!((status, &value["ending"]["status"]), (1, &serde_json::json!("damaged")));

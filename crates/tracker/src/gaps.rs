@@ -17,6 +17,8 @@ pub enum Cause {
     Damage,
     /// The recorder left them out: they were never in the file.
     Recorder,
+    /// Dropped while recording or cut out of the file: nothing in the file tells which, so they count as lost.
+    Unknown,
 }
 
 /// Frames that are not there between a frame and the next.
@@ -44,7 +46,7 @@ impl Gap {
 pub struct Gaps {
     /// Gaps in the order of the recording.
     pub places: Vec<Gap>,
-    /// Frames lost by damage, as far as their number is known.
+    /// Frames lost by damage, or for all that the container tells, as far as their number is known.
     pub lost_frames: u64,
     /// Gaps by damage, with those that are not kept.
     pub lost_places: u64,
@@ -57,7 +59,7 @@ impl Gaps {
     pub fn push(&mut self, gap: Gap) {
         let frames = gap.frames.unwrap_or(0);
         match gap.cause {
-            Cause::Damage => {
+            Cause::Damage | Cause::Unknown => {
                 self.lost_frames += frames;
                 self.lost_places += 1;
             }
@@ -86,11 +88,18 @@ impl Gaps {
 
     /// What is lost by damage, a part of a sentence each.
     pub fn lost_words(&self) -> Vec<String> {
-        let lost: Vec<&Gap> = self.places.iter().filter(|g| g.cause == Cause::Damage).collect();
+        let lost: Vec<&Gap> = self.places.iter().filter(|g| g.cause != Cause::Recorder).collect();
         let mut words: Vec<String> = lost
             .iter()
             .take(MOST_TOLD)
             .map(|g| match g.frames {
+                Some(n) if g.cause == Cause::Unknown => {
+                    let are = if n == 1 { "1 frame is".to_owned() } else { format!("{n} frames are") };
+                    format!(
+                        "{are} missing {}, either dropped while recording or cut out of the file",
+                        g.place()
+                    )
+                }
                 Some(1) => format!("1 frame is lost {} (gap in the time stamps)", g.place()),
                 Some(n) => format!("{n} frames are lost {} (gap in the time stamps)", g.place()),
                 None => format!("frames may be lost {} (how many, nothing tells)", g.place()),
@@ -247,6 +256,13 @@ mod tests {
                 .unwrap()
                 .starts_with("5 frames were dropped by the recorder after frames 3 and 11;")
         );
+        let mut unknown = Damage::default();
+        unknown.gaps.push(gap(Some(3), Some(2), Cause::Unknown));
+        assert_eq!(
+            unknown.words().unwrap(),
+            "damaged: 2 frames are missing between frames 3 and 4, either dropped while recording or cut out of the file"
+        );
+        assert!(unknown.is_damaged() && unknown.gaps.dropped_words().is_none());
         assert_eq!(damage.gaps.within(&(0..8)).lost_places, 0);
         assert_eq!(damage.gaps.within(&(0..9)).lost_frames, 2);
         assert_eq!(damage.gaps.within(&(8..u64::MAX)).places.len(), 2);

@@ -12,6 +12,8 @@ use ::parquet::file::reader::{FileReader, SerializedFileReader};
 
 use crate::error::{Error, Fault, Result};
 use crate::message::{Message, Step};
+use crate::name::shell_word;
+use crate::packed::{is_packed, unpacking};
 
 /// What a file or folder is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -48,13 +50,15 @@ pub enum Kind {
     Page,
     /// A spreadsheet or a file of another program's own form.
     Spreadsheet,
+    /// A packed file or archive.
+    Compressed,
     /// Nothing that is known here.
     Unknown,
 }
 
 impl Kind {
     /// All of them.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 18] = [
         Self::Film,
         Self::Pictures,
         Self::NodeTable,
@@ -71,6 +75,7 @@ impl Kind {
         Self::Fit,
         Self::Page,
         Self::Spreadsheet,
+        Self::Compressed,
         Self::Unknown,
     ];
 
@@ -93,6 +98,7 @@ impl Kind {
             Self::Fit => "fit",
             Self::Page => "page",
             Self::Spreadsheet => "spreadsheet",
+            Self::Compressed => "compressed",
             Self::Unknown => "unknown",
         }
     }
@@ -116,6 +122,7 @@ impl Kind {
             Self::Fit => "a damping fit",
             Self::Page => "a page for a browser",
             Self::Spreadsheet => "a spreadsheet or another program's file",
+            Self::Compressed => "a packed file",
             Self::Unknown => "of no known kind",
         }
     }
@@ -212,6 +219,9 @@ impl Kind {
             ),
             Self::Page => "Open it in a browser".into(),
             Self::Spreadsheet => "Save it as CSV with a header line".into(),
+            Self::Compressed => unpacking(path)
+                .map_or_else(|| "Unpack it".to_owned(), |command| format!("Unpack it with `{command}`"))
+                .into(),
             Self::Unknown => Message::default(),
         }
     }
@@ -220,16 +230,6 @@ impl Kind {
 /// A stem with an ending, quoted once.
 fn joined(stem: &str, ending: &str) -> String {
     stem.strip_suffix('\'').map_or_else(|| format!("{stem}{ending}"), |open| format!("{open}{ending}'"))
-}
-
-/// A word as a shell takes it.
-fn shell_word(word: &str) -> String {
-    let plain = |c: char| c.is_alphanumeric() || "-_./+,:@%=".contains(c);
-    if !word.is_empty() && word.chars().all(plain) {
-        word.into()
-    } else {
-        format!("'{}'", word.replace('\'', "'\\''"))
-    }
 }
 
 /// What is in a run folder of a kind, and its name there: of the first recording.
@@ -353,6 +353,9 @@ fn kind_of_magic(bytes: &[u8]) -> Option<Kind> {
     if at(0, b"TDSm") {
         return Some(Kind::Encoder);
     }
+    if is_packed(bytes) {
+        return Some(Kind::Compressed);
+    }
     // A zipped document, an old one, MATLAB's two forms.
     let documents: [&[u8]; 4] = [b"PK\x03\x04", b"\xd0\xcf\x11\xe0", b"MATLAB", b"\x89HDF"];
     documents.iter().any(|d| at(0, d)).then_some(Kind::Spreadsheet)
@@ -447,7 +450,12 @@ mod tests {
     #[test]
     fn a_file_is_known_by_what_is_in_it_and_not_by_its_name() {
         let folder = tempfile::tempdir().unwrap();
-        let cases: [(&str, &[u8], Kind); 14] = [
+        let zip = |name: &str| {
+            let mut bytes = [&b"PK\x03\x04"[..], &[0; 22], &[name.len() as u8, 0, 0, 0]].concat();
+            bytes.extend(name.as_bytes());
+            bytes
+        };
+        let cases: [(&str, &[u8], Kind); 17] = [
             ("a.csv", b"\0\0\0\x18ftypisom", Kind::Film),
             ("b.mp4", b"time_s,phi1_rad\n0,1\n", Kind::Angles),
             ("c.csv", b"# made by hand\ntime_s;phi1_deg;phi2_deg\n", Kind::Angles),
@@ -459,7 +467,10 @@ mod tests {
             ("i.toml", b"[[part]]\nname = 'bar'\n", Kind::Model),
             ("j.toml", b"frames = 4\n[camera]\ndepth_bits = 8\n", Kind::Scene),
             ("k.json", b"{\"schema\": 1, \"slope_v_per_rad\": 0.1}", Kind::Calibration),
-            ("l.xlsx", b"PK\x03\x04....", Kind::Spreadsheet),
+            ("l.xlsx", &zip("[Content_Types].xml"), Kind::Spreadsheet),
+            ("l.npz", &zip("phi.npy"), Kind::Spreadsheet),
+            ("l.mp4", &zip("drop.mp4"), Kind::Compressed),
+            ("o.mp4", b"\x1f\x8b\x08....", Kind::Compressed),
             ("m.txt", b"Dear all,\nthe pendulum is broken.\n", Kind::Unknown),
             ("n.html", b"<!DOCTYPE html>\n", Kind::Page),
         ];

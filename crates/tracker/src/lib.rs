@@ -22,6 +22,7 @@ pub mod name;
 pub mod observation;
 pub mod output;
 pub mod overlay;
+mod packed;
 pub mod peak_level;
 pub mod pipeline;
 pub mod pixel_aspect;

@@ -1,6 +1,6 @@
 //! Names of files as text: without loss on the way in, harmless on the way to a terminal.
 //!
-//! Owns: [`text`], [`path`], [`shown`], [`shown_json`]. A name on a disk is bytes. One that is not UTF-8 is carried as
+//! Owns: [`text`], [`path`], [`shown`], [`shown_json`], [`shell_word`]. A name on a disk is bytes. One that is not UTF-8 is carried as
 //! text whose undecodable bytes are private characters, as Python carries them as surrogates.
 
 use std::ffi::{OsStr, OsString};
@@ -45,6 +45,17 @@ pub fn path(text: &str) -> PathBuf {
         }
     }
     PathBuf::from(OsString::from_vec(bytes))
+}
+
+/// A name as a word for a shell, which no program takes for an option.
+pub fn shell_word(name: &str) -> String {
+    let plain = |c: char| c.is_alphanumeric() || "-_./+,:@%=".contains(c);
+    let before = if name.starts_with('-') { "./" } else { "" };
+    if !name.is_empty() && name.chars().all(plain) {
+        format!("{before}{name}")
+    } else {
+        format!("'{before}{}'", name.replace('\'', "'\\''"))
+    }
 }
 
 /// Whether a terminal would do something else than show the character: controls (escape sequences begin with one),

@@ -23,6 +23,8 @@ pub struct Setup {
     pub rig: Rig,
     /// What to know of the rig and the recording, a sentence each.
     pub warnings: Vec<Message>,
+    /// How the recording ended.
+    pub ending: RunEnding,
     /// The reference picture with the rig and all other detections drawn, 8-bit blue, green, red.
     pub picture: Mat,
 }
@@ -70,7 +72,7 @@ pub fn find(settings: &RunSettings, observer: &mut dyn Observer) -> Result<Setup
         ).into());
     }
     let picture = overlay::still(&frame, &rig, &detections)?;
-    Ok(Setup { rig, warnings, picture })
+    Ok(Setup { rig, warnings, ending: summary.meta.ending, picture })
 }
 
 /// A frame of a recording and what is detected in it.

@@ -8,16 +8,17 @@ use tracker::source::{OpenOptions, open};
 
 use crate::film::{HEIGHT, WIDTH, encode, have_ffmpeg, index_of, picture, read_all, samples};
 
-const COUNT: usize = 60;
+pub const COUNT: usize = 60;
 
-fn read(path: &Path) -> (Vec<Frame>, Ending, Gaps, TimeBase) {
+/// Frames, ending, gaps and time base of a film.
+pub fn read(path: &Path) -> (Vec<Frame>, Ending, Gaps, TimeBase) {
     let mut source: Box<dyn FrameSource> = open(path.to_str().unwrap(), &OpenOptions::default()).unwrap();
     let frames = read_all(&mut *source);
     (frames, source.ending(), source.gaps(), source.info().time_base)
 }
 
 /// The number of the picture that a frame shows.
-fn told(frame: &Frame) -> Option<usize> {
+pub fn told(frame: &Frame) -> Option<usize> {
     samples(frame).map(|v| index_of(&v, (1 << frame.depth_bits) - 1).unwrap_or(usize::MAX))
 }
 
@@ -309,5 +310,53 @@ fn a_film_of_a_tenth_of_a_second_in_a_transport_stream_is_read_and_sampled() {
         let sampled = source.sample(12).unwrap();
         assert!(!sampled.is_empty() && sampled.iter().all(|f| f.plane.is_some()), "{name}");
         assert_eq!((read_all(&mut *source).len(), source.ending()), (count, Ending::Complete), "{name}");
+    }
+}
+
+/// Where the first entry of a box's table is in an MP4 file: after its version and the number of entries.
+fn table(bytes: &[u8], name: &[u8]) -> usize {
+    bytes.windows(4).position(|w| w == name).unwrap() + 12
+}
+
+#[test]
+fn a_frame_hidden_inside_a_film_is_lost_and_trimmed_ends_are_not() {
+    if !have_ffmpeg() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let path = encode(folder.path(), "a.mp4", COUNT, &["-c:v", "libx264", "-g", "12", "-bf", "2"]);
+    let whole = std::fs::read(&path).unwrap();
+    // Entries of `ctts`: how many frames, and by how much they wait for display.
+    let waits = table(&whole, b"ctts");
+    let entries = u32::from_be_bytes(whole[waits - 4..waits].try_into().unwrap()) as usize;
+    assert!(entries > 6, "{entries}");
+    for entry in 1..entries - 1 {
+        let mut bytes = whole.clone();
+        let at = waits + 8 * entry;
+        // 8, 66 or 262 s more. The library heeds no entry of a table in which one is greater yet.
+        bytes[at + 5] |= [0x02, 0x10, 0x40][entry % 3];
+        std::fs::write(&path, &bytes).unwrap();
+        let (frames, ending, gaps, _) = read(&path);
+        let undecoded = frames.iter().any(|f| f.plane.is_none());
+        assert!(gaps.is_damage() || undecoded || ending != Ending::Complete, "entry {entry}: {gaps:?}");
+        assert_eq!(gaps.dropped_frames, 0, "entry {entry}");
+    }
+    // A film trimmed without coding it anew: frames before its beginning are hidden.
+    std::fs::write(&path, &whole).unwrap();
+    let trimmed = folder.path().join("trimmed.mp4");
+    let cut = |from: &str, to: &str| {
+        let done = std::process::Command::new("ffmpeg")
+            .args(["-v", "error", "-y", "-ss", from, "-to", to, "-i"])
+            .arg(&path)
+            .args(["-c", "copy"])
+            .arg(&trimmed)
+            .status();
+        assert!(done.unwrap().success());
+        read(&trimmed)
+    };
+    for (from, to) in [("0.03", "0.09"), ("0.05", "0.1"), ("0", "0.07")] {
+        let (frames, ending, gaps, _) = cut(from, to);
+        assert!(frames.len() > 15 && frames.iter().all(|f| f.plane.is_some()), "{from}: {}", frames.len());
+        assert_eq!((ending, gaps), (Ending::Complete, Gaps::default()), "{from}");
     }
 }

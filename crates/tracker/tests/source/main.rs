@@ -6,6 +6,7 @@ mod film;
 mod aspect;
 mod cine;
 mod cut;
+mod cut_out;
 mod damage;
 mod ffmpeg;
 mod fields;

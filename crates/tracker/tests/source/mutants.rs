@@ -15,7 +15,7 @@ use crate::film::{encode, have_ffmpeg, samples};
 const COUNT: usize = 24;
 
 /// Film name and encoder arguments.
-const FILMS: [(&str, &[&str]); 14] = [
+const FILMS: [(&str, &[&str]); 20] = [
     ("h264.mp4", &["-c:v", "libx264", "-g", "8", "-bf", "2"]),
     ("fast.mp4", &["-c:v", "libx264", "-g", "8", "-movflags", "faststart"]),
     ("frag.mp4", &["-c:v", "libx264", "-g", "4", "-movflags", "frag_keyframe+empty_moov"]),
@@ -29,6 +29,12 @@ const FILMS: [(&str, &[&str]); 14] = [
     ("raw.avi", &["-c:v", "rawvideo", "-pix_fmt", "gray"]),
     ("a.gif", &["-vf", "setpts=N/50/TB", "-r", "50"]),
     ("h264.ts", &["-c:v", "libx264", "-g", "8"]),
+    ("h264.flv", &["-c:v", "libx264", "-g", "8", "-bf", "2"]),
+    ("sorenson.flv", &["-c:v", "flv", "-g", "8", "-q:v", "3"]),
+    ("a.asf", &["-c:v", "msmpeg4", "-g", "8", "-q:v", "3"]),
+    ("theora.ogv", &["-c:v", "libtheora", "-g", "8", "-q:v", "9", "-page_duration", "8000"]),
+    ("a.nut", &["-c:v", "mpeg4", "-g", "8", "-q:v", "3"]),
+    ("mpeg2.mpg", &["-vf", "setpts=N/25/TB", "-r", "25", "-c:v", "mpeg2video", "-g", "8", "-q:v", "3"]),
     ("a.y4m", &["-pix_fmt", "gray", "-strict", "-1"]),
 ];
 

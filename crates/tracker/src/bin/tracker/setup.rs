@@ -11,6 +11,7 @@ use tracker::error::Error;
 use tracker::name::text;
 use tracker::pipeline::RunSettings;
 use tracker::source;
+use tracker::table::RunEnding;
 use tracker::{output, overlay, setup};
 
 use crate::print;
@@ -78,5 +79,6 @@ pub fn run(args: Args, front: &CommandLine) -> anyhow::Result<ExitCode> {
         writeln!(out, "{}: the picture", text(&picture))?;
         print::lines(&out)?;
     }
-    Ok(ExitCode::SUCCESS)
+    // The rig is of what could be read.
+    Ok(ExitCode::from(u8::from(found.ending != RunEnding::Complete)))
 }

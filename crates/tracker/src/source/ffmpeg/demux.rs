@@ -126,10 +126,33 @@ impl Demuxer {
         self.stream
     }
 
+    /// How many streams the container has.
+    pub(super) fn streams(&self) -> u32 {
+        // SAFETY: the context is open.
+        unsafe { (*self.context).nb_streams }
+    }
+
     /// The stream's parameters.
     pub(super) fn parameters(&self) -> &ffi::AVCodecParameters {
         // SAFETY: every stream has parameters as long as the context lives.
         unsafe { &*self.stream().codecpar }
+    }
+
+    /// The codec's parameters as the container holds them.
+    pub(super) fn codec_bytes(&self) -> &[u8] {
+        let parameters = self.parameters();
+        match usize::try_from(parameters.extradata_size) {
+            // SAFETY: `extradata_size` bytes that live as long as the parameters and are not changed after opening.
+            Ok(size) if !parameters.extradata.is_null() => unsafe {
+                std::slice::from_raw_parts(parameters.extradata, size)
+            },
+            _ => &[],
+        }
+    }
+
+    /// Whether packets have display times. MPEG program streams have one where a block of bytes begins, and no more.
+    pub(super) fn has_display_times(&self) -> bool {
+        self.container() != "mpeg"
     }
 
     /// Width to height of a pixel: the container's, else the codec's; and the codec's own. 0 is not said.
@@ -309,6 +332,16 @@ impl Packet {
     pub(super) fn get(&self) -> &ffi::AVPacket {
         // SAFETY: never null after `new`.
         unsafe { &*self.0 }
+    }
+
+    /// What it holds of the stream.
+    pub(super) fn bytes(&self) -> &[u8] {
+        let fields = self.get();
+        match usize::try_from(fields.size) {
+            // SAFETY: a packet's data are `size` bytes that live until it is cleared, which takes a mutable borrow.
+            Ok(size) if !fields.data.is_null() => unsafe { std::slice::from_raw_parts(fields.data, size) },
+            _ => &[],
+        }
     }
 
     /// Replaces the packet's display time.

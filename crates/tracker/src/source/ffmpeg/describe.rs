@@ -89,13 +89,13 @@ pub(super) fn stream_base(demuxer: &Demuxer) -> TimeBase {
 }
 
 /// Ticks from frame to frame by the rate that the container claims, at least 1.
-pub(super) fn step(demuxer: &Demuxer) -> i64 {
+pub(super) fn step(demuxer: &Demuxer) -> f64 {
     let base = demuxer.stream().time_base;
     let ticks = demuxer
         .rate()
         .map_or(1.0, |r| f64::from(base.den) * f64::from(r.den) / (f64::from(base.num) * f64::from(r.num)));
-    // A float that is none, from a base of 0, becomes 0.
-    (ticks.round() as i64).max(1)
+    // A base of 0 gives no number.
+    if ticks.is_finite() { ticks.max(1.0) } else { 1.0 }
 }
 
 /// A fraction with both parts above 0.

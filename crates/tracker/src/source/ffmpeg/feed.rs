@@ -10,6 +10,7 @@ use ffmpeg_next::ffi;
 use super::decode::{Decoder, Received};
 use super::demux::{Demuxer, Packet, Read};
 use super::fields::{FieldOrder, Fields};
+use super::frame_numbers::FrameNumbers;
 use super::slots::Slots;
 use super::structure::{Fit, Structure};
 use crate::error::Result;
@@ -26,6 +27,10 @@ struct Arrived {
     lost: Vec<i64>,
     /// Its time follows that of the packet before it without a gap.
     follows: bool,
+    /// It is later than that by more than half a frame.
+    is_late: bool,
+    /// The coded film goes on with it; `None` where nothing tells.
+    goes_on: Option<bool>,
     is_second_field: bool,
 }
 
@@ -36,6 +41,12 @@ pub(super) struct Given {
     pub lost: Vec<ffi::AVPacket>,
     /// Packets before it are gone.
     pub after_loss: bool,
+    /// The file before it is damaged.
+    pub after_damage: bool,
+    /// Its time is later than the end of the packet before it, by more than half a frame.
+    pub is_late: bool,
+    /// The coded film goes on with it.
+    pub goes_on: bool,
     /// It is itself damaged, as far as the file around it tells.
     pub is_damaged: bool,
     /// It is the last one and less than there should be.
@@ -53,6 +64,7 @@ pub(super) struct Feed {
     structure: Option<Structure>,
     slots: Option<Slots>,
     fields: Option<Fields>,
+    numbers_in_film: Option<FrameNumbers>,
     has_single_fields: bool,
     /// Time and duration of the packet read last, ticks.
     last: Option<(i64, i64)>,
@@ -77,6 +89,7 @@ impl Feed {
         let structure = is_file.then(|| Structure::of(&container, name, demuxer.stream().id)).flatten();
         let slots = (is_file && container == "avi").then(|| Slots::read(name, demuxer.index())).flatten();
         let fields = Fields::of(&demuxer);
+        let numbers_in_film = FrameNumbers::of(demuxer.parameters().codec_id, demuxer.codec_bytes());
         let mut feed = Self {
             demuxer,
             name: name.to_owned(),
@@ -84,6 +97,7 @@ impl Feed {
             structure,
             slots,
             fields,
+            numbers_in_film,
             has_single_fields: false,
             last: None,
             numbers: 0,
@@ -114,6 +128,14 @@ impl Feed {
     /// Frames that the container declares and that were never in it: the recorder left them out.
     pub(super) fn empty(&self) -> u64 {
         self.slots.as_ref().map_or(self.empty, Slots::empty)
+    }
+
+    /// Whether packets can be cut out of the file without a trace: its container's elements are not followed, or those
+    /// of FLV and MPEG program streams, which have no numbers; and its frames are not in numbered slots (AVI's empty ones are in the file).
+    pub(super) fn is_blind(&self) -> bool {
+        let container = self.demuxer.container();
+        let is_numbered = self.slots.is_some() || ["avi", "cine"].contains(&container.as_str());
+        !is_numbered && (self.structure.is_none() || ["flv", "mpeg"].contains(&container.as_str()))
     }
 
     /// Why nothing more could be read, if that is not the end of the file.
@@ -150,7 +172,11 @@ impl Feed {
         let Some(arrived) = self.ahead.pop_front() else { return Ok(None) };
         let mut given = Given {
             lost: arrived.lost.iter().map(|at| stamped(&arrived.packet, *at)).collect(),
-            after_loss: !arrived.lost.is_empty() || arrived.fit != Fit::Whole && !arrived.follows,
+            after_loss: !arrived.lost.is_empty()
+                || !arrived.follows && (arrived.fit != Fit::Whole || arrived.goes_on == Some(false)),
+            after_damage: arrived.fit != Fit::Whole,
+            is_late: arrived.is_late,
+            goes_on: arrived.goes_on == Some(true),
             is_damaged: arrived.packet.has(ffi::AV_PKT_FLAG_CORRUPT),
             is_cut: arrived.packet.has(ffi::AV_PKT_FLAG_CORRUPT),
             is_second_field: arrived.is_second_field,
@@ -191,8 +217,17 @@ impl Feed {
         self.suspect || self.below.is_some_and(|below| key < below)
     }
 
+    /// Whether the length that the container declares is that of its pictures: FLV gives the last one's time, ASF adds the
+    /// time that a player fills its buffer; Ogg and MPEG program streams give none, and the library's is what it finds.
+    pub(super) fn declares_length(&self) -> bool {
+        !["flv", "asf", "ogg", "mpeg"].contains(&self.demuxer.container().as_str())
+    }
+
     /// Whether the packet read last reaches the end that the container declares.
     fn is_declared_end(&self) -> bool {
+        if !self.declares_length() {
+            return false;
+        }
         let (Some(end), Some((time, duration))) = (self.demuxer.declared_end(), self.last) else {
             return false;
         };
@@ -260,15 +295,17 @@ impl Feed {
         }
         let fields = *packet.get();
         let time = [fields.dts, fields.pts].into_iter().find(|t| *t != ffi::AV_NOPTS_VALUE);
-        let follows = match (self.last, time) {
+        let (follows, is_late) = match (self.last, time) {
             (Some((last, duration)), Some(time)) if duration > 0 => {
-                time.saturating_sub(last.saturating_add(duration)).abs() <= (duration / 2).max(1)
+                let late = time.saturating_sub(last.saturating_add(duration));
+                (late.abs() <= (duration / 2).max(1), late > duration / 2)
             }
-            _ => false,
+            _ => (false, true),
         };
         self.last = time.map(|t| (t, fields.duration));
         let is_second_field = self.fields.as_mut().is_some_and(|f| f.is_second(&packet));
-        self.ahead.push_back(Arrived { packet, fit, lost, follows, is_second_field });
+        let goes_on = self.numbers_in_film.as_mut().and_then(|n| n.follows(packet.bytes()));
+        self.ahead.push_back(Arrived { packet, fit, lost, follows, is_late, goes_on, is_second_field });
     }
 }
 

@@ -2,6 +2,7 @@
 //!
 //! Owns: [`Fields`], [`refusal`], [`warning`]. Must not: take a picture apart.
 
+use std::path::Path;
 use std::ptr;
 
 use ffmpeg_next::ffi;
@@ -9,6 +10,7 @@ use ffmpeg_next::ffi;
 use super::demux::{Demuxer, Packet};
 use crate::error::{Error, Fault};
 use crate::message::{Message, Setting};
+use crate::name::shell_word;
 
 /// Tells single fields from whole pictures, by the codec's own headers.
 pub(super) struct Fields {
@@ -127,23 +129,20 @@ impl FieldOrder {
 /// The setting's word for reading pictures whole.
 const AS_FRAMES: &str = "as-frames";
 
-/// A shell's word for a name.
-fn quoted(name: &str) -> String {
-    let plain = |c: char| c.is_ascii_alphanumeric() || "._-/".contains(c);
-    if !name.is_empty() && !name.starts_with('-') && name.chars().all(plain) {
-        name.to_owned()
-    } else {
-        format!("'{}'", name.replace('\'', "'\\''"))
-    }
-}
-
 /// The command that makes a picture of each field.
 fn command(name: &str) -> String {
-    let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem);
+    let is_address = name.contains("://");
+    let file = if is_address { name.rsplit('/').next().unwrap_or_default() } else { name };
+    let stem = Path::new(file).with_extension("").display().to_string();
+    // Standard input and an address name no file beside which the other could be.
+    let stem = if ["", "-"].contains(&stem.as_str()) { "film" } else { &stem };
+    // What is before a colon would be a protocol, and what begins with a hyphen an option.
+    let protocol = |file: &str| if file.contains(':') || file.starts_with('-') { "file:" } else { "" };
+    let input = if is_address { "" } else { protocol(name) };
     format!(
         "ffmpeg -i {} -vf bwdif=mode=send_field:deint=all -c:v ffv1 {}",
-        quoted(name),
-        quoted(&format!("{stem}-fields.mkv"))
+        if name == "-" { name.to_owned() } else { shell_word(&format!("{input}{name}")) },
+        shell_word(&format!("{}{stem}-fields.mkv", protocol(stem)))
     )
 }
 
@@ -177,4 +176,22 @@ pub(super) fn warning(name: &str, order: FieldOrder) -> Message {
         command(name)
     )
     .into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_command_names_files_that_look_like_protocols_or_options() {
+        let names =
+            |name: &str| command(name).replace(" -vf bwdif=mode=send_field:deint=all -c:v ffv1 ", " | ");
+        assert_eq!(names("i.ts"), "ffmpeg -i i.ts | i-fields.mkv");
+        assert_eq!(names("a.b/i"), "ffmpeg -i a.b/i | a.b/i-fields.mkv");
+        assert_eq!(names("-"), "ffmpeg -i - | film-fields.mkv");
+        assert_eq!(names("http://lab:80/a/i.ts"), "ffmpeg -i http://lab:80/a/i.ts | i-fields.mkv");
+        assert_eq!(names("12:30 i.ts"), "ffmpeg -i 'file:12:30 i.ts' | 'file:12:30 i-fields.mkv'");
+        assert_eq!(names("-i.ts"), "ffmpeg -i file:-i.ts | file:-i-fields.mkv");
+        assert_eq!(names("a'b $c.ts"), "ffmpeg -i 'a'\\''b $c.ts' | 'a'\\''b $c-fields.mkv'");
+    }
 }

@@ -1,9 +1,9 @@
 //! Frames that are not there: gaps in the time stamps of a film whose frames are otherwise evenly spaced.
 //!
-//! Owns: [`Lost`]. A gap is damage where the file is damaged beside it; else the recorder left frames out. A film of
-//! variable rate has gaps by nature: there nothing is concluded from them.
+//! Owns: [`Lost`]. A gap is damage where the file is damaged beside it; else the recorder left frames out, where packets
+//! cannot be cut out of the file without a trace or the coded film proves that none were. A film of variable rate has gaps by nature: there nothing is concluded from them.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::frame::TimeBase;
 use crate::gaps::{Cause, Gap, Gaps};
@@ -11,7 +11,7 @@ use crate::timing::{Steps, grid_gaps};
 
 /// Places of damage that are remembered.
 const MOST_BREAKS: usize = 10_000;
-/// Stretches of equal steps that are remembered (16 MiB); more are a variable rate.
+/// Stretches of equal steps that are remembered (16 MiB), as many as places where film goes on; more are a variable rate.
 const MOST_RUNS: usize = 1 << 20;
 /// Part of all steps that must be the usual one, give or take a tick, for a film to be called evenly spaced.
 const EVEN: f64 = 0.8;
@@ -27,8 +27,14 @@ pub(super) struct Lost {
     /// Rates that the container gives.
     claims: Vec<[u64; 2]>,
     steps: Steps,
-    /// Times beside which the file is damaged, ticks, and how many frames came before, once that is known.
+    /// Times before which packets are gone, ticks, and how many frames came before, once that is known.
     breaks: Vec<(i64, Option<u64>)>,
+    /// Times near which the file is damaged, ticks.
+    damaged: Vec<i64>,
+    /// Times before which frames are not there that were not in the coded film either, ticks.
+    goes_on: BTreeSet<i64>,
+    /// Whether frames can be cut out of the file without a trace.
+    is_blind: bool,
 }
 
 /// A step between two frames, ticks, and the frames that lack in it.
@@ -41,15 +47,39 @@ struct Wide {
 }
 
 impl Lost {
-    /// A film of this time base, whose container gives these rates.
-    pub(super) fn new(base: TimeBase, claims: &[[u64; 2]]) -> Self {
-        Self { base, claims: claims.to_vec(), steps: Steps::default(), breaks: Vec::new() }
+    /// A film of this time base, whose container gives these rates. `is_blind` is whether frames can be cut out of the
+    /// file without a trace: then a gap may be damage.
+    pub(super) fn new(base: TimeBase, claims: &[[u64; 2]], is_blind: bool) -> Self {
+        Self {
+            base,
+            claims: claims.to_vec(),
+            steps: Steps::default(),
+            breaks: Vec::new(),
+            damaged: Vec::new(),
+            goes_on: BTreeSet::new(),
+            is_blind,
+        }
     }
 
-    /// The file is damaged before the packet of this time.
+    /// Packets before the one of this time are gone.
     pub(super) fn broken(&mut self, ticks: i64) {
         if self.breaks.len() < MOST_BREAKS {
             self.breaks.push((ticks, None));
+        }
+        self.damaged(ticks);
+    }
+
+    /// The file is damaged before the packet of this time: a gap near it is damage.
+    pub(super) fn damaged(&mut self, ticks: i64) {
+        if self.damaged.len() < MOST_BREAKS {
+            self.damaged.push(ticks);
+        }
+    }
+
+    /// There is a gap before the packet of this time, but the coded film goes on with it.
+    pub(super) fn goes_on(&mut self, ticks: i64) {
+        if self.goes_on.len() < MOST_RUNS {
+            self.goes_on.insert(ticks);
         }
     }
 
@@ -76,8 +106,13 @@ impl Lost {
         let reach = (REORDER as f64 * usual) as i64;
         for wide in wide {
             let near = wide.from.saturating_sub(reach)..=wide.to.saturating_add(reach);
-            let damaged = self.breaks.iter().any(|(at, _)| near.contains(at));
-            let cause = if damaged { Cause::Damage } else { Cause::Recorder };
+            let cause = if self.damaged.iter().any(|at| near.contains(at)) {
+                Cause::Damage
+            } else if self.is_blind && self.goes_on.range(wide.to..=*near.end()).next().is_none() {
+                Cause::Unknown
+            } else {
+                Cause::Recorder
+            };
             gaps.push(Gap { after: Some(wide.after), frames: Some(wide.frames), cause });
         }
         gaps
@@ -150,7 +185,7 @@ mod tests {
     use super::*;
 
     fn watch(times: impl IntoIterator<Item = i64>, breaks: &[i64]) -> Gaps {
-        let mut lost = Lost::new(TimeBase { numerator: 1, denominator: 1000 }, &[]);
+        let mut lost = Lost::new(TimeBase { numerator: 1, denominator: 1000 }, &[], false);
         breaks.iter().for_each(|b| lost.broken(*b));
         times.into_iter().enumerate().for_each(|(i, t)| lost.frame(i as u64, t));
         lost.gaps()

@@ -13,6 +13,7 @@ mod ending;
 mod feed;
 mod fields;
 pub(crate) mod formats;
+mod frame_numbers;
 mod layout;
 mod lost;
 mod order;
@@ -30,14 +31,14 @@ use ffmpeg_next::ffi;
 use decode::{Decoder, Picture, Received};
 use demux::{Demuxer, Packet};
 use describe::{describe, step, stream_base};
-use feed::Feed;
+use feed::{Feed, Given};
 use fields::FieldOrder;
 use layout::Layout;
 pub(crate) use layout::Orientation;
 use lost::Lost;
 use order::{Order, Sent};
-use stamps::Stamps;
 pub(crate) use stamps::display_times;
+use stamps::{Stamps, Survey};
 use words::{codec_name, message};
 
 use super::{Input, Interlaced, OpenOptions};
@@ -65,6 +66,8 @@ pub struct FfmpegSource {
     orientation: Orientation,
     interlaced: Interlaced,
     stamps: Stamps,
+    /// Ticks from frame to frame by the rate that the container claims; 1 if it claims none.
+    step: i64,
     order: Order,
     intra_only: bool,
     /// A frame is damaged and those that follow are predicted from it.
@@ -78,6 +81,14 @@ pub struct FfmpegSource {
     /// The last packet is less than there should be.
     last_is_cut: bool,
     lost: Lost,
+    /// The file is to be looked through before its first packet is given to the decoder.
+    is_surveyed: bool,
+    /// Packets given to the decoder, and numbers of those that come after gaps where nothing else tells of damage.
+    fed: u64,
+    after_gaps: VecDeque<u64>,
+    /// Least display time of a shown packet, and those of hidden ones that may lie between shown ones, ticks.
+    first_shown: Option<i64>,
+    hidden: Vec<i64>,
     /// Frames without a plane whose fate depends on whether a good one follows.
     held: VecDeque<Ready>,
     ready: VecDeque<Ready>,
@@ -120,8 +131,7 @@ impl FfmpegSource {
         let (mut info, orientation) = describe(&demuxer, &layout, name, options)?;
 
         let counts_frames = options.fps.is_some() || demuxer.is_untimed();
-        let step = step(&demuxer);
-        let lost = Lost::new(stream_base(&demuxer), &info.claims.container);
+        let step = step(&demuxer).round() as i64;
         let feed = Feed::new(demuxer, name, can_reopen, if intra_only { 1 } else { 6 })?;
         if let Some(order) = feed.field_order(name)? {
             match options.interlaced {
@@ -140,7 +150,9 @@ impl FfmpegSource {
         let lacks = |p: &Packet| {
             p.get().pts == ffi::AV_NOPTS_VALUE && !(intra_only && p.get().dts != ffi::AV_NOPTS_VALUE)
         };
-        let unstamped = feed.ahead().any(lacks);
+        let unstamped = !feed.demuxer.has_display_times() || feed.ahead().any(lacks);
+        let is_blind = feed.is_blind();
+        let lost = Lost::new(stream_base(&feed.demuxer), &info.claims.container, is_blind);
         Ok(Self {
             info,
             url: url.clone(),
@@ -153,6 +165,7 @@ impl FfmpegSource {
             orientation,
             interlaced: options.interlaced,
             stamps: Stamps::new(unstamped, step),
+            step,
             order: Order::new(if unstamped && !intra_only { REORDER } else { 0 }),
             intra_only,
             tainted: false,
@@ -163,6 +176,11 @@ impl FfmpegSource {
             last_byte: None,
             last_is_cut: false,
             lost,
+            is_surveyed: is_blind && can_reopen && !intra_only && !counts_frames,
+            fed: 0,
+            after_gaps: VecDeque::new(),
+            first_shown: None,
+            hidden: Vec::new(),
             held: VecDeque::new(),
             ready: VecDeque::new(),
             replay: VecDeque::new(),
@@ -193,6 +211,7 @@ impl FfmpegSource {
             self.packets += 1;
             self.order.sent(Sent { key, byte: None, key_frame: false, suspect: true });
         }
+        let is_after_gap = self.is_after_gap()?;
         let fields = *given.packet.get();
         let byte = u64::try_from(fields.pos).ok();
         // A second field belongs to the picture of the packet before it, whose time that picture has.
@@ -200,9 +219,17 @@ impl FfmpegSource {
         if !given.is_second_field {
             key = self.stamps.key(&fields, self.packets as i64);
             self.packets += 1;
-            if given.after_loss && self.stamps.is_stamped() {
-                self.lost.broken(key);
+            let time = self.stamps.time(key);
+            if given.after_loss {
+                self.lost.broken(time);
+            } else if given.after_damage {
+                self.lost.damaged(time);
             }
+            if given.goes_on && given.is_late {
+                self.lost.goes_on(time);
+            }
+            given.after_loss |= is_after_gap && !given.goes_on;
+            self.note_hidden(&given, key);
             let suspect = self.feed.judge(&given, key, self.intra_only);
             // What an edit list hides is decoded, because others are predicted from it, but gives no picture.
             if !given.packet.has(ffi::AV_PKT_FLAG_DISCARD) {
@@ -218,6 +245,49 @@ impl FfmpegSource {
             self.decoder.send(Some(&given.packet));
         }
         Ok(())
+    }
+
+    /// Whether the next packet comes after a gap in the times of a file in which nothing else tells of damage.
+    fn is_after_gap(&mut self) -> Result<bool> {
+        if std::mem::take(&mut self.is_surveyed) {
+            let survey = Survey::of(&self.info.name, &Input::File(self.url.clone()), usize::MAX, u64::MAX)?;
+            self.after_gaps = survey.packets_after_gaps(&self.info.claims.container).into();
+            self.stamps.surveyed(&survey);
+        }
+        let number = self.fed;
+        self.fed += 1;
+        let is_next = self.after_gaps.front() == Some(&number);
+        if is_next {
+            self.after_gaps.pop_front();
+        }
+        Ok(is_next)
+    }
+
+    /// What an edit list hides at the ends is trimmed; what is hidden between shown frames is lost to who watches, and so
+    /// is a frame whose display time is damaged: it is further from its decoding time than any codec allows.
+    fn note_hidden(&mut self, given: &Given, key: i64) {
+        if given.packet.has(ffi::AV_PKT_FLAG_DISCARD) {
+            let dts = given.packet.get().dts;
+            let is_far = dts != ffi::AV_NOPTS_VALUE
+                && self.step > 1
+                && key.saturating_sub(dts).unsigned_abs() > (2 * REORDER * self.step).unsigned_abs();
+            if is_far {
+                self.lost.broken(dts);
+            } else {
+                self.hidden.push(key);
+            }
+            return;
+        }
+        let first = self.first_shown.map_or(key, |f| f.min(key));
+        self.first_shown = Some(first);
+        let lost = &mut self.lost;
+        self.hidden.retain(|hidden| {
+            let is_inside = (first..key).contains(hidden);
+            if is_inside {
+                lost.broken(*hidden);
+            }
+            !is_inside
+        });
     }
 
     fn drain(&mut self) {
@@ -361,7 +431,13 @@ impl FrameSource for FfmpegSource {
             return Ok(None);
         }
         let input = Input::File(self.url.clone());
-        let found = display_times(&self.info.name, &input, SURVEYED_FRAMES, SURVEYED_BYTES)?;
+        let (frames, bytes) = if self.feed.demuxer.has_display_times() {
+            (SURVEYED_FRAMES, SURVEYED_BYTES)
+        } else {
+            // A time is known by those that come after it.
+            (usize::MAX, u64::MAX)
+        };
+        let found = display_times(&self.info.name, &input, frames, bytes)?;
         Ok(Some(found).filter(|(times, _)| !times.is_empty()))
     }
 

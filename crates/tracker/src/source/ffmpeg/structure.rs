@@ -3,10 +3,15 @@
 //!
 //! Owns: [`Structure`]. Must not: decode, or decide what is lost.
 
+mod asf;
 mod boxes;
 mod bytes;
+mod flv;
 mod gif;
 mod matroska;
+mod ogg;
+mod pages;
+mod program;
 mod transport;
 mod walk;
 
@@ -36,6 +41,14 @@ impl Structure {
             Box::new(boxes::Boxes::new(&mut file))
         } else if has("gif") {
             Box::new(gif::Gif::default())
+        } else if has("flv") {
+            Box::new(flv::Flv::new(&mut file)?)
+        } else if has("ogg") {
+            Box::new(pages::Paged::new(ogg::Ogg::default(), 0))
+        } else if has("mpeg") {
+            Box::new(program::Program::default())
+        } else if has("asf") {
+            Box::new(asf::Asf::walk(&mut file, stream_id)?)
         } else {
             return None;
         };
