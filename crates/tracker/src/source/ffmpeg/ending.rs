@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 
-use super::FfmpegSource;
+use super::source::FfmpegSource;
 use crate::frame::Ending;
 use crate::name::path;
 
@@ -61,7 +61,7 @@ fn number(rest: &mut &[u8]) -> Option<i64> {
 impl FfmpegSource {
     /// How much of the length that the container declares is not there, s; `None` if it is all there, but for
     /// two of the longest steps between frames.
-    fn missing_s(&self) -> Option<f64> {
+    pub(super) fn missing_s(&self) -> Option<f64> {
         let (last, longest) = self.stamps.last()?;
         let missing = self.feed.demuxer.declared_end()?.saturating_sub(last);
         let base = self.feed.demuxer.stream().time_base;
@@ -83,14 +83,14 @@ impl FfmpegSource {
 
     /// Whether the file is damaged after its last packet, and no length that it declares says that all pictures are there.
     /// A transport stream is cut anywhere by those who record it.
-    fn ends_in_an_element(&self) -> bool {
+    pub(super) fn ends_in_an_element(&self) -> bool {
         let declares = || self.info.declared_frames.is_some() || self.feed.demuxer.declared_end().is_some();
         let is_certain = self.info.container == "matroska,webm" && !declares();
         self.feed.ends_broken() && (!self.feed.declares_length() || is_certain)
     }
 
     /// Whether the file lacks the mark that its container writes at its end.
-    fn lacks_end(&self) -> bool {
+    pub(super) fn lacks_end(&self) -> bool {
         if !self.can_reopen {
             return false;
         }

@@ -8,7 +8,7 @@ use super::decode::{Decoder, Picture, Received};
 use super::demux::{Demuxer, Packet, Read};
 use super::fields::{self, FieldOrder};
 use super::layout::{Layout, Orientation};
-use super::{FfmpegSource, Shared};
+use super::source::{FfmpegSource, Shared};
 use crate::error::{Error, Fault, Result};
 use crate::frame::{Frame, SourceInfo};
 use crate::source::{Interlaced, cores};

@@ -1,28 +1,15 @@
-//! A container's own structure, followed beside the reader: a demuxer goes on after damage in silence, and what it
-//! passed over is told by elements that do not fit together.
+//! Chooses the walk for a container and follows it from packet to packet.
 //!
 //! Owns: [`Structure`]. Must not: decode, or decide what is lost.
 
-mod asf;
-mod boxes;
-mod bytes;
-mod flv;
-mod gif;
-mod matroska;
-mod ogg;
-mod pages;
-mod program;
-mod transport;
-mod walk;
-
 use std::fs::File;
 
-use bytes::Bytes;
-pub(super) use walk::Fit;
-use walk::Walk;
+use super::bytes::Bytes;
+use super::walk::{Fit, Walk};
+use super::{asf, boxes, flv, gif, matroska, ogg, pages, program, transport};
 
 /// Follows the elements of a file from packet to packet.
-pub(super) struct Structure {
+pub(in super::super) struct Structure {
     file: Bytes,
     walk: Box<dyn Walk>,
 }
@@ -30,7 +17,7 @@ pub(super) struct Structure {
 impl Structure {
     /// The structure of a file, by its container's short names; `None` where none is known or the file cannot be
     /// read again. `stream_id` is the stream's number in the container.
-    pub(super) fn of(container: &str, path: &str, stream_id: i32) -> Option<Self> {
+    pub(in super::super) fn of(container: &str, path: &str, stream_id: i32) -> Option<Self> {
         let has = |name: &str| container.split(',').any(|c| c == name);
         let mut file = Bytes::new(File::open(path).ok()?)?;
         let walk: Box<dyn Walk> = if has("matroska") {
@@ -56,12 +43,12 @@ impl Structure {
     }
 
     /// How all elements from the last packet to the one whose first byte is at `to` fit together.
-    pub(super) fn reach(&mut self, to: u64) -> Fit {
+    pub(in super::super) fn reach(&mut self, to: u64) -> Fit {
         self.walk.reach(&mut self.file, to)
     }
 
     /// How all elements from the last packet to the end of the file fit together.
-    pub(super) fn rest(&mut self) -> Fit {
+    pub(in super::super) fn rest(&mut self) -> Fit {
         self.walk.rest(&mut self.file)
     }
 }

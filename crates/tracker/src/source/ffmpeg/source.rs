@@ -1,0 +1,435 @@
+//! Reads the frames of a film through FFmpeg: demultiplexes, decodes, puts pictures in order, numbers frames.
+//!
+//! Owns: [`FfmpegSource`]. Must not: print, or guess what a frame that could not be decoded held.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use ffmpeg_next::ffi;
+
+use super::decode::{Decoder, Picture, Received};
+use super::demux::{Demuxer, Packet};
+use super::describe::{describe, step, stream_base};
+use super::feed::{Feed, Given};
+use super::fields::{self, FieldOrder};
+use super::layout::{Layout, Orientation};
+use super::lost::Lost;
+use super::order::{Order, Sent};
+use super::stamps::{Stamps, Survey, display_times};
+use crate::error::{Error, Fault, Result};
+use crate::frame::{Bytes, Ending, Frame, FrameSource, SourceInfo};
+use crate::gaps::Gaps;
+use crate::source::{Input, Interlaced, OpenOptions};
+
+/// A frame on its way out: its time, and its plane with the bytes of a row.
+pub(super) struct Ready {
+    pub(super) ticks: i64,
+    pub(super) plane: Option<(Box<dyn Bytes>, usize)>,
+    pub(super) byte: Option<u64>,
+}
+
+/// A recording read through FFmpeg.
+pub struct FfmpegSource {
+    pub(super) info: SourceInfo,
+    pub(super) url: String,
+    pub(super) can_reopen: bool,
+    pub(super) protocols: Option<&'static str>,
+    pub(super) threads: usize,
+    pub(super) feed: Feed,
+    pub(super) decoder: Decoder,
+    pub(super) layout: Layout,
+    pub(super) orientation: Orientation,
+    pub(super) interlaced: Interlaced,
+    pub(super) stamps: Stamps,
+    /// Ticks from frame to frame by the rate that the container claims; 1 if it claims none.
+    pub(super) step: i64,
+    pub(super) order: Order,
+    pub(super) intra_only: bool,
+    /// A frame is damaged and those that follow are predicted from it.
+    pub(super) tainted: bool,
+    pub(super) draining: bool,
+    pub(super) finished: bool,
+    pub(super) failures: usize,
+    /// Packets of the stream seen or known to be lost, with those that an edit list hides.
+    pub(super) packets: u64,
+    pub(super) last_byte: Option<u64>,
+    /// The last packet is less than there should be.
+    pub(super) last_is_cut: bool,
+    pub(super) lost: Lost,
+    /// The file is to be looked through before its first packet is given to the decoder.
+    pub(super) is_surveyed: bool,
+    /// Packets given to the decoder, and numbers of those that come after gaps where nothing else tells of damage.
+    pub(super) fed: u64,
+    pub(super) after_gaps: VecDeque<u64>,
+    /// Least display time of a shown packet, and those of hidden ones that may lie between shown ones, ticks.
+    pub(super) first_shown: Option<i64>,
+    pub(super) hidden: Vec<i64>,
+    /// Frames without a plane whose fate depends on whether a good one follows.
+    pub(super) held: VecDeque<Ready>,
+    pub(super) ready: VecDeque<Ready>,
+    /// Frames given as samples of a pipe, to be handed out in their turn.
+    pub(super) replay: VecDeque<Frame>,
+    pub(super) next_index: u64,
+    /// Ticks are frame numbers: the user gives the rate, or nothing does.
+    pub(super) counts_frames: bool,
+    pub(super) ending: Ending,
+}
+
+/// How far decoding order and display order can differ (H.264's and HEVC's limit of 16 frames).
+const REORDER: i64 = 16;
+
+/// Packets, and bytes of them, whose time stamps are looked at without decoding.
+const SURVEYED_FRAMES: usize = 20_000;
+const SURVEYED_BYTES: u64 = 256 << 20;
+
+impl FfmpegSource {
+    /// Opens what `input` stands for; `name` is the user's, for messages.
+    ///
+    /// # Errors
+    /// [`Error::Source`] if it holds no film that can be decoded.
+    pub(crate) fn open(name: &str, input: &Input, options: &OpenOptions) -> Result<Self> {
+        // SAFETY: sets one global number. The libraries would print; errors come back as codes.
+        unsafe { ffi::av_log_set_level(ffi::AV_LOG_QUIET) };
+        let (url, can_reopen, protocols) = match input {
+            Input::File(url) => (url, true, Some("file")),
+            Input::Pipe(url) => (url, false, Some(if url.starts_with("file:") { "file" } else { "pipe" })),
+            Input::Address(url) => (url, false, None),
+        };
+        let demuxer = Demuxer::open(url, name, protocols)?;
+        let decoder = Decoder::open(&demuxer, name, options.threads)?;
+        let parameters = demuxer.parameters();
+        let layout = Layout::new(parameters.format, name)?;
+        // SAFETY: a look-up in a static table; null for codecs without a descriptor.
+        let properties =
+            unsafe { ffi::avcodec_descriptor_get(parameters.codec_id).as_ref() }.map_or(0, |d| d.props);
+        let intra_only = properties & ffi::AV_CODEC_PROP_INTRA_ONLY != 0;
+        let (mut info, orientation) = describe(&demuxer, &layout, name, options)?;
+
+        let counts_frames = options.fps.is_some() || demuxer.is_untimed();
+        let step = step(&demuxer).round() as i64;
+        let feed = Feed::new(demuxer, name, can_reopen, if intra_only { 1 } else { 6 })?;
+        if let Some(order) = feed.field_order(name)? {
+            match options.interlaced {
+                Interlaced::Refuse => return Err(fields::refusal(name, order)),
+                Interlaced::AsFrames => {
+                    info.details.push(("fields".into(), format!("interlaced, {}", order.words())));
+                    info.warnings.push(fields::warning(name, order));
+                }
+            }
+        }
+        // Where each field is a packet, so is it where the container counts.
+        if feed.has_single_fields() {
+            info.declared_frames = info.declared_frames.map(|n| n.div_ceil(2));
+        }
+        // A stream has display times if its first packets have.
+        let lacks = |p: &Packet| {
+            p.get().pts == ffi::AV_NOPTS_VALUE && !(intra_only && p.get().dts != ffi::AV_NOPTS_VALUE)
+        };
+        let unstamped = !feed.demuxer.has_display_times() || feed.ahead().any(lacks);
+        let is_blind = feed.is_blind();
+        let lost = Lost::new(stream_base(&feed.demuxer), &info.claims.container, is_blind);
+        Ok(Self {
+            info,
+            url: url.clone(),
+            can_reopen,
+            protocols,
+            threads: options.threads,
+            feed,
+            decoder,
+            layout,
+            orientation,
+            interlaced: options.interlaced,
+            stamps: Stamps::new(unstamped, step),
+            step,
+            order: Order::new(if unstamped && !intra_only { REORDER } else { 0 }),
+            intra_only,
+            tainted: false,
+            draining: false,
+            finished: false,
+            failures: 0,
+            packets: 0,
+            last_byte: None,
+            last_is_cut: false,
+            lost,
+            is_surveyed: is_blind && can_reopen && !intra_only && !counts_frames,
+            fed: 0,
+            after_gaps: VecDeque::new(),
+            first_shown: None,
+            hidden: Vec::new(),
+            held: VecDeque::new(),
+            ready: VecDeque::new(),
+            replay: VecDeque::new(),
+            next_index: 0,
+            counts_frames,
+            ending: Ending::Complete,
+        })
+    }
+
+    /// How its pictures are turned.
+    pub(crate) fn orientation(&self) -> Orientation {
+        self.orientation
+    }
+
+    /// Whether the end was reached.
+    pub(crate) fn is_finished(&self) -> bool {
+        self.finished
+    }
+
+    /// Gives the next packet to the decoder, or starts draining.
+    pub(super) fn feed(&mut self) -> Result<()> {
+        let Some(mut given) = self.feed.next()? else {
+            self.drain();
+            return Ok(());
+        };
+        for slot in std::mem::take(&mut given.lost) {
+            let key = self.stamps.key(&slot, self.packets as i64);
+            self.packets += 1;
+            self.order.sent(Sent { key, byte: None, key_frame: false, suspect: true });
+        }
+        let is_after_gap = self.is_after_gap()?;
+        let fields = *given.packet.get();
+        let byte = u64::try_from(fields.pos).ok();
+        // A second field belongs to the picture of the packet before it, whose time that picture has.
+        let mut key = ffi::AV_NOPTS_VALUE;
+        if !given.is_second_field {
+            key = self.stamps.key(&fields, self.packets as i64);
+            self.packets += 1;
+            let time = self.stamps.time(key);
+            if given.after_loss {
+                self.lost.broken(time);
+            } else if given.after_damage {
+                self.lost.damaged(time);
+            }
+            if given.goes_on && given.is_late {
+                self.lost.goes_on(time);
+            }
+            given.after_loss |= is_after_gap && !given.goes_on;
+            self.note_hidden(&given, key);
+            let suspect = self.feed.judge(&given, key, self.intra_only);
+            // What an edit list hides is decoded, because others are predicted from it, but gives no picture.
+            if !given.packet.has(ffi::AV_PKT_FLAG_DISCARD) {
+                let key_frame = given.packet.has(ffi::AV_PKT_FLAG_KEY);
+                self.order.sent(Sent { key, byte, key_frame, suspect });
+                self.last_byte = byte.map(|b| b + u64::try_from(fields.size).unwrap_or(0)).or(self.last_byte);
+            }
+        }
+        given.packet.set_pts(key);
+        self.last_is_cut = given.is_cut;
+        // A packet that is known to be cut would give a picture with made-up pixels.
+        if !given.packet.has(ffi::AV_PKT_FLAG_CORRUPT) {
+            self.decoder.send(Some(&given.packet));
+        }
+        Ok(())
+    }
+
+    /// Whether the next packet comes after a gap in the times of a file in which nothing else tells of damage.
+    fn is_after_gap(&mut self) -> Result<bool> {
+        if std::mem::take(&mut self.is_surveyed) {
+            let survey = Survey::of(&self.info.name, &Input::File(self.url.clone()), usize::MAX, u64::MAX)?;
+            self.after_gaps = survey.packets_after_gaps(&self.info.claims.container).into();
+            self.stamps.surveyed(&survey);
+        }
+        let number = self.fed;
+        self.fed += 1;
+        let is_next = self.after_gaps.front() == Some(&number);
+        if is_next {
+            self.after_gaps.pop_front();
+        }
+        Ok(is_next)
+    }
+
+    /// What an edit list hides at the ends is trimmed; what is hidden between shown frames is lost to who watches, and so
+    /// is a frame whose display time is damaged: it is further from its decoding time than any codec allows.
+    fn note_hidden(&mut self, given: &Given, key: i64) {
+        if given.packet.has(ffi::AV_PKT_FLAG_DISCARD) {
+            let dts = given.packet.get().dts;
+            let is_far = dts != ffi::AV_NOPTS_VALUE
+                && self.step > 1
+                && key.saturating_sub(dts).unsigned_abs() > (2 * REORDER * self.step).unsigned_abs();
+            if is_far {
+                self.lost.broken(dts);
+            } else {
+                self.hidden.push(key);
+            }
+            return;
+        }
+        let first = self.first_shown.map_or(key, |f| f.min(key));
+        self.first_shown = Some(first);
+        let lost = &mut self.lost;
+        self.hidden.retain(|hidden| {
+            let is_inside = (first..key).contains(hidden);
+            if is_inside {
+                lost.broken(*hidden);
+            }
+            !is_inside
+        });
+    }
+
+    pub(super) fn drain(&mut self) {
+        self.draining = true;
+        self.decoder.send(None);
+    }
+
+    /// Takes one picture out of the decoder, feeding it as needed. Adds to `ready`, or ends the recording.
+    pub(super) fn advance(&mut self) -> Result<()> {
+        match self.decoder.receive()? {
+            Received::Picture(picture) => {
+                self.failures = 0;
+                if let (Interlaced::Refuse, Some(order)) = (self.interlaced, FieldOrder::of(picture.get())) {
+                    return Err(fields::refusal(&self.info.name, order));
+                }
+                self.take(picture);
+            }
+            Received::Hungry if self.draining => self.finish(),
+            Received::Hungry => self.feed()?,
+            Received::End => self.finish(),
+            Received::Damaged => {
+                self.failures += 1;
+                // One failure for each packet under way is the most that can come; more is a decoder that is stuck.
+                if self.draining && self.failures > self.order.waiting() + 64 {
+                    self.finish();
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Puts a picture into the queue, and before it frames without a plane for those that will not come.
+    pub(super) fn take(&mut self, picture: Picture) {
+        let key = picture.get().pts;
+        let arrival = self.order.arrived(key);
+        for lost in arrival.lost {
+            self.tainted |= !self.intra_only;
+            self.hold(lost);
+        }
+        let damaged = picture.is_damaged();
+        if damaged {
+            self.tainted |= !self.intra_only;
+        } else if arrival.own.is_some_and(|p| p.key_frame) {
+            self.tainted = false;
+        }
+        let byte = arrival.own.and_then(|p| p.byte);
+        let suspect = arrival.own.is_some_and(|p| p.suspect);
+        let fits = self.layout.is_of(&picture) && {
+            let (w, h) = (picture.get().width.unsigned_abs(), picture.get().height.unsigned_abs());
+            self.orientation.size(w, h) == (self.info.width, self.info.height)
+        };
+        let plane = if damaged || suspect || self.tainted || !fits {
+            None
+        } else {
+            self.layout.plane(picture, self.orientation)
+        };
+        let usual = self.stamps.last();
+        let ticks = self.stamps.ticks(key);
+        // In a file that is cut, the last pictures in display order may be there and one before them not.
+        let after_hole = self.draining
+            && !self.intra_only
+            && usual
+                .is_some_and(|(last, longest)| ticks.saturating_sub(last) > longest.saturating_mul(3) / 2);
+        let plane = if after_hole && self.is_cut() { None } else { plane };
+        let ready = Ready { ticks, plane, byte };
+        if ready.plane.is_some() {
+            self.ready.append(&mut self.held);
+            self.ready.push_back(ready);
+        } else {
+            self.held.push_back(ready);
+        }
+    }
+
+    pub(super) fn hold(&mut self, lost: Sent) {
+        let ticks = self.stamps.ticks(lost.key);
+        self.held.push_back(Ready { ticks, plane: None, byte: lost.byte });
+    }
+
+    pub(super) fn make(&mut self, ready: Ready) -> Frame {
+        let index = self.next_index;
+        self.next_index += 1;
+        self.lost.frame(index, ready.ticks);
+        let (plane, stride) = match ready.plane {
+            Some((plane, stride)) => (Some(plane), stride),
+            None => (None, 0),
+        };
+        Frame {
+            index,
+            ticks: if self.counts_frames { index as i64 } else { ready.ticks },
+            width: self.info.width,
+            height: self.info.height,
+            stride,
+            format: self.info.format,
+            depth_bits: self.info.depth_bits,
+            plane,
+        }
+    }
+
+    pub(super) fn decode_next(&mut self) -> Result<Option<Frame>> {
+        loop {
+            if let Some(ready) = self.ready.pop_front() {
+                return Ok(Some(self.make(ready)));
+            }
+            if self.finished {
+                if self.next_index == 0 {
+                    let reason = match &self.ending {
+                        Ending::Early { reason, .. } => reason.clone(),
+                        Ending::Complete => "it holds no frames".to_owned(),
+                    };
+                    return Err(Error::Source(
+                        Fault::new(&self.info.name, format!("no frame can be decoded: {reason}"))
+                            .advice("Check that the file is complete and that `ffmpeg -i` reads it"),
+                    ));
+                }
+                return Ok(None);
+            }
+            self.advance()?;
+        }
+    }
+}
+
+impl FrameSource for FfmpegSource {
+    fn info(&self) -> &SourceInfo {
+        &self.info
+    }
+
+    fn next_frame(&mut self) -> Result<Option<Frame>> {
+        match self.replay.pop_front() {
+            Some(frame) => Ok(Some(frame)),
+            None => self.decode_next(),
+        }
+    }
+
+    fn ending(&self) -> Ending {
+        self.ending.clone()
+    }
+
+    fn stamps(&mut self) -> Result<Option<(Vec<i64>, bool)>> {
+        // A packet that holds one field is no frame.
+        if !self.can_reopen || self.counts_frames || self.feed.has_single_fields() {
+            return Ok(None);
+        }
+        let input = Input::File(self.url.clone());
+        let (frames, bytes) = if self.feed.demuxer.has_display_times() {
+            (SURVEYED_FRAMES, SURVEYED_BYTES)
+        } else {
+            // A time is known by those that come after it.
+            (usize::MAX, u64::MAX)
+        };
+        let found = display_times(&self.info.name, &input, frames, bytes)?;
+        Ok(Some(found).filter(|(times, _)| !times.is_empty()))
+    }
+
+    fn gaps(&self) -> Gaps {
+        self.lost.gaps()
+    }
+
+    fn sample(&mut self, count: usize) -> Result<Vec<Frame>> {
+        if self.can_reopen { self.sample_file(count) } else { self.sample_pipe(count) }
+    }
+}
+
+/// A plane that two frames share.
+pub(super) struct Shared(pub(super) Arc<dyn Bytes>);
+
+impl Bytes for Shared {
+    fn bytes(&self) -> &[u8] {
+        self.0.bytes()
+    }
+}
