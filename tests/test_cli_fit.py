@@ -12,10 +12,12 @@ import numpy as np
 import pytest
 from pydpend.angles import LinkAngles
 from pydpend.cli import main
+from pydpend.damping import DampingFit
 from pydpend.energy import Motion
 from pydpend.model import Damping, read_model
 from pydpend.report import damping as report_damping
 from pydpend.report.page import Heading
+from pydpend.run_folder import StoredRun
 from pydpend.simulate import simulate
 
 from tests.free_decays import measured, released
@@ -228,9 +230,11 @@ def test_the_papers_ten_coefficients_come_with_a_warning(tmp_path: Path) -> None
         added = zip(ten["weights"][name], (1, 2, 3), strict=True)
         total = sum(w * ten["values"][f"mu_c{i}_{name[-1]}"]["value"] for w, i in added)
         assert total == pytest.approx(found["value"], rel=1e-9)
+    stored = DampingFit.from_json((tmp_path / "out" / "fit.json").read_text())
+    run = StoredRun(tmp_path, "", "", {}, {}, {}, {}, (), {}, ())
     headings = [
         block.text
-        for section in report_damping.sections(tmp_path, fit, None)
+        for section in report_damping.sections(run, stored, {})
         for block in section.blocks
         if isinstance(block, Heading)
     ]

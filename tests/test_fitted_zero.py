@@ -66,14 +66,14 @@ def test_a_wrong_zero_changes_no_coefficient_and_is_told(
     assert given["zeros_off"] == [abs(v) > 0.5 for v in off_deg]
     words = " and ".join(f"{abs(v):.1f} deg (phi{j})" for j, v in enumerate(off_deg, 1) if v)
     assert f"swing: the zero was off by {words}; " in " ".join(fit.notes)
-    (warning,) = [w for w in told.warnings(fit.to_json()) if "the zero of its angles was off by" in w]
+    (warning,) = [w for w in told.warnings(fit) if "the zero of its angles was off by" in w]
     assert warning.startswith("swing")
 
 
 def test_a_right_zero_is_not_spoken_of(right: DampingFit) -> None:
     assert right.inputs[0]["zeros_off"] == [False, False]
     assert not any("zero was off" in note for note in right.notes)
-    assert not any("zero of its angles" in w for w in told.warnings(right.to_json()))
+    assert not any("zero of its angles" in w for w in told.warnings(right))
 
 
 def test_the_energy_fit_and_a_prediction_have_their_own_zero_too(right: DampingFit) -> None:

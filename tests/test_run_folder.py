@@ -15,7 +15,7 @@ from pydpend.analyse.contents import about, made_by
 from pydpend.analyse.folder import RUN_SCHEMA, RunFolder, RunFolderError
 from pydpend.cli import main
 from pydpend.errors import PydpendError
-from pydpend.plots.folder import FigureError, chosen
+from pydpend.run_folder import RunFileError, read_run
 
 
 def test_every_file_of_a_run_is_one_that_its_stage_makes(demo_run: Path) -> None:
@@ -151,9 +151,9 @@ def test_names_of_recordings_stay_in_the_folder(tmp_path: Path) -> None:
         recording = {"name": name, "label": "drop.mp4", "path": "drop.mp4", "kind": "film"}
         (tmp_path / "run.json").write_text(json.dumps({"facts": {"recordings": [recording]}}))
         with pytest.raises(
-            FigureError, match=r"key facts\.recordings\[0\]\.name: .* is no folder of the run"
+            RunFileError, match=r"key facts\.recordings\[0\]\.name: .* is no folder of the run"
         ):
-            chosen(tmp_path, None)
+            read_run(tmp_path)
 
 
 def test_a_damaged_file_is_made_again(tmp_path: Path) -> None:

@@ -90,6 +90,10 @@ class Table:
         """A number; NaN and infinity only with ``finite=False``."""
         return self._number(self.place(key), self._get(key), finite)
 
+    def number_or_nan(self, key: str) -> float:
+        """A number, NaN where there is null or nothing."""
+        return self.number(key) if key in self else math.nan
+
     def _number(self, place: str, value: object, finite: bool = True) -> float:
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             self._wrong(place, value, "a number")

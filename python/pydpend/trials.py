@@ -17,12 +17,13 @@ from pydpend.damping.result import clean
 from pydpend.damping.shooting import Progress
 from pydpend.errors import FitError, fault
 from pydpend.fit_options import FitOptions
+from pydpend.json_text import JsonResult
 from pydpend.model import Model
 
 Floats = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Spread:
     """One coefficient or ratio over the trials."""
 
@@ -43,8 +44,8 @@ class Spread:
     unit: str
 
 
-@dataclass(frozen=True)
-class Trials:
+@dataclass(frozen=True, eq=False)
+class Trials(JsonResult):
     """Fits of several recordings."""
 
     each: tuple[DampingFit, ...]
@@ -52,7 +53,7 @@ class Trials:
     spreads: dict[str, Spread]
     message: str
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Numbers only."""
         out: dict[str, Any] = clean(
             {

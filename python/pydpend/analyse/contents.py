@@ -4,31 +4,7 @@ from __future__ import annotations
 
 import re
 
-ABOUT = {
-    "nodes.parquet": "node table: where each marker is in each frame",
-    "residuals.parquet": "distance of each marker from where its rigid body puts it, px",
-    "markers.json": "each marker summed up: seen, gaps, residual",
-    "angles.parquet": "angles of the links and their standard uncertainties, rad",
-    "angles.json": "how the angles were had: bodies, joints, scale, zero",
-    "zero.parquet": "node table of the film that hangs still",
-    "zero_rig.toml": "the rig it was tracked with",
-    "encoder.json": "calibration of the encoder",
-    "calibration.svg": "calibration line and its residuals (Fig. 10)",
-    "comparison.json": "film against encoder, numbers",
-    "comparison.parquet": "film and encoder at the encoder's times, rad",
-    "comparison.png": "film against encoder (Fig. 15)",
-    "overlay.mp4": "the film with nodes, names and bodies drawn in",
-    "overlay.json": "times of its frames in the recording",
-    "fit.json": "damping coefficients, uncertainties, shares, identifiability",
-    "model.json": "constants of the model that the fit began from, with their standard uncertainties, SI",
-    "coefficients.csv": "the coefficients as a table",
-    "shares.png": "where the energy goes",
-    "trials.json": "the coefficients of each recording and their mean",
-    "trials.png": "the same, drawn (Fig. 20)",
-    "maps.png": "angle-dependent bias of the tracking",
-    "windows.csv": "error of each predicted window, degrees",
-    "prediction.json": "each recording predicted from the others",
-}
+from pydpend.run_folder import RunFile
 
 
 def about(name: str) -> str:
@@ -40,7 +16,7 @@ def about(name: str) -> str:
         )
     if last.startswith("residuals") and last.endswith(".csv"):
         return "measured minus fitted angle of each link, and its standard deviation, rad"
-    return ABOUT.get(last, "")
+    return RunFile(last).words if last in list(RunFile) else ""
 
 
 _PART = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]*")

@@ -20,6 +20,7 @@ from pydpend.analyse.contents import made_by
 from pydpend.documents import Table, read_json
 from pydpend.errors import PydpendError, fault
 from pydpend.output import check_kept, results_folder, write_text
+from pydpend.run_folder import RECORD
 
 RUN_SCHEMA = 4
 """A folder of an older schema is done again, one of a newer is refused."""
@@ -113,7 +114,7 @@ class RunFolder:
     @classmethod
     def open(cls, path: Path) -> RunFolder:
         """The folder, made if it is not there. One that holds other things is refused."""
-        record = path / "run.json"
+        record = path / RECORD
         if not record.exists():
             if path.exists() and (not path.is_dir() or any(path.iterdir())):
                 raise RunFolderError(
@@ -142,7 +143,7 @@ class RunFolder:
 
     def digests(self) -> Digests:
         """The digests of inputs that are known from the run before."""
-        facts = Table(self.facts, str(self.path / "run.json"), RunFolderError, "facts", "Use a new folder")
+        facts = Table(self.facts, str(self.path / RECORD), RunFolderError, "facts", "Use a new folder")
         if "digests" not in facts:
             return Digests()
         table = facts.table("digests")
@@ -165,7 +166,7 @@ class RunFolder:
         }
         text = json.dumps(content, indent=1)
         try:
-            write_whole(self.path / "run.json", text + "\n")
+            write_whole(self.path / RECORD, text + "\n")
         except OSError as error:
             raise RunFolderError(fault(str(self.path), f"cannot be written ({error.strerror})")) from None
 

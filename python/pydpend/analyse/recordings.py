@@ -13,6 +13,7 @@ from pydpend.analyse.options import Options
 from pydpend.columns import column_names
 from pydpend.errors import OptionError, PydpendError, Setting, fault, listed
 from pydpend.kinds import expect, kind_of
+from pydpend.run_folder import FIT_FOLDER
 
 TABLES = (".parquet", ".csv", ".txt")
 """Endings of tables."""
@@ -59,7 +60,7 @@ def recordings(options: Options, digests: Digests) -> tuple[Recording, ...]:
         stem = re.sub(r"[^A-Za-z0-9._-]+", "_", path.stem or path.name).strip("._") or "recording"
         name = stem
         count = 1
-        while name in names or name in ("fit", UNFINISHED):
+        while name in names or name in (FIT_FOLDER, UNFINISHED):
             count += 1
             name = f"{stem}_{count}"
         names.add(name)

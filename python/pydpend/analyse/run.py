@@ -20,7 +20,9 @@ from pydpend.analyse.options import Options, check_files
 from pydpend.analyse.recordings import Recording, check_options, recordings
 from pydpend.analyse.state import Progress, RunState, StageResult, StageState, Started, Tell
 from pydpend.errors import OptionError, PydpendError, Setting, fault
+from pydpend.json_text import JsonResult
 from pydpend.output import keeping
+from pydpend.run_folder import FIT_FOLDER, PAGE, README, RECORD, RunFile
 
 
 @dataclass(frozen=True)
@@ -44,7 +46,7 @@ class Stage:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class Outcome(JsonResult):
     """What a run came to."""
 
     folder: Path
@@ -57,7 +59,7 @@ class Outcome:
     seconds: dict[str, float]
     """How long each stage took when it was done, the report included."""
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """As plain values."""
         return {
             "folder": str(self.folder),
@@ -66,7 +68,7 @@ class Outcome:
             "stages": {name: str(state) for name, state in self.stages.items()},
             "reasons": self.reasons,
             "seconds": self.seconds,
-            "report": str(self.folder / "report.html"),
+            "report": str(self.folder / PAGE),
         }
 
 
@@ -109,7 +111,7 @@ def plan(options: Options, folder: Path, digests: Digests | None = None) -> list
         "fit",
         "Damping fit",
         ready,
-        "fit",
+        FIT_FOLDER,
         [model, options.joint_fit(several).key()],
         lambda into, tell, resume: stages.fit(found, options, folder, into, tell),
     )
@@ -162,7 +164,7 @@ def _plan_recording(
             r.name,
             [r.digest, known.option(options.rig), options.fps, options.pixel_aspect],
             lambda into, tell, resume: stages.track(r, options, into, tell, resume),
-            ("nodes.parquet",),
+            (RunFile.NODES,),
             ends_the_run=True,
         )
         needs = (f"{r.name}/track",)
@@ -211,7 +213,7 @@ def analyse(options: Options, folder: str | Path, progress: Progress | None = No
     interrupted run (`KeyboardInterrupt` passes through) keeps what it finished; the same call goes on from there.
     """
     path = Path(folder)
-    run = RunFolder.open(path) if (path / "run.json").exists() else None
+    run = RunFolder.open(path) if (path / RECORD).exists() else None
     digests = Digests() if run is None else run.digests()
     todo = plan(options, path, digests)
     if run is None:
@@ -257,7 +259,7 @@ def _analyse(run: RunFolder, todo: list[Stage], options: Options, progress: Prog
     tell(of, of, "Report", Started())
     begun = time.monotonic()
     stages.report(path)
-    write_whole(path / "README.txt", provenance.readme(run))
+    write_whole(path / README, provenance.readme(run))
     seconds = {name: float(done["seconds"]) for name, done in run.stages.items()}
     seconds["report"] = round(time.monotonic() - begun, 2)
     tell(of, of, "Report", StageResult(StageState.DONE))

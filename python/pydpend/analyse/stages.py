@@ -21,6 +21,7 @@ from pydpend.documents import read_json
 from pydpend.errors import PydpendError
 from pydpend.fit_status import FitStatus
 from pydpend.output import whole
+from pydpend.run_folder import FIT_FOLDER, RunFile
 
 if TYPE_CHECKING:
     from pydpend.analyse.recordings import Recording
@@ -78,7 +79,7 @@ def track(r: Recording, options: Options, into: Path, tell: Tell, resume: bool) 
         fps=options.fps,
         pixel_aspect=options.pixel_aspect,
         threads=options.threads,
-        output=into / "nodes.parquet",
+        output=into / RunFile.NODES,
         resume=resume,
         force=True,
         progress=_share(tell),
@@ -99,7 +100,7 @@ def markers(r: Recording, here: Path, into: Path) -> str:
     off = misfits(nodes)
     # Columns are numbered, because a node may be called anything; their names are in markers.json.
     columns = {"time_s": nodes.t_s} | {f"node{i}_px": off[:, i] for i in range(off.shape[1])}
-    _write_parquet(into / "residuals.parquet", columns)
+    _write_parquet(into / RunFile.RESIDUALS, columns)
     known = np.isfinite(off)
     rows = [
         {
@@ -113,7 +114,7 @@ def markers(r: Recording, here: Path, into: Path) -> str:
         }
         for i, node in enumerate(nodes.rig.nodes)
     ]
-    _write_json(into / "markers.json", {"nodes": rows})
+    _write_json(into / RunFile.MARKERS, {"nodes": rows})
     if not known.any():
         return "no body shows two nodes at once, so none can be compared with its shape"
     return f"RMS distance of a marker from its body's shape {math.sqrt(np.nanmean(off**2)):.4f} px"
@@ -122,7 +123,7 @@ def markers(r: Recording, here: Path, into: Path) -> str:
 def _nodes(here: Path, r: Recording) -> Nodes:
     from pydpend.nodes import read_nodes
 
-    return read_nodes(here / "nodes.parquet" if r.kind == "film" else r.path)
+    return read_nodes(here / RunFile.NODES if r.kind == "film" else r.path)
 
 
 def _hanging(r: Recording, options: Options, here: Path, into: Path) -> Any:
@@ -140,14 +141,14 @@ def _hanging(r: Recording, options: Options, here: Path, into: Path) -> Any:
     from pydpend.tracking import track as track_film
 
     # The same rig, so that the markers have the same names.
-    rig = into / "zero_rig.toml"
+    rig = into / RunFile.ZERO_RIG
     _nodes(here, r).rig.write(rig)
     return track_film(
         path,
         rig,
         fps=options.fps,
         pixel_aspect=options.pixel_aspect,
-        output=into / "zero.parquet",
+        output=into / RunFile.ZERO,
         progress=False,
     )
 
@@ -185,8 +186,8 @@ def angles(r: Recording, options: Options, here: Path, into: Path) -> str:
             gaps="stop",
             name=r.name,
         )
-    write_angles(found, into / "angles.parquet")
-    _write_json(into / "angles.json", _plain(found.meta))
+    write_angles(found, into / RunFile.ANGLES)
+    _write_json(into / RunFile.ANGLES_ABOUT, _plain(found.meta))
     return f"{found.links} link{'s' if found.links > 1 else ''}, {found.t_s.size} instants"
 
 
@@ -207,9 +208,9 @@ def _angles(folder: Path, found: tuple[Recording, ...]) -> list[LinkAngles]:
     from pydpend.angles import read_angles
 
     return [
-        read_angles(folder / r.name / "angles.parquet", name=r.name)
+        read_angles(folder / r.name / RunFile.ANGLES, name=r.name)
         for r in found
-        if (folder / r.name / "angles.parquet").exists()
+        if (folder / r.name / RunFile.ANGLES).exists()
     ]
 
 
@@ -220,7 +221,7 @@ def encoder(r: Recording, options: Options, here: Path, into: Path) -> str:
     from pydpend.plots.encoder import calibration_figure, comparison_figure
     from pydpend.plots.style import save
 
-    film = read_angles(here / "angles.parquet", name=r.name)
+    film = read_angles(here / RunFile.ANGLES, name=r.name)
     unit: Any = options.unit
     signal = read_encoder(
         str(r.encoder),
@@ -233,12 +234,12 @@ def encoder(r: Recording, options: Options, here: Path, into: Path) -> str:
     if options.calibration is not None:
         path = Path(options.calibration)
         line = calibrate(read_holds([path])) if path.is_dir() else read_calibration(path)
-        line.write(into / "encoder.json")
-        save(calibration_figure(line), into / "calibration.svg")
+        line.write(into / RunFile.ENCODER)
+        save(calibration_figure(line), into / RunFile.CALIBRATION_FIGURE)
     found = compare(film, encoder_angles(signal, line))
-    write_whole(into / "comparison.json", found.to_json())
-    _write_parquet(into / "comparison.parquet", found.to_columns())
-    save(comparison_figure(found), into / "comparison.png")
+    write_whole(into / RunFile.COMPARISON, found.to_json())
+    _write_parquet(into / RunFile.COMPARED, found.to_columns())
+    save(comparison_figure(found), into / RunFile.COMPARISON_FIGURE)
     return f"RMS difference {math.degrees(found.rms_rad):.4f} deg"
 
 
@@ -262,7 +263,7 @@ def fit(found: tuple[Recording, ...], options: Options, folder: Path, into: Path
             alone=lambda k: tell(Going(f"recording {k + 1} alone")),
         )
         fitted = trials.joint
-        _write_json(into / "trials.json", trials.to_json())
+        write_whole(into / RunFile.TRIALS, trials.to_json())
     else:
         fitted = fit_damping(recordings, model, options=chosen, progress=_steps(tell))
     write_fit(fitted, into)
@@ -272,14 +273,14 @@ def fit(found: tuple[Recording, ...], options: Options, folder: Path, into: Path
             n: {"value": v, "sigma": sigmas[n]}
             for n, v in zip(CONSTANTS, model.constants().tolist(), strict=True)
         }
-        _write_json(into / "model.json", {"name": model.name, "constants": constants})
+        _write_json(into / RunFile.MODEL, {"name": model.name, "constants": constants})
     save_figures(fitted, trials, into)
     return fitted.message
 
 
 def converged(folder: Path) -> bool:
     """Whether the fit of a run came to its end."""
-    return read_json(folder / "fit" / "fit.json", PydpendError).text("status") == FitStatus.CONVERGED
+    return read_json(folder / FIT_FOLDER / RunFile.FIT, PydpendError).text("status") == FitStatus.CONVERGED
 
 
 def _steps(tell: Tell) -> Callable[[int, int, float], None]:
@@ -306,18 +307,18 @@ def prediction(found: tuple[Recording, ...], options: Options, folder: Path, int
         fitted = fit_damping(others, model, options=options.fit.bare())
         stored = StoredFit.of(fitted)
         predicted = stored.predict(one, start_s=options.start_s, stop_s=options.stop_s)
-        out[one.name] = predicted.to_json()
+        out[one.name] = predicted.to_dict()
         windows = windows_columns(predicted)
         (into / one.name).mkdir()
         np.savetxt(
-            into / one.name / "windows.csv",
+            into / one.name / RunFile.WINDOWS,
             np.column_stack(list(windows.values())),
             fmt="%.9g",
             delimiter=",",
             header=",".join(windows),
             comments="",
         )
-    _write_json(into / "prediction.json", out)
+    _write_json(into / RunFile.PREDICTION, out)
     return f"{len(out)} recordings predicted"
 
 
@@ -342,15 +343,15 @@ def overlay(r: Recording, here: Path, into: Path, tell: Tell) -> str:
     drawn = draw(
         r.path,
         nodes,
-        into / "overlay.mp4",
+        into / RunFile.OVERLAY,
         every=every,
         width=width - width % 2,
         quality=OVERLAY_QUALITY,
         progress=_share(tell),
     )
-    film = info(into / "overlay.mp4")
+    film = info(into / RunFile.OVERLAY)
     _write_json(
-        into / "overlay.json",
+        into / RunFile.OVERLAY_ABOUT,
         {
             "rate_hz": drawn.play_fps,
             "every": every,

@@ -119,7 +119,7 @@ def zero_for(
         else:
             notes += off_the_swing(kept, value, sigma, swing)
             sigma = confirmed_sigma(kept, value, sigma, swing)
-        meta = {"from": "rest", "sigma_rad": sigma.tolist(), "rests": [j.to_json() for j in judged]}
+        meta = {"from": "rest", "sigma_rad": sigma.tolist(), "rests": [j.to_dict() for j in judged]}
         return value, meta | _told(swing, value), notes
     if isinstance(zero, str) and zero == "reference_frame":
         value, meta = np.zeros(links), {"from": "reference picture"}

@@ -75,7 +75,7 @@ class Judged:
         """Whether it may be the zero."""
         return self.verdict in (Verdict.CONFIRMED, Verdict.UNREFUTED)
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """As in the angles' ``meta``."""
         return {
             "start_s": self.rest.start_s,

@@ -53,6 +53,7 @@ def run(args: argparse.Namespace) -> int:
     from pydpend.analyse import Options, RunState, analyse, plan, read_config, write_config
     from pydpend.analyse.folder import RunFolder
     from pydpend.errors import PydpendError, fault
+    from pydpend.run_folder import PAGE, RECORD
 
     options = read_config(args.config) if args.config else Options()
     told = given(args, _flagged())
@@ -67,7 +68,7 @@ def run(args: argparse.Namespace) -> int:
     folder = Path(args.output)
     if args.dry_run:
         todo = plan(options, folder)
-        run_folder = RunFolder.open(folder) if (folder / "run.json").exists() else RunFolder(folder)
+        run_folder = RunFolder.open(folder) if (folder / RECORD).exists() else RunFolder(folder)
         states = {s.name: "kept" if run_folder.holds(s.name, s.key) else "to do" for s in todo}
         if args.json:
             print(json.dumps(states, indent=1))
@@ -78,9 +79,9 @@ def run(args: argparse.Namespace) -> int:
 
     outcome = analyse(options, folder, None if args.quiet else teller())
     if args.json:
-        print(json.dumps(outcome.to_json(), indent=1))
+        print(outcome.to_json(), end="")
     else:
-        print(f"{outcome.message}; report: {outcome.folder / 'report.html'}")
+        print(f"{outcome.message}; report: {outcome.folder / PAGE}")
     return 0 if outcome.status is RunState.DONE else 1
 
 

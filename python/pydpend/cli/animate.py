@@ -43,32 +43,28 @@ def add_arguments(p: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Simulates and films."""
-    from dataclasses import fields
-
     import numpy as np
 
-    from pydpend.angles import read_angles
-    from pydpend.damping.stored import load_fit
-    from pydpend.documents import read_json
+    from pydpend.damping.stored import StoredFit
     from pydpend.errors import ArgumentError, FitError, Setting, fault
     from pydpend.model import Damping
     from pydpend.plots.beside import Pictures, beside
-    from pydpend.plots.folder import AGAIN, FigureError, chosen
+    from pydpend.plots.folder import chosen
+    from pydpend.run_folder import read_run
     from pydpend.simulate import simulate
 
     check_files(args, args.output)
-    r = chosen(args.run_folder, args.recording)
-    stored = load_fit(r.run / "fit")
-    model = stored.model()
-    angles = read_angles(r.here / "angles.parquet", name=r.facts["label"])
-    fit = read_json(r.run / "fit" / "fit.json", FitError, AGAIN)
+    run = read_run(args.run_folder)
+    r = chosen(run, args.recording)
+    fit = run.fit()
+    stored = StoredFit.of(fit)
+    model, angles = stored.model(), r.angles()
     start = args.start_s
     if start is None:
-        inputs = fit.tables("inputs")
-        if r.index >= len(inputs):
-            fit.refuse("inputs", f"{len(inputs)} recordings, {r.facts['name']} is the {r.index + 1}th")
-        first = inputs[r.index]
-        start = first.number("start_s") if "start_s" in first else float(angles.t_s[0])
+        if r.index >= len(fit.inputs):
+            advice = f"It has {len(fit.inputs)} recordings, {r.name} is the {r.index + 1}th"
+            raise FitError(fault(str(run.path), "the fit is of other recordings", advice))
+        start = float(fit.inputs[r.index]["start_s"])
     if not angles.t_s[0] <= start < angles.t_s[-1]:
         raise ArgumentError(
             fault(
@@ -83,19 +79,10 @@ def run(args: argparse.Namespace) -> int:
     # One state fits a second of a motion well, and more of a chaotic one hardly.
     state = stored.state(angles, start, min(1.0, until - start))
     times = np.arange(start, until, 1e-3)
-    coefficients = fit.table("coefficients")
-    known = {f.name for f in fields(Damping)}
-    for name in coefficients:
-        if name not in known:
-            coefficients.refuse(name, "there is no such coefficient")
-    damping = Damping(**{name: coefficients.table(name).number("value") for name in coefficients})
+    damping = Damping(**{name: e.value for name, e in fit.coefficients.items()})
     motion = simulate(model, damping, state, times)
-    pictures = None
-    about = r.here / "overlay.json"
-    if about.exists():
-        shown = read_json(about, FigureError, AGAIN)
-        width, height = (int(side) for side in shown.array("size_px", 2))
-        pictures = Pictures(r.here / "overlay.mp4", (width, height), shown.array("times_s", -1))
+    shown = r.overlay()
+    pictures = None if shown is None else Pictures(shown.path, shown.size_px, shown.times_s)
     count = beside(angles, motion, model, args.output, pictures=pictures, fps=args.fps, speed=args.speed)
     print(f"{count} pictures from {times[0]:.3f} to {times[-1]:.3f} s; written to {args.output}")
     return 0

@@ -11,7 +11,6 @@ what is estimated and how to read it.
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import sys
 import time
@@ -126,9 +125,9 @@ def progress(label: str, quiet: bool) -> Callable[[int, int, float], None] | Non
 def run(args: argparse.Namespace) -> int:
     """Fits and writes. 1 when the fit did not converge."""
     from pydpend.damping import fit_damping
-    from pydpend.damping.stored import files_of_fit, write_fit, write_json
+    from pydpend.damping.stored import files_of_fit, write_fit
     from pydpend.model import model_called
-    from pydpend.output import check_folder, results_folder
+    from pydpend.output import check_folder, results_folder, write_text
     from pydpend.trials import fit_trials
 
     options = FitOptions(**given(args, fields(FitOptions)))
@@ -151,13 +150,13 @@ def run(args: argparse.Namespace) -> int:
     results_folder(args.output)
     write_fit(fit, args.output)
     if trials is not None:
-        write_json(args.output / "trials.json", trials.to_json())
+        write_text(args.output / "trials.json", trials.to_json())
     if not args.no_figures:
         from pydpend.plots.damping import save_figures
 
         save_figures(fit, trials, args.output)
     if args.json:
-        print(json.dumps(fit.to_json(), indent=1, allow_nan=False))
+        print(fit.to_json(), end="")
     else:
         for line in describe(fit):
             print(line)

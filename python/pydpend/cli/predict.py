@@ -9,7 +9,6 @@ Writes predict.json, windows.csv and a figure into DIR.
 from __future__ import annotations
 
 import argparse
-import json
 from dataclasses import fields
 from pathlib import Path
 
@@ -36,7 +35,7 @@ def add_arguments(p: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Predicts and writes."""
     from pydpend.damping.prediction import slashed
-    from pydpend.damping.stored import load_fit, write_json
+    from pydpend.damping.stored import load_fit
     from pydpend.errors import OptionError, Setting, fault
     from pydpend.number_words import numbers
 
@@ -49,7 +48,7 @@ def run(args: argparse.Namespace) -> int:
     stored = load_fit(args.fit)
     result = stored.predict(read(args.angles, args), windows, start_s=args.start_s, stop_s=args.stop_s)
     results_folder(args.output)
-    write_json(args.output / "predict.json", result.to_json())
+    write_text(args.output / "predict.json", result.to_json())
     links = next(iter(result.rows.values())).shape[1] - 1
     lines = [",".join(("window_s", "start_s", *(f"phi{j + 1}_rms_deg" for j in range(links))))]
     for window, rows in result.rows.items():
@@ -60,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
 
     save(windows_figure(windows_columns(result)), args.output / "windows.png")
     if args.json:
-        print(json.dumps(result.to_json(), indent=1, allow_nan=False))
+        print(result.to_json(), end="")
     else:
         print(result.message)
         for title, group in (("in window", result.in_window), ("forecast", result.forecast)):

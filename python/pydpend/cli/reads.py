@@ -16,6 +16,8 @@ WRITTEN = ("output", "figure", "methods_figure")
 
 def read_by(args: argparse.Namespace) -> Iterator[Path]:
     """Files that the arguments name or lead to. A run folder leads to the recordings that it was made from."""
+    from pydpend.run_folder import RECORD
+
     for name, value in vars(args).items():
         if name in WRITTEN:
             continue
@@ -29,7 +31,7 @@ def read_by(args: argparse.Namespace) -> Iterator[Path]:
                 # A list of words may be longer than any name.
                 continue
             if there:
-                yield from _run_folder(path) if (path / "run.json").exists() else _files(path)
+                yield from _run_folder(path) if (path / RECORD).exists() else _files(path)
 
 
 def _files(path: Path) -> Iterator[Path]:
@@ -45,13 +47,15 @@ def _files(path: Path) -> Iterator[Path]:
 
 
 def _run_folder(path: Path) -> Iterator[Path]:
+    from pydpend.run_folder import RECORD
+
     try:
-        run: Any = json.loads((path / "run.json").read_text("utf-8"))
+        run: Any = json.loads((path / RECORD).read_text("utf-8"))
         stages = [name for done in run["stages"].values() for name in done["files"]]
         inputs = [str(i["path"]) for i in run["facts"]["inputs"]]
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return
-    yield path / "run.json"
+    yield path / RECORD
     for name in stages:
         yield path / name
     for name in inputs:

@@ -24,7 +24,7 @@ PRIOR_RAD = np.radians(0.1)
 """Prior standard deviation of a knot's bias; steps between markers are of this size."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Maps:
     """Bias of each measured angle, rad, at the knots, (2, 3, KNOTS): link, argument (phi1, phi2, phi2 -
     phi1)."""
@@ -40,7 +40,7 @@ class Maps:
                 out[:, j] += knots[low] * (1 - part) + knots[high] * part
         return out
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Knots in degrees with what they are functions of."""
         return {
             "arguments": ["phi1", "phi2", "phi2-phi1"],
@@ -48,8 +48,8 @@ class Maps:
         }
 
     @classmethod
-    def from_json(cls, given: dict[str, Any]) -> Maps:
-        """The inverse of `to_json`."""
+    def from_dict(cls, given: dict[str, Any]) -> Maps:
+        """The inverse of `to_dict`."""
         return cls(np.radians(np.asarray(given["knots_deg"], dtype=np.float64)))
 
 

@@ -20,6 +20,7 @@ from pydpend.damping.recording import Recording
 from pydpend.damping.result import DampingFit, clean
 from pydpend.damping.shooting import Segments, Track
 from pydpend.errors import FitError, Setting, fault
+from pydpend.json_text import JsonResult
 
 Floats = NDArray[np.float64]
 
@@ -52,7 +53,7 @@ class Window:
     n: int
     """Number of windows."""
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """As in ``predict.json``."""
         out: dict[str, Any] = clean(
             {"rms_deg": list(self.rms_deg), "median_deg": list(self.median_deg), "n": self.n}
@@ -60,8 +61,8 @@ class Window:
         return out
 
 
-@dataclass(frozen=True)
-class Prediction:
+@dataclass(frozen=True, eq=False)
+class Prediction(JsonResult):
     """How well a fit predicts one recording."""
 
     name: str
@@ -76,11 +77,11 @@ class Prediction:
     """Per window length: start time and the two RMS of each window, (n, 3), s and deg."""
     message: str
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """``predict.json``."""
 
         def group(windows: Mapping[str, Window]) -> dict[str, Any]:
-            return {k: w.to_json() for k, w in windows.items()}
+            return {k: w.to_dict() for k, w in windows.items()}
 
         out: dict[str, Any] = {
             "name": self.name,
@@ -336,7 +337,7 @@ def held_out(
     for known, unknown in parts:
         try:
             fit = run(known)
-            maps = None if fit.maps is None else Maps.from_json(fit.maps)
+            maps = None if fit.maps is None else Maps.from_dict(fit.maps)
             result = predict(unknown, fit.parameters, maps=maps, forecasts=False)
         except FitError as problem:
             return {}, f"no prediction of unseen data: {problem}"

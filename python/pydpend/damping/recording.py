@@ -46,7 +46,7 @@ class FittedZero:
         allowed = OFF_SIGMAS * np.hypot(np.nan_to_num(self.sigma_rad), np.nan_to_num(self.stated_rad))
         return np.asarray(np.abs(self.zero_rad) > np.maximum(allowed, OFF_RAD))
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """As in ``inputs``: degrees, null where not known."""
         return {
             "zeros_deg": np.degrees(self.zero_rad).tolist(),
@@ -107,7 +107,7 @@ class Recording:
             "samples": int(self.angles.t_s.size),
             "noise_deg": [float(v) for v in np.degrees(self.noise.measured_rad)],
             "noise_source": list(self.noise.source),
-            **zero.to_json(),
+            **zero.to_dict(),
         }
 
     def notes(self) -> list[str]:

@@ -11,8 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pydpend.coefficients import unit
+from pydpend.coefficients import FULL, RATIOS, unit
+from pydpend.documents import Table, parse_json
+from pydpend.errors import FIT, FitError
+from pydpend.fit_options import METHODS
 from pydpend.fit_status import FitStatus, Verdict
+from pydpend.json_text import JsonResult
 
 Floats = NDArray[np.float64]
 
@@ -25,9 +29,14 @@ class Estimate:
     sigma: float
     unit: str
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Value, sigma and unit; null where not finite."""
         return {"value": number(self.value), "sigma": number(self.sigma), "unit": self.unit}
+
+    @classmethod
+    def of_table(cls, table: Table) -> Estimate:
+        """The inverse of `to_dict`."""
+        return cls(table.number("value"), table.number_or_nan("sigma"), table.text("unit"))
 
 
 def estimates(
@@ -37,7 +46,7 @@ def estimates(
     return {n: Estimate(float(values[n]), float(sigma.get(n, 0.0)), unit(n)) for n in names}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class EnergyCurve:
     """Energy of one recording's motion and what the laws take out of it (Fig. 19). All (T,) in s and J."""
 
@@ -50,7 +59,7 @@ class EnergyCurve:
     coefficients."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Residuals:
     """What is left of one recording's angles when the fitted motion, its zeros and angle maps are taken off."""
 
@@ -116,9 +125,25 @@ class Term:
     correlation: float
     verdict: Verdict
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """As in ``fit.json``."""
         return {**asdict(self), "verdict": str(self.verdict), "sentence": self.sentence}
+
+    @classmethod
+    def of_table(cls, name: str, table: Table) -> Term:
+        """The inverse of `to_dict`."""
+        verdict = table.text("verdict")
+        if verdict not in list(Verdict):
+            table.refuse("verdict", f"{verdict!r} is not known")
+        return cls(
+            name,
+            table.number("gain"),
+            table.number("prediction"),
+            table.number("prediction_z"),
+            table.text("partner"),
+            table.number("correlation"),
+            Verdict(verdict),
+        )
 
     @property
     def sentence(self) -> str:
@@ -149,9 +174,16 @@ class Interval:
     note: str
     """What should be known of an end; empty if nothing."""
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """As in ``fit.json``; null for an end that was not found."""
         return asdict(self)
+
+    @classmethod
+    def of_table(cls, table: Table) -> Interval:
+        """The inverse of `to_dict`."""
+        values, rises = (tuple(table.array(key, -1).tolist()) for key in ("values", "rises"))
+        ends = (table.number_or_nan("low"), table.number_or_nan("high"))
+        return cls(*ends, table.text("unit"), values, rises, table.text("note"))
 
     def sentence(self, name: str) -> str:
         """The interval in words."""
@@ -176,16 +208,28 @@ class TenCoefficients:
     condition: float
     """Condition number of the ten works, scaled."""
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """As in ``fit.json``."""
         return {
-            "values": {k: v.to_json() for k, v in self.values.items()},
-            "rmu": {k: v.to_json() for k, v in self.rmu.items()},
+            "values": {k: v.to_dict() for k, v in self.values.items()},
+            "rmu": {k: v.to_dict() for k, v in self.rmu.items()},
             "weights": self.weights,
             "rank": self.rank,
             "condition": self.condition,
             "warning": self.warning,
         }
+
+    @classmethod
+    def of_table(cls, table: Table) -> TenCoefficients:
+        """The inverse of `to_dict`."""
+        values, rmu, weights = (table.table(key) for key in ("values", "rmu", "weights"))
+        return cls(
+            {name: Estimate.of_table(values.table(name)) for name in values},
+            {name: Estimate.of_table(rmu.table(name)) for name in rmu},
+            {name: weights.array(name, 3).tolist() for name in weights},
+            table.whole("rank"),
+            table.number("condition"),
+        )
 
     @property
     def warning(self) -> str:
@@ -204,8 +248,8 @@ class TenCoefficients:
         )
 
 
-@dataclass(frozen=True)
-class DampingFit:
+@dataclass(frozen=True, eq=False)
+class DampingFit(JsonResult):
     """Damping coefficients with everything needed to judge them."""
 
     method: str
@@ -258,7 +302,7 @@ class DampingFit:
     notes: tuple[str, ...] = ()
     """What was left out or should be known."""
 
-    def to_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """``fit.json``: plain numbers and text, null for what is not defined."""
         out = {
             "method": self.method,
@@ -267,7 +311,7 @@ class DampingFit:
             "within_noise": self.within_noise,
             "chi2": self.chi2,
             "n": self.n,
-            "coefficients": {k: v.to_json() for k, v in self.coefficients.items()},
+            "coefficients": {k: v.to_dict() for k, v in self.coefficients.items()},
             "ratios": {k: v.value for k, v in self.ratios.items()},
             "ratio_sigmas": {k: v.sigma for k, v in self.ratios.items()},
             "shares": {
@@ -282,8 +326,8 @@ class DampingFit:
                 "too_short": self.identifiability.too_short,
                 "sentences": list(self.identifiability.sentences),
             },
-            "terms": {t.name: t.to_json() for t in self.terms},
-            "intervals": {name: i.to_json() for name, i in self.intervals.items()},
+            "terms": {t.name: t.to_dict() for t in self.terms},
+            "intervals": {name: i.to_dict() for name, i in self.intervals.items()},
             "inputs": list(self.inputs),
             "version": package_version(),
             "chi2_slack": self.chi2_slack,
@@ -293,11 +337,101 @@ class DampingFit:
             "parameters": self.parameters,
             "covariance": {"names": list(self.names), "matrix": self.covariance.tolist()},
             "maps": self.maps,
-            "ten_coefficients": None if self.ten is None else self.ten.to_json(),
+            "ten_coefficients": None if self.ten is None else self.ten.to_dict(),
             "notes": list(self.notes),
         }
         cleaned: dict[str, Any] = clean(out)
         return cleaned
+
+    @classmethod
+    def from_json(cls, text: str, source: str = "fit.json") -> DampingFit:
+        """A fit from the text of its ``fit.json``; ``source`` names it in messages. Energies and residuals are in
+        tables of their own, and empty here.
+
+        Raises FitError naming the key for a text that is none.
+        """
+        return cls.of_table(parse_json(text, source, FitError, "Give the fit.json that " + FIT + " wrote"))
+
+    @classmethod
+    def of_table(cls, given: Table) -> DampingFit:
+        """`from_json` of a document that is read."""
+        status, method = given.text("status"), given.text("method")
+        if status not in list(FitStatus):
+            given.refuse("status", f"{status!r} is not known")
+        if method not in METHODS:
+            given.refuse("method", f"{method!r} is not known")
+        coefficients, ratios = given.table("coefficients"), given.table("ratios")
+        sigmas, shares, told = (
+            given.table("ratio_sigmas"),
+            given.table("shares"),
+            given.table("identifiability"),
+        )
+        for name in (*coefficients, *ratios):
+            if name not in (*FULL, *RATIOS):
+                given.refuse("coefficients", f"{name} is no coefficient and no ratio")
+        names = given.table("covariance").texts("names")
+        terms, intervals, numbers = (given.table(key) for key in ("terms", "intervals", "slack"))
+        correlations, parameters = told.table("correlations"), given.table("parameters")
+        prediction = given.table("prediction")
+        sentences = told.texts("sentences")
+        short = told.number("duration_s") < SHORT_S
+        return cls(
+            method=method,
+            status=FitStatus(status),
+            message=given.text("message"),
+            chi2=given.number_or_nan("chi2"),
+            n=given.whole("n"),
+            coefficients={n: Estimate.of_table(coefficients.table(n)) for n in coefficients},
+            ratios={n: Estimate(ratios.number(n), sigmas.number_or_nan(n), unit(n)) for n in ratios},
+            shares={
+                group: {n: _share_of(shares.table(group).table(n)) for n in shares.table(group)}
+                for group in shares
+            },
+            identifiability=Identifiability(
+                told.number_or_nan("condition"),
+                {pair: correlations.number(pair) for pair in correlations},
+                told.number("duration_s"),
+                sentences[1:] if short else sentences,
+            ),
+            parameters={n: parameters.number(n) for n in parameters},
+            names=names,
+            covariance=given.table("covariance").array("matrix", len(names), len(names)),
+            inputs=tuple(_input_of(table) for table in given.tables("inputs")),
+            within_noise=given.flag("within_noise") if "within_noise" in given else None,
+            prediction={w: _window_of(prediction.table(w)) for w in prediction},
+            terms=tuple(Term.of_table(n, terms.table(n)) for n in terms),
+            intervals={n: Interval.of_table(intervals.table(n)) for n in intervals},
+            chi2_slack=given.number_or_nan("chi2_slack"),
+            slack={n: numbers.number_or_nan(n) for n in numbers},
+            iterations=given.whole("iterations"),
+            modes_hz=tuple(given.array("modes_hz", -1).tolist()),
+            maps=given.table("maps").values if "maps" in given else None,
+            ten=TenCoefficients.of_table(given.table("ten_coefficients"))
+            if "ten_coefficients" in given
+            else None,
+            notes=given.texts("notes"),
+        )
+
+
+def _input_of(table: Table) -> dict[str, Any]:
+    """What a fit says of one recording, checked as far as it is used."""
+    table.text("name")
+    for key in ("start_s", "stop_s"):
+        table.number(key)
+    for key, kind in (("zeros_deg", float), ("zeros_sigma_deg", float), ("zeros_off", bool)):
+        if key in table and not all(isinstance(v, kind) or v is None for v in table.items(key)):
+            table.refuse(key, "a list of numbers or truth values is expected")
+    return table.values
+
+
+def _share_of(table: Table) -> Estimate:
+    """A share of the energy; NaN where nothing was lost."""
+    return Estimate(table.number_or_nan("value"), table.number_or_nan("sigma"), "1")
+
+
+def _window_of(table: Table) -> dict[str, Any]:
+    """The prediction's errors in windows of one length, checked."""
+    return {key: table.whole(key) if key == "n" else table.number(key) for key in table}
 
 
 def package_version() -> str:

@@ -35,7 +35,7 @@ class StoredFit:
     @classmethod
     def of(cls, fit: DampingFit) -> StoredFit:
         """A fit just made, as if it had been written and read."""
-        return cls(dict(fit.parameters), None if fit.maps is None else Maps.from_json(fit.maps))
+        return cls(dict(fit.parameters), None if fit.maps is None else Maps.from_dict(fit.maps))
 
     def model(self) -> Model:
         """The fitted constants as a model."""
@@ -136,7 +136,7 @@ def files_of_fit(recordings: int, *, figures: bool, maps: bool) -> list[str]:
 
 def write_fit(fit: DampingFit, folder: Path) -> None:
     """Writes ``fit.json``, ``coefficients.csv``, and a table of energies and one of residuals per recording."""
-    write_json(folder / "fit.json", fit.to_json())
+    write_text(folder / "fit.json", fit.to_json())
     rows = ["name,value,sigma,unit"]
     for name, e in (*fit.coefficients.items(), *((f"{k}/psi", e) for k, e in fit.ratios.items())):
         rows.append(f"{name},{e.value!r},{e.sigma!r},{e.unit}")

@@ -251,7 +251,7 @@ def _judge(
         },
         iterations=solution.iterations,
         modes_hz=plausible.modes_hz(fitted)[:links],
-        maps=None if bias is None else bias.to_json(),
+        maps=None if bias is None else bias.to_dict(),
         notes=(
             *_notes(recordings, solution),
             *(note for r, zero in zip(recordings, zeros, strict=True) for note in zero.notes(r.angles.name)),

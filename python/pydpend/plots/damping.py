@@ -3,9 +3,11 @@ maps."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Protocol
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -13,7 +15,7 @@ from numpy.typing import NDArray
 
 from pydpend.coefficients import RATIOS
 from pydpend.damping import DampingFit, Maps, Prediction
-from pydpend.damping.result import EnergyCurve
+from pydpend.damping.result import EnergyCurve, Estimate
 from pydpend.damping.stored import recording_suffix
 from pydpend.plots.angles import thinned
 from pydpend.plots.style import COLORS, new_figure, save, style
@@ -73,10 +75,10 @@ def residuals_figure(residuals: Mapping[str, Floats]) -> Figure:
     return figure
 
 
-def shares_figure(shares: Mapping[str, Mapping[str, Mapping[str, float]]]) -> Figure:
+def shares_figure(shares: Mapping[str, Mapping[str, Estimate]]) -> Figure:
     """Fractions of the dissipated energy by law and by joint, with their standard errors.
 
-    ``shares``: as in ``fit.json``, ``shares["law"]["viscous"] = {"value": .., "sigma": ..}``.
+    ``shares``: `DampingFit.shares`.
     """
     with style():
         figure = new_figure(6.5, 2.2)
@@ -84,8 +86,8 @@ def shares_figure(shares: Mapping[str, Mapping[str, Mapping[str, float]]]) -> Fi
             items = shares[group]
             axes.barh(
                 list(items),
-                [100 * e["value"] for e in items.values()],
-                xerr=[100 * e["sigma"] for e in items.values()],
+                [100 * e.value for e in items.values()],
+                xerr=[100 * e.sigma for e in items.values()],
                 color=COLORS[: len(items)],
                 height=0.6,
                 capsize=3,
@@ -97,31 +99,53 @@ def shares_figure(shares: Mapping[str, Mapping[str, Mapping[str, float]]]) -> Fi
     return figure
 
 
-def coefficients_figure(coefficients: Mapping[str, Mapping[str, Any]]) -> Figure:
-    """Each coefficient over the recordings with its errors, and the mean with its own (Fig. 20).
+class Spreads(Protocol):
+    """What the figure needs of a coefficient over the recordings, as `pydpend.trials.Spread` has it."""
 
-    ``coefficients``: as in ``trials.json``: ``values``, ``sigmas``, ``unit`` and, of several recordings, ``mean`` and
-    ``sigma``.
-    """
+    @property
+    def values(self) -> Sequence[float] | Floats: ...
+    @property
+    def sigmas(self) -> Sequence[float] | Floats: ...
+    @property
+    def mean(self) -> float: ...
+    @property
+    def sigma(self) -> float: ...
+    @property
+    def unit(self) -> str: ...
+
+
+@dataclass(frozen=True)
+class One:
+    """A coefficient of one recording alone: there is no mean."""
+
+    values: tuple[float, ...]
+    sigmas: tuple[float, ...]
+    unit: str
+    mean: float = math.nan
+    sigma: float = math.nan
+
+
+def coefficients_figure(coefficients: Mapping[str, Spreads]) -> Figure:
+    """Each coefficient over the recordings with its errors, and the mean with its own, if it is a number (Fig. 20)."""
     columns = min(3, max(1, len(coefficients)))
     rows = -(-len(coefficients) // columns) or 1
     with style():
         figure = new_figure(6.5, 1.6 * rows)
         for k, (name, c) in enumerate(coefficients.items()):
             axes = figure.add_subplot(rows, columns, k + 1)
-            index = range(1, len(c["values"]) + 1)
-            axes.errorbar(index, c["values"], c["sigmas"], fmt="o", ms=3.5, color=COLORS[0], capsize=3)
-            if "mean" in c:
-                axes.axhspan(c["mean"] - c["sigma"], c["mean"] + c["sigma"], alpha=0.2, color=COLORS[1], lw=0)
-                axes.axhline(c["mean"], color=COLORS[1])
+            index = range(1, len(c.values) + 1)
+            axes.errorbar(index, c.values, c.sigmas, fmt="o", ms=3.5, color=COLORS[0], capsize=3)
+            if math.isfinite(c.mean):
+                axes.axhspan(c.mean - c.sigma, c.mean + c.sigma, alpha=0.2, color=COLORS[1], lw=0)
+                axes.axhline(c.mean, color=COLORS[1])
             else:
                 axes.axhline(0, color="0.5", lw=0.8)
-            unit = f" ({c['unit'].replace('s2', 's²')})" if c["unit"] not in ("", "1") else ""
+            unit = f" ({c.unit.replace('s2', 's²')})" if c.unit not in ("", "1") else ""
             axes.set_title(
                 f"{name}/psi{unit}" if name in RATIOS else f"{name}{unit}", fontsize=8, loc="right"
             )
             axes.set_xticks(list(index))
-            axes.set_xlim(0.5, len(c["values"]) + 0.5)
+            axes.set_xlim(0.5, len(c.values) + 0.5)
             axes.tick_params(labelsize=7)
             axes.ticklabel_format(axis="y", useOffset=False)
     return figure
@@ -176,11 +200,8 @@ def save_figures(fit: DampingFit, trials: Trials | None, folder: Path) -> None:
     """Writes every figure that the fit has something for as PNG into a folder."""
     for k, curve in enumerate(fit.energy):
         save(energy_figure(energy_columns(curve)), folder / f"energy{recording_suffix(fit, k)}.png")
-    shares = {
-        g: {k: {"value": e.value, "sigma": e.sigma} for k, e in s.items()} for g, s in fit.shares.items()
-    }
-    save(shares_figure(shares), folder / "shares.png")
+    save(shares_figure(fit.shares), folder / "shares.png")
     if fit.maps is not None:
-        save(maps_figure(Maps.from_json(fit.maps)), folder / "maps.png")
+        save(maps_figure(Maps.from_dict(fit.maps)), folder / "maps.png")
     if trials is not None:
-        save(coefficients_figure(trials.to_json()["coefficients"]), folder / "trials.png")
+        save(coefficients_figure(trials.spreads), folder / "trials.png")

@@ -5,64 +5,48 @@ from __future__ import annotations
 import re
 import shlex
 from pathlib import Path
-from typing import Any
 
-from pydpend.documents import read_json
-from pydpend.errors import PydpendError
-from pydpend.plots.folder import AGAIN
 from pydpend.report import damping, recording
 from pydpend.report.page import Block, Code, Heading, Listing, Page, Section, Table, Text
 from pydpend.report.words import sentence
-
-
-def _json(path: Path) -> dict[str, Any] | None:
-    """A JSON object, or ``None`` where the stage that writes it was not done."""
-    return read_json(path, PydpendError, AGAIN).values if path.exists() else None
+from pydpend.run_folder import FIT_FOLDER, StoredRun, read_run
 
 
 def report_page(folder: str | Path) -> Page:
     """The report of a run folder (`pydpend.analyse`)."""
-    path = Path(folder)
-    run = _json(path / "run.json") or {"facts": {}, "stages": {}}
-    facts: dict[str, Any] = run["facts"]
-    stages: set[str] = set(run["stages"])
-    found: list[dict[str, Any]] = facts.get("recordings", [])
-    fit = _json(path / "fit" / "fit.json") if "fit" in stages else None
-    prediction = _json(path / "prediction.json") if "prediction" in stages else None
-
-    titles: dict[str, str] = facts.get("titles", {})
-    warnings = [f"{titles.get(name, name)}: {why}" for name, why in facts.get("not_done", {}).items()]
+    run = read_run(folder)
+    fit = run.fit() if FIT_FOLDER in run.stages else None
+    predictions = run.predictions()
+    warnings = [f"{run.title(name)}: {why}" for name, why in run.not_done.items()]
     answer: list[Block] = []
     if fit is not None:
-        model = _json(path / "fit" / "model.json")
-        answer = [Heading("Damping"), *damping.answer(fit, prediction, model)]
+        answer = [Heading("Damping"), *damping.answer(fit, predictions, run.scale())]
     read: list[recording.Part] = []
     parts: list[Section] = []
-    for i, r in enumerate(found):
-        part = recording.read(path, r, stages)
+    for r in run.recordings:
+        part = recording.read(r)
         read.append(part)
         warnings += part.warnings
-        parts += part.sections(f"r{i}", r["label"] if len(found) > 1 else "")
+        parts += part.sections(f"r{r.index}", r.label if len(run.recordings) > 1 else "")
     if any(part.answer for part in read):
         answer += [Heading("Recordings" if len(read) > 1 else "Recording"), beside_each_other(read)]
     if fit is not None:
         warnings += damping.warnings(fit)
-        parts += damping.sections(path, fit, prediction)
+        parts += damping.sections(run, fit, predictions)
     if not answer:
         answer = [Text("No stage gave a result; the warnings say why.")]
-    apart = facts.get("does_not_apply", {})
-    if apart:
+    if run.does_not_apply:
         answer.append(Heading("What does not apply"))
-        answer.append(Listing(tuple(f"{titles.get(name, name)}: {why}" for name, why in apart.items())))
-    names = ", ".join(r["label"] for r in found) or path.name
+        answer.append(Listing(tuple(f"{run.title(name)}: {why}" for name, why in run.does_not_apply.items())))
+    names = ", ".join(r.label for r in run.recordings) or run.path.name
     return Page(
         title=f"Analysis of {names}",
-        subtitle=f"pydpend {facts.get('version', '')}",
+        subtitle=f"pydpend {run.version}",
         warnings=tuple(dict.fromkeys(warnings)),
         sections=(
             Section("answer", "Results", tuple(answer)),
             *parts,
-            Section("reproduce", "Reproduce and cite", tuple(_reproduce(facts, run["stages"]))),
+            Section("reproduce", "Reproduce and cite", tuple(_reproduce(run))),
         ),
     )
 
@@ -86,18 +70,17 @@ def in_lines(command: str) -> str:
     return " \\\n    ".join(shlex.join(line) for line in lines)
 
 
-def _reproduce(facts: dict[str, Any], stages: dict[str, dict[str, Any]]) -> list[Block]:
-    rows = tuple((i["given_as"], i["path"], i["sha256"]) for i in facts.get("inputs", ()))
+def _reproduce(run: StoredRun) -> list[Block]:
     return [
         Text("This page was made by"),
-        Code(in_lines(facts.get("command", ""))),
-        Table(("given as", "file", "SHA-256"), rows),
-        Table(("program", "version"), tuple(facts.get("versions", {}).items())),
+        Code(in_lines(run.command)),
+        Table(("given as", "file", "SHA-256"), run.inputs),
+        Table(("program", "version"), tuple(run.versions.items())),
         Table(
             ("stage", "what came of it", "took (s)"),
             tuple(
-                (facts.get("titles", {}).get(name, name), sentence(done["message"]), f"{done['seconds']:.1f}")
-                for name, done in stages.items()
+                (run.title(name), sentence(done.message), f"{done.seconds:.1f}")
+                for name, done in run.stages.items()
             ),
             numbers=frozenset({2}),
         ),
@@ -105,7 +88,7 @@ def _reproduce(facts: dict[str, Any], stages: dict[str, dict[str, Any]]) -> list
             "Every number, table and option is in the folder beside this page; README.txt there lists them."
         ),
         Text(
-            f"Cite as: The pydpend developers, pydpend {facts.get('version', '')} (software), and for the method "
+            f"Cite as: The pydpend developers, pydpend {run.version} (software), and for the method "
             "A. D. Myers, J. R. Tempelman, D. Petrushenko, F. A. Khasawneh, The Double Pendulum: An Experimental "
             "Design Report (2020)."
         ),

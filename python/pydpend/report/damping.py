@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
-from typing import Any
+from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pydpend.coefficients import RATIO_UNITS
-from pydpend.documents import read_json
-from pydpend.errors import PydpendError, Setting
+from pydpend.damping import DampingFit
+from pydpend.damping.result import number
+from pydpend.errors import Setting
 from pydpend.fit_status import FitStatus, Verdict
 from pydpend.plots.damping import coefficients_figure, shares_figure
-from pydpend.plots.folder import AGAIN, read_table, table_of_fit
 from pydpend.plots.style import inline_svg
 from pydpend.report.page import (
     Block,
@@ -30,6 +28,7 @@ from pydpend.report.page import (
     band,
 )
 from pydpend.report.words import between, digits, listed, quantity, sentence, signed, with_sigma, with_squares
+from pydpend.run_folder import Floats, StoredPrediction, StoredRun, StoredScale, StoredTrials
 
 ZOOM_S = 2.0
 """The first seconds of the energy stand alone too (Fig. 19)."""
@@ -63,9 +62,9 @@ TOLD_WINDOW_S = "1"
 """The window length of which the answer tells the prediction error, as the tables' keys have it."""
 
 
-def links_of(fit: dict[str, Any]) -> int:
+def links_of(fit: DampingFit) -> int:
     """1 for a fit of a single pendulum."""
-    return len(fit["modes_hz"])
+    return len(fit.modes_hz)
 
 
 def meaning(name: str, links: int) -> str:
@@ -74,23 +73,23 @@ def meaning(name: str, links: int) -> str:
     return words if links > 1 else words.replace("upper ", "")
 
 
-def warnings(fit: dict[str, Any]) -> list[str]:
+def warnings(fit: DampingFit) -> list[str]:
     """What a reader must know before the numbers."""
     out = []
-    if FitStatus(fit["status"]) is not FitStatus.CONVERGED:
-        out.append(f"The damping fit did not converge, its numbers are where it stopped: {fit['message']}")
-    elif fit["within_noise"] is False:
+    if fit.status is not FitStatus.CONVERGED:
+        out.append(f"The damping fit did not converge, its numbers are where it stopped: {fit.message}")
+    elif fit.within_noise is False:
         out.append(
             "The model or the angles have errors beyond the noise, and the standard errors of the damping carry them: "
             f"{_left(fit)}"
         )
-    if fit["method"] == "energy" and fit["chi2"] > 1 + 4 * math.sqrt(2 / fit["n"]):
+    if fit.method == "energy" and fit.chi2 > 1 + 4 * math.sqrt(2 / fit.n):
         out.append(
-            f"These laws do not take out the energy that was lost: chi-square of its {fit['n']} values is "
-            f"{digits(fit['chi2'], 3)}, where noise alone would give 1. The standard errors carry that; "
+            f"These laws do not take out the energy that was lost: chi-square of its {fit.n} values is "
+            f"{digits(fit.chi2, 3)}, where noise alone would give 1. The standard errors carry that; "
             f"{Setting('laws', 'full')} or the trajectory fit may tell what is missing."
         )
-    for given in fit["inputs"]:
+    for given in fit.inputs:
         off = [
             f"{digits(abs(z))} deg{f' (phi{j})' if links_of(fit) > 1 else ''}"
             for j, (z, wrong) in enumerate(
@@ -104,14 +103,14 @@ def warnings(fit: dict[str, Any]) -> list[str]:
                 "of its own. The damping is free of that; the angles above are not."
             )
     # The sentence on the whole recording; those on single coefficients stand with them.
-    if fit["identifiability"]["too_short"]:
-        out.append(fit["identifiability"]["sentences"][0])
+    if fit.identifiability.too_short:
+        out.append(fit.identifiability.warning)
     return out
 
 
-def _left(fit: dict[str, Any]) -> str:
+def _left(fit: DampingFit) -> str:
     """How much larger than their noise the residuals are, from the mean squares with and without slack."""
-    strict, slack = (math.sqrt(fit[k]) for k in ("chi2", "chi2_slack"))
+    strict, slack = math.sqrt(fit.chi2), math.sqrt(fit.chi2_slack)
     return (
         f"the residuals of the angles are {digits(slack)} times their noise where the motion may jump a little from "
         f"each piece of it to the next, and {digits(strict)} times where it may not."
@@ -119,40 +118,42 @@ def _left(fit: dict[str, Any]) -> str:
 
 
 def answer(
-    fit: dict[str, Any], prediction: dict[str, Any] | None, model: dict[str, Any] | None
+    fit: DampingFit, predictions: Mapping[str, StoredPrediction], scale: StoredScale | None
 ) -> list[Block]:
     """Where the energy goes, how well the model does, and the coefficients with their uncertainties."""
-    intervals: dict[str, Any] = fit.get("intervals", {})
+    intervals = fit.intervals
     links = links_of(fit)
     header = ["coefficient", "symbol", "value"]
     if intervals:
         header.append("95 % interval")
     rows = []
-    for name, c in fit["coefficients"].items():
-        unit = with_squares(c["unit"])
-        row = [meaning(name, links), name, quantity(c["value"], c["sigma"], unit)]
+    for name, c in fit.coefficients.items():
+        unit = with_squares(c.unit)
+        row = [meaning(name, links), name, quantity(c.value, c.sigma, unit)]
         if intervals:
             found = intervals.get(name)
-            row.append("–" if found is None else f"{between(found['low'], found['high'])} {unit}".strip())
+            row.append(
+                "–" if found is None else f"{between(number(found.low), number(found.high))} {unit}".strip()
+            )
         rows.append(tuple(row))
     numbers = frozenset({2, 3}) if intervals else frozenset({2})
-    blocks: list[Block] = [Text(s) for s in (_energy_sentence(fit), *_trust(fit, prediction)) if s]
+    blocks: list[Block] = [Text(s) for s in (_energy_sentence(fit), *_trust(fit, predictions)) if s]
     blocks.append(Table(tuple(header), tuple(rows), numbers=numbers))
     by = "± is one standard uncertainty of the fit." + (
         " The 95 % intervals are by profile likelihood, everything else fitted again." if intervals else ""
     )
-    blocks.append(Text(f"{by} {_scale(model, links)}", quiet=True))
+    blocks.append(Text(f"{by} {_scale(scale, links)}", quiet=True))
     return blocks
 
 
-def _energy_sentence(fit: dict[str, Any]) -> str:
+def _energy_sentence(fit: DampingFit) -> str:
     """Of the energy lost, what went into which law and where; empty where nothing was lost."""
 
     def parts(group: str) -> list[tuple[str, str]]:
-        found = fit["shares"].get(group, {})
-        if any(c["value"] is None for c in found.values()):
+        found = fit.shares.get(group, {})
+        if not all(math.isfinite(c.value) for c in found.values()):
             return []
-        return [(n, f"{with_sigma(100 * c['value'], 100 * (c['sigma'] or 0))} %") for n, c in found.items()]
+        return [(n, f"{with_sigma(100 * c.value, 100 * c.sigma)} %") for n, c in found.items()]
 
     laws, joints = parts("law"), parts("joint")
     if not laws:
@@ -163,51 +164,51 @@ def _energy_sentence(fit: dict[str, Any]) -> str:
     return said + "."
 
 
-def _trust(fit: dict[str, Any], prediction: dict[str, Any] | None) -> list[str]:
+def _trust(fit: DampingFit, predictions: Mapping[str, StoredPrediction]) -> list[str]:
     """How well the model describes the angles, and how well it predicts angles that it has not seen."""
     out = []
-    if fit["within_noise"]:
+    if fit.within_noise:
         out.append(
-            f"The equations of motion describe the angles to within their noise (chi-square {fit['chi2']:.3f}; 1 is "
+            f"The equations of motion describe the angles to within their noise (chi-square {fit.chi2:.3f}; 1 is "
             "what noise alone would give)."
         )
-    for name, p in (prediction or {}).items():
-        told = p.get("in_window", {}).get(TOLD_WINDOW_S)
-        if told is not None and told["n"]:
-            out.append(f"{name} predicted from the others, {_errors(told['rms_deg'])}.")
-    told = fit.get("prediction", {}).get(TOLD_WINDOW_S)
-    if told is not None and len(fit["inputs"]) == 1:
+    for name, p in predictions.items():
+        window = p.in_window.get(TOLD_WINDOW_S)
+        if window is not None and window.n:
+            out.append(f"{name} predicted from the others, {_errors(window.rms_deg)}.")
+    told = fit.prediction.get(TOLD_WINDOW_S)
+    if told is not None and len(fit.inputs) == 1:
         rms = [told[f"phi{j}_deg"] for j in range(1, links_of(fit) + 1)]
         out.append(f"The last part predicted from a fit to the rest, {_errors(rms)}.")
     return out
 
 
-def _errors(rms_deg: list[float]) -> str:
+def _errors(rms_deg: Sequence[float]) -> str:
     each = listed([f"{digits(v)} deg for phi{j}" for j, v in enumerate(rms_deg, 1)])
     return f"in windows of {TOLD_WINDOW_S} s with the state at the start fitted: RMS error {each}"
 
 
-def _scale(model: dict[str, Any] | None, links: int) -> str:
+def _scale(scale: StoredScale | None, links: int) -> str:
     """What stands behind all coefficients together."""
     where = "upper joint" if links > 1 else "pivot"
     said = (
         f"All coefficients are in proportion to psi, half the moment of inertia about the {where}, which free motion "
         "does not tell"
     )
-    if model is None:
+    if scale is None:
         return f"{said}; it is the model's, and its uncertainty comes on top."
-    psi, sigma = (model["constants"]["psi_kg_m2"][k] for k in ("value", "sigma"))
+    psi, sigma = scale.psi_kg_m2, scale.sigma_kg_m2
     if not sigma:
-        return f"{said}: the model “{model['name']}” gives {psi:.4g} kg m² without an uncertainty."
+        return f"{said}: the model “{scale.model}” gives {psi:.4g} kg m² without an uncertainty."
     return (
-        f"{said}: the model “{model['name']}” gives {with_sigma(psi, sigma)} kg m². This {digits(100 * sigma / psi)} % "
+        f"{said}: the model “{scale.model}” gives {with_sigma(psi, sigma)} kg m². This {digits(100 * sigma / psi)} % "
         "is common to all coefficients and comes on top."
     )
 
 
-def _residuals(path: Path, group: str, title: str) -> list[Block]:
+def _residuals(columns: Mapping[str, Floats], group: str, title: str) -> list[Block]:
     """What the fitted motion leaves of each angle, with the standard deviation it was weighted by."""
-    c = {k: v if k == "time_s" else np.degrees(v) for k, v in read_table(path).items()}
+    c = {k: v if k == "time_s" else np.degrees(v) for k, v in columns.items()}
     out: list[Block] = []
     for j in (1, 2):
         if f"phi{j}_residual_rad" not in c:
@@ -228,8 +229,7 @@ def _residuals(path: Path, group: str, title: str) -> list[Block]:
     return out
 
 
-def _energy(path: Path, group: str, title: str) -> list[Block]:
-    c = read_table(path)
+def _energy(c: Mapping[str, Floats], group: str, title: str) -> list[Block]:
     t, energy, model = c["time_s"], c["energy_j"], c["model_j"]
     near = t <= t[0] + ZOOM_S
     laws = [n for n in c if n.endswith("_j") and n not in ("energy_j", "model_j")]
@@ -278,57 +278,47 @@ def _energy(path: Path, group: str, title: str) -> list[Block]:
     ]
 
 
-def sections(folder: Path, fit: dict[str, Any], prediction: dict[str, Any] | None) -> list[Section]:
+def sections(run: StoredRun, fit: DampingFit, predictions: Mapping[str, StoredPrediction]) -> list[Section]:
     """Energy, identifiability, trials and prediction."""
-    blocks: list[Block] = [Text(sentence(fit["message"]))]
-    blocks += [Listing(tuple(sentence(n) for n in fit["notes"]))] if fit.get("notes") else []
+    blocks: list[Block] = [Text(sentence(fit.message))]
+    blocks += [Listing(tuple(sentence(n) for n in fit.notes))] if fit.notes else []
     blocks.append(
-        Figure(
-            inline_svg(shares_figure(fit["shares"])), "Where the energy goes, with standard uncertainties."
-        )
+        Figure(inline_svg(shares_figure(fit.shares)), "Where the energy goes, with standard uncertainties.")
     )
-    names = [i.get("name", f"recording {k + 1}") for k, i in enumerate(fit["inputs"])]
-    for k, name in enumerate(names):
-        path, left = (table_of_fit(table, folder, k) for table in ("energy", "residuals"))
+    names = [i.get("name", f"recording {k + 1}") for k, i in enumerate(fit.inputs)]
+    for k, (name, recording) in enumerate(zip(names, run.recordings, strict=False)):
+        energy, left = recording.energy(), recording.residuals()
         title = f" of {name}" if len(names) > 1 else ""
-        if left.exists():
-            blocks += _residuals(left, f"e{k}", title)
-        if path.exists():
-            blocks += _energy(path, f"e{k}", title)
-        if left.exists() or path.exists():
+        blocks += [] if left is None else _residuals(left, f"e{k}", title)
+        blocks += [] if energy is None else _energy(energy, f"e{k}", title)
+        if left is not None or energy is not None:
             blocks.append(Reset(f"e{k}"))
     out = [Section("damping", "Damping", (*blocks, *_constants(fit), *_ten(fit)))]
     out.append(Section("identifiability", "What the data can tell", tuple(_told(fit))))
-    trials = folder / "fit" / "trials.json"
-    if len(names) > 1 and trials.exists():
-        out.append(
-            Section(
-                "trials",
-                "The recordings beside each other",
-                tuple(_trials(read_json(trials, PydpendError, AGAIN).values, names)),
-            )
-        )
-    if prediction:
-        out.append(Section("prediction", "Prediction", tuple(_prediction(folder, prediction))))
+    trials = run.trials()
+    if len(names) > 1 and trials is not None:
+        out.append(Section("trials", "The recordings beside each other", tuple(_trials(trials, names))))
+    if predictions:
+        out.append(Section("prediction", "Prediction", tuple(_prediction(run, predictions))))
     return out
 
 
-def _constants(fit: dict[str, Any]) -> list[Block]:
+def _constants(fit: DampingFit) -> list[Block]:
     """The ratios of the constants that were fitted too, and the small oscillations that follow."""
-    links, sigmas = links_of(fit), fit.get("ratio_sigmas", {})
+    links = links_of(fit)
     rows = [
-        (meaning(n, links), f"{n}/psi", quantity(v, sigmas.get(n), ratio_unit(n)))
-        for n, v in fit["ratios"].items()
+        (meaning(n, links), f"{n}/psi", quantity(e.value, e.sigma, ratio_unit(n)))
+        for n, e in fit.ratios.items()
     ]
-    for given in fit["inputs"]:
+    for given in fit.inputs:
         for j, (zero, sigma) in enumerate(
             zip(given.get("zeros_deg", ()), given.get("zeros_sigma_deg", ()), strict=False), 1
         ):
-            of = f" of {given['name']}" if len(fit["inputs"]) > 1 else ""
+            of = f" of {given['name']}" if len(fit.inputs) > 1 else ""
             rows.append(
                 (f"zero of phi{j}{of} by the fit, from the given one", "", quantity(zero, sigma, "deg"))
             )
-    rows.append(("small oscillations", "", f"{listed([f'{f:.4f}' for f in fit['modes_hz']])} Hz"))
+    rows.append(("small oscillations", "", f"{listed([f'{f:.4f}' for f in fit.modes_hz])} Hz"))
     return [
         Heading("Constants of the motion"),
         Table(("constant", "symbol", "value"), tuple(rows), numbers=frozenset({2})),
@@ -340,46 +330,42 @@ def ratio_unit(name: str) -> str:
     return "" if RATIO_UNITS[name] == "1" else with_squares(RATIO_UNITS[name])
 
 
-def _ten(fit: dict[str, Any]) -> list[Block]:
+def _ten(fit: DampingFit) -> list[Block]:
     """The paper's ten coefficients, where they were asked for, under their warning."""
-    ten = fit.get("ten_coefficients")
+    ten = fit.ten
     if ten is None:
         return []
-    rows = tuple(
-        (name, quantity(c["value"], c["sigma"], with_squares(c["unit"]))) for name, c in ten["values"].items()
-    )
+    rows = tuple((name, quantity(c.value, c.sigma, with_squares(c.unit))) for name, c in ten.values.items())
     return [
         Heading("The paper's ten coefficients"),
-        Text(sentence(ten["warning"])),
+        Text(sentence(ten.warning)),
         Table(("coefficient", "value"), rows, numbers=frozenset({1})),
     ]
 
 
-def _told(fit: dict[str, Any]) -> list[Block]:
+def _told(fit: DampingFit) -> list[Block]:
     """Which terms the data ask for, which they do not tell apart, and where the intervals are open."""
-    told = fit["identifiability"]
+    told = fit.identifiability
     blocks: list[Block] = []
-    terms = fit.get("terms", {})
-    if terms:
+    if fit.terms:
         rows = []
-        for name, t in terms.items():
-            verdict = Verdict(t["verdict"])
-            said = verdict.words
-            if verdict is Verdict.INSEPARABLE:
-                said += f" from {t['partner']} (correlation {signed(t['correlation'], 2)})"
-            shown = t["gain"] > 0
+        for t in fit.terms:
+            said = t.verdict.words
+            if t.verdict is Verdict.INSEPARABLE:
+                said += f" from {t.partner} (correlation {signed(t.correlation, 2)})"
+            shown = t.gain > 0
             rows.append(
                 (
-                    name,
+                    t.name,
                     said,
-                    digits(t["gain"], 3) if shown else "–",
-                    signed(100 * t["prediction"], 3) if shown else "–",
-                    signed(t["prediction_z"], 2) if t["prediction_z"] else "–",
+                    digits(t.gain, 3) if shown else "–",
+                    signed(100 * t.prediction, 3) if shown else "–",
+                    signed(t.prediction_z, 2) if t.prediction_z else "–",
                 )
             )
         header = ["term", "verdict of the data", "fall of 2 log L without it", "prediction, mean square (%)"]
         # One window of prediction has no scatter, and so no error.
-        header += ["in standard errors"] if any(t["prediction_z"] for t in terms.values()) else []
+        header += ["in standard errors"] if any(t.prediction_z for t in fit.terms) else []
         blocks += [
             Text(
                 "Each term was left out in turn and all others fitted again. Without a term that is asked for, twice "
@@ -388,41 +374,41 @@ def _told(fit: dict[str, Any]) -> list[Block]:
             ),
             Table(tuple(header), tuple(row[: len(header)] for row in rows), numbers=frozenset({2, 3, 4})),
         ]
-    notes = [f"95 % interval of {n}: {i['note']}." for n, i in fit.get("intervals", {}).items() if i["note"]]
-    blocks.append(Listing(tuple(sentence(s) for s in (*told["sentences"], *notes))))
+    notes = [f"95 % interval of {n}: {i.note}." for n, i in fit.intervals.items() if i.note]
+    blocks.append(Listing(tuple(sentence(s) for s in (*told.sentences, *notes))))
     blocks.append(
         Text(
-            f"Condition number of the scaled information matrix: {sentence(format(told['condition'], '.3g'))}.",
+            f"Condition number of the scaled information matrix: {sentence(format(told.condition, '.3g'))}.",
             quiet=True,
         )
     )
     return blocks
 
 
-def _trials(trials: dict[str, Any], names: list[str]) -> list[Block]:
+def _trials(trials: StoredTrials, names: list[str]) -> list[Block]:
     rows = tuple(
         (
             f"{name}/psi" if name in RATIO_UNITS else name,
-            *(with_sigma(v, s) for v, s in zip(c["values"], c["sigmas"], strict=True)),
-            with_sigma(c["mean"], c["sigma"]),
-            sentence(f"{c['spread']:.2g}"),
-            "–" if c["p_value"] is None else sentence(f"{c['p_value']:.2g}"),
-            "" if c["unit"] == "1" else with_squares(c["unit"]),
+            *(with_sigma(v, s) for v, s in zip(c.values, c.sigmas, strict=True)),
+            with_sigma(c.mean, c.sigma),
+            sentence(f"{c.spread:.2g}"),
+            sentence(f"{c.p_value:.2g}") if math.isfinite(c.p_value) else "–",
+            "" if c.unit == "1" else with_squares(c.unit),
         )
-        for name, c in trials["coefficients"].items()
+        for name, c in trials.spreads.items()
     )
     header = ("quantity", *names, "mean", "spread beyond errors", "p that all are one value", "unit")
     return [
-        Text(sentence(trials["message"])),
+        Text(sentence(trials.message)),
         Figure(
-            inline_svg(coefficients_figure(trials["coefficients"])),
+            inline_svg(coefficients_figure(trials.spreads)),
             f"Each coefficient over the recordings ({', '.join(names)}) and its mean, with standard uncertainties.",
         ),
         Table(header, rows, numbers=frozenset(range(1, len(names) + 4))),
     ]
 
 
-def _prediction(folder: Path, prediction: dict[str, Any]) -> list[Block]:
+def _prediction(run: StoredRun, predictions: Mapping[str, StoredPrediction]) -> list[Block]:
     blocks: list[Block] = [
         Text(
             "Each recording predicted from a fit of the others. In a window only the state at its start is fitted to "
@@ -430,18 +416,19 @@ def _prediction(folder: Path, prediction: dict[str, Any]) -> list[Block]:
             "whatever the model: compare its median."
         )
     ]
-    for k, (name, p) in enumerate(prediction.items()):
-        links = max(len(w["rms_deg"]) for w in p["in_window"].values())
+    windows = {r.name: r.windows for r in run.recordings}
+    for k, (name, p) in enumerate(predictions.items()):
+        links = max(len(w.rms_deg) for w in p.in_window.values())
         rows = tuple(
             (
-                kind.replace("_", " "),
+                kind,
                 f"{window} s",
-                *(digits(v, 3) for v in (*w["rms_deg"], *w["median_deg"])),
-                str(w["n"]),
+                *(digits(v, 3) for v in (*w.rms_deg, *w.median_deg)),
+                str(w.n),
             )
-            for kind in ("in_window", "forecast")
-            for window, w in p.get(kind, {}).items()
-            if w["n"]
+            for kind, group in (("in window", p.in_window), ("forecast", p.forecast))
+            for window, w in group.items()
+            if w.n
         )
         blocks += [
             Heading(name),
@@ -455,12 +442,12 @@ def _prediction(folder: Path, prediction: dict[str, Any]) -> list[Block]:
                 rows,
                 numbers=frozenset(range(2, 2 * links + 3)),
             ),
-            *_windows(read_table(folder / name / "windows.csv"), f"w{k}"),
+            *_windows(windows[name](), f"w{k}"),
         ]
     return blocks
 
 
-def _windows(c: dict[str, NDArray[np.float64]], group: str) -> list[Block]:
+def _windows(c: Mapping[str, Floats], group: str) -> list[Block]:
     """The error of each window over the recording, a chart for each length."""
     out: list[Block] = []
     for n, length in enumerate(np.unique(c["window_s"])):

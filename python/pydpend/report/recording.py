@@ -4,19 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pydpend.angles import LinkAngles, read_angles
-from pydpend.documents import read_json
-from pydpend.encoder import read_calibration
-from pydpend.errors import PydpendError
-from pydpend.nodes import Nodes, read_nodes
+from pydpend.angles import LinkAngles
+from pydpend.nodes import Nodes
 from pydpend.plots.encoder import calibration_figure
-from pydpend.plots.folder import AGAIN, read_table
 from pydpend.plots.style import inline_svg
 from pydpend.report.page import (
     Block,
@@ -32,6 +27,7 @@ from pydpend.report.page import (
     band,
 )
 from pydpend.report.words import digits, with_sigma
+from pydpend.run_folder import StoredComparison, StoredOverlay, StoredRecording
 
 MOST_PLACES = 6
 """Curves of places in one chart."""
@@ -47,9 +43,8 @@ class Part:
     """(T, N): distance of each node from its place in its body's shape."""
     angles: LinkAngles | None = None
     meta: dict[str, Any] = field(default_factory=dict)
-    film: tuple[bytes, dict[str, Any]] | None = None
-    comparison: dict[str, Any] | None = None
-    compared: dict[str, NDArray[np.float64]] | None = None
+    film: StoredOverlay | None = None
+    comparison: StoredComparison | None = None
     calibration: str | None = None
     warnings: list[str] = field(default_factory=list)
     answer: list[tuple[str, str]] = field(default_factory=list)
@@ -73,16 +68,15 @@ class Part:
     def _film_blocks(self, id_: str) -> list[Block]:
         if self.film is None:
             return []
-        mp4, about = self.film
-        every = int(about["every"])
+        every = self.film.every
         shown = "every frame" if every == 1 else f"one frame in {every}"
         return [
             Film(
                 f"{id_}-overlay",
                 id_,
-                mp4,
-                np.asarray(about["times_s"], dtype=np.float64),
-                float(about["rate_hz"]),
+                self.film.path.read_bytes(),
+                self.film.times_s,
+                self.film.rate_hz,
                 f"{self.label} with markers and bodies drawn in; {shown}. The plots follow it.",
             )
         ]
@@ -201,29 +195,27 @@ class Part:
     def _encoder_blocks(self, id_: str) -> list[Block]:
         assert self.comparison is not None
         c = self.comparison
-        clocks, shares = c["clocks"], c["shares"]
         rows = [
-            ("readings compared", str(c["n"])),
-            ("RMS of film minus encoder (deg)", digits(c["rms_deg"], 3)),
-            ("largest (deg)", digits(c["largest_deg"], 3)),
-            ("gain", with_sigma(c["gain"], c["gain_sigma"])),
+            ("readings compared", str(c.n)),
+            ("RMS of film minus encoder (deg)", digits(math.degrees(c.rms_rad), 3)),
+            ("largest (deg)", digits(math.degrees(c.largest_rad), 3)),
+            ("gain", with_sigma(c.gain, c.gain_sigma)),
             (
                 "zero of the encoder (deg)",
-                with_sigma(math.degrees(c["offset_rad"]), math.degrees(c["offset_sigma_rad"])),
+                with_sigma(math.degrees(c.offset_rad), math.degrees(c.offset_sigma_rad)),
             ),
         ]
-        if clocks["given"]:
-            rows.append(("delay (ms)", with_sigma(1e3 * c["delay_s"], 1e3 * c["delay_sigma_s"])))
+        if c.clocks_given:
+            rows.append(("delay (ms)", with_sigma(1e3 * c.delay_s, 1e3 * c.delay_sigma_s)))
         else:
             rows += [
-                ("clock offset (s)", with_sigma(clocks["offset_s"], clocks["offset_sigma_s"])),
-                ("clock drift (ppm)", with_sigma(1e6 * clocks["drift"], 1e6 * clocks["drift_sigma"])),
+                ("clock offset (s)", with_sigma(c.clock_offset_s, c.clock_offset_sigma_s)),
+                ("clock drift (ppm)", with_sigma(1e6 * c.drift, 1e6 * c.drift_sigma)),
             ]
         names = {"encoder": "encoder's noise", "video": "film's noise", "unexplained": "neither"}
         rows += [
             (f"share of the residual explained by {names[k]} (%)", f"{100 * v:.1f}")
-            for k, v in shares.items()
-            if v is not None
+            for k, v in c.shares.items()
         ]
         blocks: list[Block] = [Table(("quantity", "value"), tuple(rows), numbers=frozenset({1}))]
         if self.calibration is not None:
@@ -233,27 +225,24 @@ class Part:
                     "Calibration line of the encoder and its residuals (the paper's Fig. 10).",
                 )
             )
-        if self.compared is not None:
-            t = self.compared["time_s"]
-            both = (
-                Series("encoder (deg)", np.degrees(self.compared["encoder_rad"]), 1),
-                Series("film (deg)", np.degrees(self.compared["video_rad"]), 0),
-            )
-            stated = [v for v in c["stated_sigma_rad"].values() if v is not None]
-            sigma = np.full(t.size, math.degrees(math.hypot(*stated)) if stated else math.nan)
-            left = np.degrees(self.compared["residual_rad"])
-            blocks += [
-                Chart(f"{id_}-both", "Film and encoder, phi1", id_, t, both, y_label="phi1 (deg)"),
-                Chart(
-                    f"{id_}-difference",
-                    "Film minus encoder; the band is ± the stated standard uncertainty of both",
-                    id_,
-                    t,
-                    (Series("difference (deg)", left, 0), *band(sigma)),
-                    y_label="difference (deg)",
-                ),
-                Reset(id_, film=self.film is not None),
-            ]
+        both = (
+            Series("encoder (deg)", np.degrees(c.encoder_rad), 1),
+            Series("film (deg)", np.degrees(c.video_rad), 0),
+        )
+        stated = math.degrees(math.hypot(*c.stated_sigma_rad)) if c.stated_sigma_rad else math.nan
+        sigma = np.full(c.t_s.size, stated)
+        blocks += [
+            Chart(f"{id_}-both", "Film and encoder, phi1", id_, c.t_s, both, y_label="phi1 (deg)"),
+            Chart(
+                f"{id_}-difference",
+                "Film minus encoder; the band is ± the stated standard uncertainty of both",
+                id_,
+                c.t_s,
+                (Series("difference (deg)", np.degrees(c.residual_rad), 0), *band(sigma)),
+                y_label="difference (deg)",
+            ),
+            Reset(id_, film=self.film is not None),
+        ]
         return blocks
 
 
@@ -275,14 +264,12 @@ def _gaps(seen: NDArray[np.bool_]) -> list[int]:
     return [int(b - a) for a, b in zip(np.flatnonzero(change < 0), np.flatnonzero(change > 0), strict=True)]
 
 
-def read(folder: Path, facts: dict[str, Any], stages: set[str]) -> Part:
+def read(r: StoredRecording) -> Part:
     """Everything the run folder holds of one recording."""
-    name = facts["name"]
-    here = folder / name
-    part = Part(facts["label"])
+    part = Part(r.label)
     rows: list[tuple[str, str]] = []
-    if f"{name}/track" in stages or facts["kind"] == "nodes":
-        nodes = read_nodes(here / "nodes.parquet" if f"{name}/track" in stages else facts["path"])
+    if r.did("track") or r.kind == "nodes":
+        nodes = r.nodes()
         part.nodes = nodes
         seen = np.isin(nodes.status, (1, 2))
         rows += [
@@ -302,12 +289,11 @@ def read(folder: Path, facts: dict[str, Any], stages: set[str]) -> Part:
             part.warnings.append(f"{part.label}: the recording ended early: {ending.get('reason')}")
         if nodes.damage is not None:
             part.warnings.append(f"{part.label}: {nodes.damage}")
-    if f"{name}/markers" in stages and part.nodes is not None:
-        columns = read_table(here / "residuals.parquet")
-        part.residual_px = np.column_stack([columns[f"node{i}_px"] for i in range(len(part.nodes.rig.nodes))])
-    if f"{name}/angles" in stages:
-        part.angles = read_angles(here / "angles.parquet", name=part.label)
-        part.meta = read_json(here / "angles.json", PydpendError, AGAIN).values
+    if r.did("markers") and part.nodes is not None:
+        part.residual_px = r.residual_px(part.nodes)
+    if r.did("angles"):
+        part.angles = r.angles()
+        part.meta = r.angles_about()
         if part.nodes is None:
             rows += [("samples", str(part.angles.t_s.size)), *_times(part.angles.t_s)]
         part.warnings += [f"{part.label}: {note}" for note in part.meta.get("notes", [])]
@@ -324,24 +310,19 @@ def read(folder: Path, facts: dict[str, Any], stages: set[str]) -> Part:
             2 * np.pi
         )
         rows += [(f"range of phi{k + 1}", f"{t:.2f} turns") for k, t in enumerate(turns)]
-    if f"{name}/overlay" in stages:
-        about = read_json(here / "overlay.json", PydpendError, AGAIN).values
-        part.film = ((here / "overlay.mp4").read_bytes(), about)
-    if f"{name}/encoder" in stages:
-        part.comparison = read_json(here / "comparison.json", PydpendError, AGAIN).values
-        part.compared = read_table(here / "comparison.parquet")
-        if (here / "encoder.json").exists():
-            part.calibration = inline_svg(calibration_figure(read_calibration(here / "encoder.json")))
-        part.warnings += [f"{part.label}: {note}" for note in part.comparison["notes"]]
-        rms, neither = part.comparison["rms_deg"], part.comparison["shares"]["unexplained"]
+    if r.did("overlay"):
+        part.film = r.overlay()
+    if r.did("encoder"):
+        found = r.comparison()
+        part.comparison = found
+        line = r.calibration()
+        part.calibration = None if line is None else inline_svg(calibration_figure(line))
+        part.warnings += [f"{part.label}: {note}" for note in found.notes]
+        rms, neither = math.degrees(found.rms_rad), found.shares.get("unexplained")
         rows.append(("film minus encoder, RMS", f"{digits(rms, 3)} deg"))
         if neither is not None and neither < 1:
-            rows.append(
-                (
-                    "film minus encoder, expected from their noise",
-                    f"{digits(rms * math.sqrt(1 - neither), 3)} deg",
-                )
-            )
+            expected = f"{digits(rms * math.sqrt(1 - neither), 3)} deg"
+            rows.append(("film minus encoder, expected from their noise", expected))
     part.answer = rows
     return part
 
@@ -375,10 +356,3 @@ def _pixels(nodes: Nodes) -> list[tuple[str, str]]:
     given = isinstance(source, dict) and source.get("pixel_aspect_origin") == "user"
     origin = "as given" if given else "as the recording says"
     return [("pixels", f"{width / height:.4f} wide ({width}:{height}), {origin}")]
-
-
-def _columns(path: Path) -> dict[str, NDArray[np.float64]]:
-    import pyarrow.parquet as pq
-
-    table = pq.read_table(path)
-    return {n: table.column(n).to_numpy().astype(np.float64) for n in table.column_names}
