@@ -497,7 +497,7 @@ fn what_makes_no_sense_is_refused_with_what_to_do() {
     for (arguments, expected) in [
         (vec![none.as_str(), "-o", &out], "no such file"),
         (vec![text.as_str(), "-o", &out], "text.mp4: text, not a recording"),
-        (vec![&input, "-o", "t.xlsx"], "neither Parquet nor CSV"),
+        (vec![&input, "-o", "t.xlsx"], "unknown extension, expected .parquet or .csv"),
         (vec![&input, "-o", &nowhere], "nowhere/t.csv"),
         (vec![&input, "-o", &closed], "/proc/t.csv"),
         (vec![&input, "-o", &out, "--rig", &none], "none.mp4: the rig file cannot be read"),

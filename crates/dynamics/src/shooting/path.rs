@@ -6,8 +6,8 @@
 //! longer can.
 //!
 //! The end is a continuous function of the start: a step's length follows the rates, the last one is what is left, and
-//! nothing is rounded to a number of steps or to a sample. Near the upright a second of motion makes a thousand times
-//! more of any jump, and a fit could not get below it.
+//! nothing is rounded to a number of steps or to a sample. Near the upright errors grow a thousandfold per second: a
+//! discontinuity of the integrator would become the fit's floor.
 
 use crate::motion::{Flow, accelerations};
 use crate::parameters::{Field, Parameters};
@@ -15,15 +15,16 @@ use crate::scalar::Real;
 use crate::state::{Contact, Motion, State};
 
 /// Angle per step, rad: classical RK4 then errs by `0.06^5/120 = 6e-9` rad a step.
-const ANGLE_PER_STEP: f64 = 0.06;
+const STEP_RAD: f64 = 0.06;
 /// Rate of the pendulum's own swinging, added to the links' rates when a step is sized, rad/s.
-const SWING_RATE: f64 = 8.0;
+const SWING_RATE_RAD_S: f64 = 8.0;
 
-/// No link turns this fast, rad/s; a guess that does is as good as not finite, and would take for ever to follow.
-const FASTEST: f64 = 1e4;
+/// Rate of a link, rad/s, above which a guess counts as not finite: no link turns this fast, and following it would take
+/// for ever.
+const MAX_RATE_RAD_S: f64 = 1e4;
 
-/// Most switches in one step.
-const MOST_SWITCHES: usize = 8;
+/// Dry-friction switches in one step, at most.
+const MAX_SWITCHES: usize = 8;
 
 /// The end of a segment.
 #[derive(Clone, Copy, Debug)]
@@ -222,12 +223,12 @@ pub fn follow<S: Real>(
         next += 1;
     }
     while t < end_s {
-        let speed = k.x[2].value().abs().max(k.x[3].value().abs()) + SWING_RATE;
-        if speed.is_nan() || speed >= FASTEST {
+        let speed = k.x[2].value().abs().max(k.x[3].value().abs()) + SWING_RATE_RAD_S;
+        if speed.is_nan() || speed >= MAX_RATE_RAD_S {
             k.x = [S::constant(f64::NAN); 4];
             break;
         }
-        let mut to = end_s.min(t + ANGLE_PER_STEP / speed);
+        let mut to = end_s.min(t + STEP_RAD / speed);
         let mut h = clock_scale * (to - t);
         let mut trial = path.step(&k, h);
         if let Some(part) = path.graze(&k, &trial, h.value()) {
@@ -244,7 +245,7 @@ pub fn follow<S: Real>(
         } else {
             // Piece after piece from switch to switch; `gone` is how far, in true time.
             let mut gone = S::constant(0.0);
-            for _ in 0..MOST_SWITCHES {
+            for _ in 0..MAX_SWITCHES {
                 let left = h - gone;
                 let (there, used) = path.switch(&k, left, ending);
                 while next < times_s.len() && times_s[next] <= to {

@@ -67,7 +67,7 @@ pub fn discover(store: &DetectionStore, image_px: [u32; 2], stop: &Stop) -> Resu
         return Err(Error::Rig(
             Fault::new(
                 "recording",
-                format!("two bodies have their markers alike, {a} and {b}: they cannot be told apart"),
+                format!("two bodies have the same marker layout, {a} and {b}: they cannot be told apart"),
             )
             .advice(
                 "Move a marker of one of them by some pixels, or say which is which with " + Setting::Rig,

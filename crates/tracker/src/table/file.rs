@@ -34,7 +34,7 @@ impl Form {
             Some("parquet" | "pq") => Ok(Form::Parquet),
             Some("csv") => Ok(Form::Csv),
             _ => Err(Error::Table(
-                Fault::new(text(path), "the ending says neither Parquet nor CSV")
+                Fault::new(text(path), "unknown extension, expected .parquet or .csv")
                     .advice("Name it .parquet or .csv"),
             )),
         }

@@ -78,7 +78,7 @@ fn two_equal_links_are_told_apart_by_what_they_hang_on() {
         let refused = crate::discover::discover(&bed.store, [720, 720], &crate::stop::Stop::default())
             .unwrap_err()
             .to_string();
-        assert!(refused.contains("markers alike"), "{refused}");
+        assert!(refused.contains("the same marker layout"), "{refused}");
     }
 }
 
