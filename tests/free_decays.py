@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from pydpend.angles import LinkAngles
 from pydpend.energy import Motion
+from pydpend.kinematics import LinkAngles
 from pydpend.model import Damping, Model, derived
-from pydpend.simulate import simulate
+from pydpend.simulation import simulate
 
 TRUTH = Damping(mu_v1=1.76e-5, mu_v2=5.08e-6, mu_q1=1.43e-5, mu_q2=3e-7, rmu1=4.5e-5, rmu2=3.7e-5)
 """The truth of the issue's table (SI)."""

@@ -17,15 +17,15 @@ import pydpend as dp
 import pytest
 from pydpend.analyse import Options, analyse, read_config, write_config
 from pydpend.analyse.folder import RunFolder
-from pydpend.angles import read_angles
 from pydpend.cli import main, parser
 from pydpend.errors import PydpendError
+from pydpend.kinematics import read_angles
 from pydpend.model import Damping, read_model
 from pydpend.nodes import read_nodes
 from pydpend.option_fields import flag_of
 from pydpend.report import report_page
 from pydpend.report.page import Table
-from pydpend.simulate import simulate
+from pydpend.simulation import simulate
 
 from tests import drawn_nodes, two_links
 from tests.test_hanging import BAR, held

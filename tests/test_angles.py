@@ -7,10 +7,10 @@ import dataclasses
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from pydpend.angles import LinkAngles, angles, find_linkage, find_rest, pair_angles
-from pydpend.angles.estimate import Method
-from pydpend.angles.markers import body_markers
 from pydpend.errors import AnglesError
+from pydpend.kinematics import LinkAngles, angles, find_linkage, find_rest, pair_angles
+from pydpend.kinematics.estimate import Method
+from pydpend.kinematics.markers import body_markers
 
 from tests import two_links as rig
 
@@ -408,7 +408,7 @@ def test_one_link_and_bad_tables() -> None:
 
 def test_single_frames_between_short_gaps_lose_no_turn() -> None:
     # Seen in one frame of three for a while, as when the links cross: no run is long enough for a rate of its own.
-    from pydpend.angles.unwrap import unwrap
+    from pydpend.kinematics.unwrap import unwrap
 
     t, phi = tumbling(3000, 5)
     truth = phi[:, 1]

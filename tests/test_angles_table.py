@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pydpend.angles import LinkAngles, read_angles, write_angles
 from pydpend.errors import AnglesError
+from pydpend.kinematics import LinkAngles, read_angles, write_angles
 
 SHARED = Path(__file__).parents[1] / ".." / "shared" / "data"
 

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from pydpend.angles import LinkAngles, read_angles, write_angles
 from pydpend.cli import main
+from pydpend.kinematics import LinkAngles, read_angles, write_angles
 
 from tests import two_links
 from tests.test_hanging import held

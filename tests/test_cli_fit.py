@@ -10,15 +10,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pydpend.angles import LinkAngles
 from pydpend.cli import main
 from pydpend.damping import DampingFit
 from pydpend.energy import Motion
+from pydpend.kinematics import LinkAngles
 from pydpend.model import Damping, read_model
 from pydpend.report import damping as report_damping
 from pydpend.report.page import Heading
 from pydpend.run_folder import StoredRun
-from pydpend.simulate import simulate
+from pydpend.simulation import simulate
 
 from tests.free_decays import measured, released
 

@@ -9,10 +9,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from nptdms import ChannelObject, TdmsWriter
-from pydpend.angles import read_angles
 from pydpend.columns import Columns, read_columns
 from pydpend.encoder import calibrate, read_encoder, read_holds
 from pydpend.errors import AnglesError, EncoderError
+from pydpend.kinematics import read_angles
 
 HEAD = "time_s,voltage_v\n"
 

@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from pydpend.angles import LinkAngles, find_rest, read_angles
 from pydpend.encoder import compare, synchronise
 from pydpend.errors import EncoderError
+from pydpend.kinematics import LinkAngles, find_rest, read_angles
 from scipy.interpolate import CubicSpline
 
 from tests import two_links

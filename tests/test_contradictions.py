@@ -13,7 +13,6 @@ from pydpend import energy
 from pydpend.analyse.folder import Digests
 from pydpend.analyse.options import Options
 from pydpend.analyse.recordings import recordings
-from pydpend.angles import LinkAngles, read_angles
 from pydpend.damping import fit_damping
 from pydpend.encoder import (
     EncoderSignal,
@@ -27,6 +26,7 @@ from pydpend.encoder import (
 )
 from pydpend.errors import EncoderError, FitError, FitOptionError, PydpendError
 from pydpend.fit_options import FitOptions
+from pydpend.kinematics import LinkAngles, read_angles
 from pydpend.model import derived
 
 from tests.free_decays import measured, released

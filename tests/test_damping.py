@@ -9,13 +9,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from pydpend import energy
-from pydpend.angles import LinkAngles
 from pydpend.damping import DampingFit, Maps, compare_terms, fit_damping, single
 from pydpend.damping.recording import prepare
 from pydpend.energy import Motion
 from pydpend.errors import FitError
+from pydpend.kinematics import LinkAngles
 from pydpend.model import Damping, derived
-from pydpend.simulate import simulate
+from pydpend.simulation import simulate
 from pydpend.trials import combine
 from scipy.integrate import solve_ivp
 

@@ -6,15 +6,15 @@ from dataclasses import asdict
 
 import numpy as np
 import pytest
-from pydpend.angles import LinkAngles
 from pydpend.coefficients import parameters
 from pydpend.damping import fit_damping, shooting
 from pydpend.damping.shooting import Solution, Track
 from pydpend.damping.uncertainty import covariance
 from pydpend.errors import FitError
 from pydpend.information import check_errors, invert
+from pydpend.kinematics import LinkAngles
 from pydpend.model import Damping, derived
-from pydpend.simulate import simulate
+from pydpend.simulation import simulate
 
 from tests.free_decays import TRUTH, released
 

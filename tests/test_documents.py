@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 from pydpend.analyse import read_config
-from pydpend.angles import read_angles
 from pydpend.arrays import read_npy
 from pydpend.damping.stored import load_fit
 from pydpend.documents import read_json, read_toml
 from pydpend.encoder import read_calibration, read_encoder
 from pydpend.errors import EncoderError, PydpendError
+from pydpend.kinematics import read_angles
 from pydpend.model import read_model
 
 DEEP = 5000

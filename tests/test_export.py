@@ -9,7 +9,7 @@ import numpy as np
 import pydpend as dp
 import pytest
 from pydpend.cli import main
-from pydpend.export import export
+from pydpend.exporting import export
 from pydpend.nodes import SEEN, Nodes
 
 from tests.drawn_nodes import some_nodes

@@ -7,16 +7,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pydpend.angles import LinkAngles, angles, write_angles
 from pydpend.cli import main
 from pydpend.damping import DampingFit, fit_damping
 from pydpend.damping.plausible import check_model
 from pydpend.damping.recording import FittedZero
 from pydpend.damping.stored import StoredFit
 from pydpend.errors import FitError
+from pydpend.kinematics import LinkAngles, angles, write_angles
 from pydpend.model import Damping, Model, derived
 from pydpend.report import damping as told
-from pydpend.simulate import simulate
+from pydpend.simulation import simulate
 
 from tests import two_links as rig
 from tests.test_hanging import BAR, held

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from pydpend.angles import LinkAngles, angles, parse_zero, roll_sigma
 from pydpend.errors import AnglesError
+from pydpend.kinematics import LinkAngles, angles, parse_zero, roll_sigma
 from pydpend.model import Damping, Model, derived
-from pydpend.simulate import simulate
+from pydpend.simulation import simulate
 
 from tests import two_links as rig
 

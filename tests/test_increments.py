@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from pydpend.angles.increments import (
+from pydpend.errors import AnglesError
+from pydpend.kinematics.increments import (
     arcsin_steps,
     by_changing_vectors,
     by_increments,
@@ -12,7 +13,6 @@ from pydpend.angles.increments import (
     steps,
     vectors_of,
 )
-from pydpend.errors import AnglesError
 
 
 def circle(theta: np.ndarray, radius: float = 100.0) -> np.ndarray:

@@ -12,9 +12,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from nptdms import ChannelObject, TdmsWriter
-from pydpend.angles import LinkAngles, read_angles
 from pydpend.encoder import EncoderSignal, read_encoder
 from pydpend.errors import AnglesError, EncoderError
+from pydpend.kinematics import LinkAngles, read_angles
 
 from tests.test_columns import HEAD, read
 

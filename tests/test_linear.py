@@ -13,7 +13,7 @@ from pydpend.linear import lyapunov, modes, poincare
 from pydpend.model import Damping, Model, derived
 from pydpend.plots import physics
 from pydpend.plots.beside import Pictures, beside
-from pydpend.simulate import simulate
+from pydpend.simulation import simulate
 
 Array = npt.NDArray[np.float64]
 

@@ -18,11 +18,11 @@ import numpy as np
 import pydpend as dp
 import pydpend.analyse
 import pytest
-from pydpend.angles import LinkAngles
 from pydpend.cli import COMMANDS, _parsers, main
 from pydpend.cli.words import RENAMED, flags_of, options_of
 from pydpend.errors import FitOptionError, Message, PydpendError, Setting, Step, fault, speaking
 from pydpend.kinds import kind_of
+from pydpend.kinematics import LinkAngles
 from pydpend.plots import folder as figures
 from pydpend.plots.moving import check_film
 

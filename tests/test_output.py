@@ -15,9 +15,9 @@ import numpy as np
 import pydpend as dp
 import pytest
 from pydpend.analyse.folder import Digests
-from pydpend.angles import LinkAngles, read_angles, write_angles
 from pydpend.cli import main
 from pydpend.errors import ArgumentError, FilmError, RigError, SourceError, TableError
+from pydpend.kinematics import LinkAngles, read_angles, write_angles
 from pydpend.output import keeping, whole, write_text
 from pydpend.terminal import shown
 

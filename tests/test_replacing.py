@@ -83,7 +83,7 @@ def test_every_command_that_names_an_output_has_the_flag() -> None:
 
 
 def test_a_folder_that_is_no_run_is_left_alone(tmp_path: Path) -> None:
-    from pydpend.angles import write_angles
+    from pydpend.kinematics import write_angles
 
     write_angles(angles(), tmp_path / "angles.parquet")
     (tmp_path / "run").mkdir()

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 import pydpend as dp
 import pytest
-from pydpend.angles import LinkAngles, write_angles
+from pydpend.kinematics import LinkAngles, write_angles
 from pydpend.model import Damping, derived
-from pydpend.simulate import simulate
+from pydpend.simulation import simulate
 
 from tests import drawn_nodes, two_links
 from tests.free_decays import ALL_TERMS, measured, released

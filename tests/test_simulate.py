@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from pydpend.errors import SimulationError
 from pydpend.model import Damping, derived
-from pydpend.simulate import LAWS, simulate, simulate_many
+from pydpend.simulation import LAWS, simulate, simulate_many
 
 from tests.reference_simulation import reference
 

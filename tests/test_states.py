@@ -8,9 +8,9 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from pydpend.errors import AnglesError
+from pydpend.link_states import LinkStates, savitzky_golay, states
 from pydpend.model import Damping, derived
-from pydpend.simulate import Simulation, simulate
-from pydpend.states import LinkStates, savitzky_golay, states
+from pydpend.simulation import Simulation, simulate
 
 Array = npt.NDArray[np.float64]
 SIGMA = float(np.radians(0.05))

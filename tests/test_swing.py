@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from pydpend.angles import Swing, find_swing, read_angles
+from pydpend.kinematics import Swing, find_swing, read_angles
 
 from tests import two_links as rig
 from tests.test_hanging import held

@@ -9,9 +9,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from nptdms import ChannelObject, TdmsWriter
-from pydpend.angles import read_angles
 from pydpend.encoder import read_encoder, read_holds
 from pydpend.errors import AnglesError, EncoderError
+from pydpend.kinematics import read_angles
 
 UNITS = {
     # text, time's column, encoder's column, times in s, values in V or rad, which

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydpend.model import Damping, derived
 from pydpend.nodes import MISSING, SEEN, Joint, Node, Nodes, Rig
-from pydpend.simulate import simulate
+from pydpend.simulation import simulate
 
 Floats = NDArray[np.float64]
 

@@ -12,8 +12,8 @@ import time
 from pathlib import Path
 
 import numpy as np
-from pydpend.angles import angles
-from pydpend.angles.estimate import Method
+from pydpend.kinematics import angles
+from pydpend.kinematics.estimate import Method
 
 from tests import two_links
 from tests.test_angles import bounds, tumbling

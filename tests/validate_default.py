@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from pydpend.angles import angles
-from pydpend.angles.estimate import Method
+from pydpend.kinematics import angles
+from pydpend.kinematics.estimate import Method
 
 from tests import two_links
 from tests.test_angles import tumbling

@@ -15,7 +15,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-from pydpend.angles import angles
+from pydpend.kinematics import angles
 from pydpend.nodes import read_nodes
 
 ROOT = Path(__file__).parents[1]

@@ -5,9 +5,9 @@ from __future__ import annotations
 import time
 
 import numpy as np
+from pydpend.link_states import states
 from pydpend.model import Damping, derived
-from pydpend.simulate import simulate, simulate_many
-from pydpend.states import states
+from pydpend.simulation import simulate, simulate_many
 
 from tests.test_states import errors, made, rms
 

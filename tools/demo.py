@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 from pydpend.analyse import Options, analyse
-from pydpend.angles import read_angles
 from pydpend.cli.analyse import teller
+from pydpend.kinematics import read_angles
 
 ROOT = Path(__file__).resolve().parent.parent
 DEMO = ROOT / "fixtures" / "demo"

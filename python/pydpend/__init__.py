@@ -6,7 +6,7 @@ hanging down, unwrapped over turns.
 
 from __future__ import annotations
 
-from pydpend.angles import Linkage, LinkAngles, angles, find_linkage, find_rest, read_angles, write_angles
+from pydpend import _tracker
 from pydpend.damping import DampingFit, Prediction, fit_damping
 from pydpend.encoder import (
     Calibration,
@@ -36,17 +36,20 @@ from pydpend.errors import (
     TableError,
     TrackerError,
 )
-from pydpend.export import export
+from pydpend.exporting import export
 from pydpend.filming import Film, Truth, film
 from pydpend.fit_options import FitOptions
+from pydpend.kinematics import Linkage, LinkAngles, angles, find_linkage, find_rest, read_angles, write_angles
 from pydpend.linear import lyapunov, modes, poincare
+from pydpend.link_states import LinkStates, savitzky_golay, states
 from pydpend.live import NodeRow, Tracker, detect
 from pydpend.model import Damping, Model, derived, published, read_model
 from pydpend.nodes import Nodes, Rig, read_nodes
 from pydpend.scoring import Score, score
-from pydpend.simulate import Simulation, simulate, simulate_many
-from pydpend.states import LinkStates, savitzky_golay, states
+from pydpend.simulation import Simulation, simulate, simulate_many
 from pydpend.tracking import OverlayFilm, Setup, info, overlay, setup, track
+
+__version__: str = _tracker.VERSION
 
 __all__ = [
     "AnglesError",

@@ -1,7 +1,7 @@
 """Named columns of numbers out of a CSV or Parquet file, with errors that name file, line and column.
 
 Owns: reading the named columns of a table, Parquet or text, into float64. Knows nothing of what the numbers mean:
-:mod:`pydpend.angles` and :mod:`pydpend.encoder` do. How text is taken apart is :mod:`pydpend.delimited`'s.
+:mod:`pydpend.kinematics` and :mod:`pydpend.encoder` do. How text is taken apart is :mod:`pydpend.delimited`'s.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _FIRST_LINE_BYTES = 1 << 16
 """More than the names of any table's columns."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Columns:
     """The columns that were asked for and found.
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pydpend.angles import LinkAngles, find_rest
 from pydpend.errors import FitError, Setting, fault
+from pydpend.kinematics import LinkAngles, find_rest
 from pydpend.model import Model
 
 Floats = NDArray[np.float64]

@@ -27,7 +27,7 @@ TERMS = tuple(name for name, _ in _tracker.term_names())
 
 
 class States(Protocol):
-    """Angles, rates and accelerations: what `pydpend.states` and a simulation both give."""
+    """Angles, rates and accelerations: what `dp.states` and a simulation both give."""
 
     @property
     def t_s(self) -> Floats: ...
@@ -39,7 +39,7 @@ class States(Protocol):
     def a_rad_s2(self) -> Floats: ...
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Motion:
     """Angles, rates, accelerations, (T, 2) each; a plain `States`."""
 
@@ -49,7 +49,7 @@ class Motion:
     a_rad_s2: Floats
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class EnergyProfile:
     """Energy of a motion and the works of the laws along it for coefficients of one."""
 
@@ -66,7 +66,7 @@ class EnergyProfile:
     """Standard errors of the energies, independent of each other, (T,), where they are known."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class EnergyFit:
     """Coefficients from an energy profile."""
 

@@ -35,7 +35,7 @@ PRESETS = ("clean", "noisy", "dim", "glints", "late", "dropout", "occluded", "fa
 """The scenes that come with the program, by which tracking is judged."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Truth:
     """What is true of a film of T frames, N markers and L links.
 

@@ -14,7 +14,7 @@ from pydpend.model import Damping, Model, parameters
 Array = npt.NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Modes:
     """The two modes of small oscillation about hanging, slow one first."""
 
@@ -51,7 +51,7 @@ def modes(model: Model, damping: Damping | None = None) -> Modes:
     return Modes(frequency, shape, ratio)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Section:
     """Passages of a link through an angle."""
 
@@ -97,7 +97,7 @@ def poincare(
     return Section(rows[:, 0], rows[:, 1:3], rows[:, 3:])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Exponent:
     """The largest Lyapunov exponent."""
 

@@ -17,6 +17,7 @@ from pydpend import _tracker
 from pydpend.crossing import Columns, HeldColumns
 from pydpend.errors import ArgumentError, fault
 from pydpend.output import AnyPath
+from pydpend.tabular import html_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -79,6 +80,11 @@ class Rig:
     def from_json(text: str) -> Rig:
         """From the JSON of a table's metadata."""
         return _rig(json.loads(text))
+
+    def to_dict(self) -> dict[str, Any]:
+        """`to_json` as plain values."""
+        value: dict[str, Any] = json.loads(self.to_json())
+        return value
 
     def to_json(self) -> str:
         """As the JSON of a table's metadata."""
@@ -186,6 +192,15 @@ class Nodes:
         seen = 100 * float(np.mean(self.seen)) if self.status.size else 0.0
         name = self.meta.get("source", {}).get("name", "nodes")
         return f"<Nodes {name}: {len(self)} frames x {len(self.rig.nodes)} nodes, {seen:.1f} % seen>"
+
+    def _repr_html_(self) -> str:
+        """How well each node was seen, for a notebook."""
+        rows = []
+        for i, node in enumerate(self.rig.nodes):
+            seen = self.seen[:, i]
+            sigma = f"{float(np.median(self.sigma_px[seen, i])):.4f}" if seen.any() else "-"
+            rows.append((node.name, node.body, f"{100 * seen.mean() if seen.size else 0:.1f} %", sigma))
+        return html_table(repr(self)[1:-1], ("node", "body", "seen", "median sigma (px)"), rows)
 
     @property
     def seen(self) -> NDArray[np.bool_]:

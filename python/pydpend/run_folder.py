@@ -15,13 +15,13 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from pydpend.angles import LinkAngles, read_angles
 from pydpend.columns import read_columns
 from pydpend.damping import DampingFit
 from pydpend.documents import Table, read_json
 from pydpend.encoder import Calibration, read_calibration
 from pydpend.errors import ANALYSE, PydpendError, fault
 from pydpend.kinds import expect
+from pydpend.kinematics import LinkAngles, read_angles
 from pydpend.nodes import Nodes, read_nodes
 from pydpend.worded import Words
 

@@ -36,6 +36,11 @@ class Score:
     matches: dict[str, str | None]
     details: dict[str, Any]
 
+    def to_dict(self) -> dict[str, Any]:
+        """`to_json` as plain values."""
+        value: dict[str, Any] = json.loads(self.to_json())
+        return value
+
     def to_json(self) -> str:
         """All of it."""
         return json.dumps(self.details, indent=2)

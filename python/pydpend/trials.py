@@ -11,13 +11,13 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from pydpend.angles import LinkAngles
 from pydpend.damping import DampingFit, fit_damping
 from pydpend.damping.result import clean
 from pydpend.damping.shooting import Progress
 from pydpend.errors import FitError, fault
 from pydpend.fit_options import FitOptions
 from pydpend.json_text import JsonResult
+from pydpend.kinematics import LinkAngles
 from pydpend.model import Model
 
 Floats = NDArray[np.float64]

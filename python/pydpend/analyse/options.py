@@ -7,11 +7,11 @@ from dataclasses import Field, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
-from pydpend.angles import parse_zero, roll_sigma
 from pydpend.documents import read_toml
 from pydpend.errors import OptionError, Setting, Step, fault, one_of
 from pydpend.fit_options import FitOptions
 from pydpend.kinds import Kind, expect
+from pydpend.kinematics import parse_zero, roll_sigma
 from pydpend.model import check_model_called
 from pydpend.option_fields import choices_of, kind_of_value, meanings, option
 

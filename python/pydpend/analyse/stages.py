@@ -25,7 +25,7 @@ from pydpend.run_folder import FIT_FOLDER, RunFile
 
 if TYPE_CHECKING:
     from pydpend.analyse.recordings import Recording
-    from pydpend.angles import LinkAngles
+    from pydpend.kinematics import LinkAngles
     from pydpend.nodes import Nodes
 
 
@@ -94,7 +94,7 @@ def markers(r: Recording, here: Path, into: Path) -> str:
     """How well each node was seen and how well it fits its body: ``residuals.parquet``, ``markers.json``."""
     import numpy as np
 
-    from pydpend.angles import misfits
+    from pydpend.kinematics import misfits
 
     nodes = _nodes(here, r)
     off = misfits(nodes)
@@ -129,7 +129,7 @@ def _nodes(here: Path, r: Recording) -> Nodes:
 def _hanging(r: Recording, options: Options, here: Path, into: Path) -> Any:
     """The ``zero`` of `angles.angles`, tracking a reference film if one is named."""
     from pydpend.analyse.recordings import recording_kind
-    from pydpend.angles import parse_zero
+    from pydpend.kinematics import parse_zero
     from pydpend.nodes import read_nodes
 
     said = parse_zero(options.zero)
@@ -155,8 +155,8 @@ def _hanging(r: Recording, options: Options, here: Path, into: Path) -> Any:
 
 def angles(r: Recording, options: Options, here: Path, into: Path) -> str:
     """Nodes, or anyone's angles, to ``angles.parquet``."""
-    from pydpend.angles import angles as estimate
-    from pydpend.angles import read_angles, write_angles
+    from pydpend.kinematics import angles as estimate
+    from pydpend.kinematics import read_angles, write_angles
 
     if r.kind == "angles":
         columns = None
@@ -205,7 +205,7 @@ def _plain(value: Any) -> Any:
 
 
 def _angles(folder: Path, found: tuple[Recording, ...]) -> list[LinkAngles]:
-    from pydpend.angles import read_angles
+    from pydpend.kinematics import read_angles
 
     return [
         read_angles(folder / r.name / RunFile.ANGLES, name=r.name)
@@ -216,8 +216,8 @@ def _angles(folder: Path, found: tuple[Recording, ...]) -> list[LinkAngles]:
 
 def encoder(r: Recording, options: Options, here: Path, into: Path) -> str:
     """Calibrates the encoder and compares the film's phi1 with it."""
-    from pydpend.angles import read_angles
     from pydpend.encoder import calibrate, compare, encoder_angles, read_calibration, read_encoder, read_holds
+    from pydpend.kinematics import read_angles
     from pydpend.plots.encoder import calibration_figure, comparison_figure
     from pydpend.plots.style import save
 

@@ -61,7 +61,7 @@ def run(args: argparse.Namespace) -> int:
     """Runs the command; 1 if something was left out and said."""
     import numpy as np
 
-    from pydpend.angles import angles, write_angles, written_files
+    from pydpend.kinematics import angles, write_angles, written_files
     from pydpend.nodes import read_nodes
 
     check_files(args, *written_files(args.output), args.figure, args.methods_figure)
@@ -82,7 +82,7 @@ def run(args: argparse.Namespace) -> int:
 
         save(angles_figure(found), args.figure)
     if args.methods_figure:
-        from pydpend.angles.markers import body_markers
+        from pydpend.kinematics.markers import body_markers
         from pydpend.plots.angles import body_methods_figure
         from pydpend.plots.style import save
 
@@ -114,8 +114,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _zero(text: str) -> Any:
-    from pydpend.angles import parse_zero
     from pydpend.errors import OptionError, Setting, fault
+    from pydpend.kinematics import parse_zero
     from pydpend.nodes import read_nodes
 
     said = parse_zero(text)

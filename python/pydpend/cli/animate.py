@@ -51,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
     from pydpend.plots.beside import Pictures, beside
     from pydpend.plots.folder import chosen
     from pydpend.run_folder import read_run
-    from pydpend.simulate import simulate
+    from pydpend.simulation import simulate
 
     check_files(args, args.output)
     run = read_run(args.run_folder)

@@ -29,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Writes it."""
-    from pydpend.export import SCALED, WRITERS, export
+    from pydpend.exporting import SCALED, WRITERS, export
     from pydpend.nodes import read_nodes
 
     check_files(args, args.output)

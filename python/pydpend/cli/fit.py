@@ -26,8 +26,8 @@ from pydpend.fit_status import FitStatus
 from pydpend.terminal import below
 
 if TYPE_CHECKING:
-    from pydpend.angles import LinkAngles
     from pydpend.damping import DampingFit
+    from pydpend.kinematics import LinkAngles
 
 HELP = "damping of each joint from angles of free decays"
 
@@ -88,8 +88,8 @@ def add_output_arguments(p: argparse.ArgumentParser) -> None:
 
 def read(path: str, args: argparse.Namespace) -> LinkAngles:
     """Angles as the arguments say."""
-    from pydpend.angles import read_angles
     from pydpend.errors import OptionError, Setting, fault
+    from pydpend.kinematics import read_angles
 
     pairs = [item.split("=", 1) for item in args.columns.split(",") if item]
     if any(len(pair) != 2 for pair in pairs):

@@ -9,7 +9,6 @@ from typing import Unpack
 import numpy as np
 from numpy.typing import NDArray
 
-from pydpend.angles import LinkAngles
 from pydpend.coefficients import RATIOS, parameters, ratios_of
 from pydpend.damping import shooting
 from pydpend.damping.compare import compare_terms
@@ -27,6 +26,7 @@ from pydpend.damping.uncertainty import identifiability
 from pydpend.errors import FitError, fault
 from pydpend.fit_options import FitKeywords, FitOptions
 from pydpend.information import undetermined
+from pydpend.kinematics import LinkAngles
 from pydpend.model import Model
 
 Floats = NDArray[np.float64]

@@ -19,7 +19,7 @@ AGREE = 1.25
 """A stated uncertainty within this factor of the measured noise is believed, sample by sample."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Noise:
     """Standard deviations used in a fit."""
 

@@ -188,7 +188,7 @@ def initial_state(track: Track, parameters: dict[str, float], start_s: float, le
     return state
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Errors:
     """Squared errors per window, deg^2, and counts, (n, 2)."""
 

@@ -37,7 +37,7 @@ UNTIED = (1e3, 1e3, 1e3, 1e3)
 """Slack at which a piece knows nothing of the next, rad and rad/s."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Smoothed:
     """A recording's motion in pieces, and its energy profile."""
 

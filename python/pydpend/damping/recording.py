@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pydpend.angles import LinkAngles, find_swing
 from pydpend.damping.noise import Noise, noise
 from pydpend.damping.shooting import Track
 from pydpend.decay import Decay, find_decay
 from pydpend.errors import FitError, fault
+from pydpend.kinematics import LinkAngles, find_swing
 from pydpend.model import Model
 from pydpend.series import highpass_noise
 
@@ -30,7 +30,7 @@ OFF_RAD = np.radians(0.5)
 """If it is off by at least this: lens and camera move the zeros of good recordings by a few tenths of a degree."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FittedZero:
     """What a fit says of the zero of the angles it was given: measured is true plus zero. All (links,), rad."""
 
@@ -70,7 +70,7 @@ class FittedZero:
         )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Recording:
     """A recording made ready for a fit."""
 

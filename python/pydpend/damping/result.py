@@ -5,18 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field
-from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pydpend import _tracker
 from pydpend.coefficients import FULL, RATIOS, unit
 from pydpend.documents import Table, parse_json
 from pydpend.errors import FIT, FitError
 from pydpend.fit_options import METHODS
 from pydpend.fit_status import FitStatus, Verdict
 from pydpend.json_text import JsonResult
+from pydpend.tabular import TableResult, html_table
 
 Floats = NDArray[np.float64]
 
@@ -248,8 +249,8 @@ class TenCoefficients:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class DampingFit(JsonResult):
+@dataclass(frozen=True, eq=False, repr=False)
+class DampingFit(JsonResult, TableResult):
     """Damping coefficients with everything needed to judge them."""
 
     method: str
@@ -302,6 +303,26 @@ class DampingFit(JsonResult):
     notes: tuple[str, ...] = ()
     """What was left out or should be known."""
 
+    def __repr__(self) -> str:
+        """A line for people."""
+        chi2 = f", chi-square {self.chi2:.3f}" if math.isfinite(self.chi2) else ""
+        return f"<DampingFit {self.method}: {self.status}, {len(self.coefficients)} coefficients{chi2}>"
+
+    def _repr_html_(self) -> str:
+        """The coefficients with their standard errors, for a notebook."""
+        rows = ((n, f"{e.value:.4e}", f"{e.sigma:.1e}", e.unit) for n, e in self.coefficients.items())
+        return html_table(repr(self)[1:-1], ("coefficient", "value", "standard error", "unit"), rows)
+
+    def to_columns(self) -> dict[str, NDArray[Any]]:
+        """The coefficients, then the ratios over psi: ``name``, ``value``, ``sigma``, ``unit``."""
+        found = [*self.coefficients.items(), *((f"{n}/psi", e) for n, e in self.ratios.items())]
+        return {
+            "name": np.array([name for name, _ in found], dtype=object),
+            "value": np.array([e.value for _, e in found]),
+            "sigma": np.array([e.sigma for _, e in found]),
+            "unit": np.array([e.unit for _, e in found], dtype=object),
+        }
+
     def to_dict(self) -> dict[str, Any]:
         """``fit.json``: plain numbers and text, null for what is not defined."""
         out = {
@@ -329,7 +350,7 @@ class DampingFit(JsonResult):
             "terms": {t.name: t.to_dict() for t in self.terms},
             "intervals": {name: i.to_dict() for name, i in self.intervals.items()},
             "inputs": list(self.inputs),
-            "version": package_version(),
+            "version": _tracker.VERSION,
             "chi2_slack": self.chi2_slack,
             "slack": self.slack,
             "iterations": self.iterations,
@@ -432,14 +453,6 @@ def _share_of(table: Table) -> Estimate:
 def _window_of(table: Table) -> dict[str, Any]:
     """The prediction's errors in windows of one length, checked."""
     return {key: table.whole(key) if key == "n" else table.number(key) for key in table}
-
-
-def package_version() -> str:
-    """The installed version, or ``unknown`` from a bare source tree."""
-    try:
-        return version("pydpend")
-    except PackageNotFoundError:
-        return "unknown"
 
 
 def number(value: float) -> float | None:

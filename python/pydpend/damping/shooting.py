@@ -28,7 +28,7 @@ GROWTH = 300.0
 close by the upright makes 1e4 and more in a second: no linear step holds through that."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Segments:
     """Pieces of recordings, each with its own free state."""
 
@@ -87,7 +87,7 @@ class Segments:
         return Segments(np.array(rows, dtype=np.int64), np.array(times), self.states[first])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Solution:
     """What the compiled fit gives; see ``dynamics::shooting::Fit``."""
 
@@ -281,7 +281,7 @@ def settled(
     return replace(loose, segments=loose.merged(size))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Trace:
     """A solution's motion at the samples."""
 

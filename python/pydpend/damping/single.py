@@ -11,8 +11,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pydpend.angles import LinkAngles
 from pydpend.errors import FitError, Setting, fault
+from pydpend.kinematics import LinkAngles
 from pydpend.model import Model
 
 Floats = NDArray[np.float64]

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from pydpend.angles import LinkAngles
 from pydpend.damping.maps import KNOTS, Maps, corrected
 from pydpend.damping.prediction import WINDOWS_S, Prediction, initial_state, predict
 from pydpend.damping.recording import prepare
@@ -18,6 +17,7 @@ from pydpend.damping.result import DampingFit
 from pydpend.documents import read_json
 from pydpend.errors import FIT, FitError, ModelError, Setting, fault
 from pydpend.kinds import expect
+from pydpend.kinematics import LinkAngles
 from pydpend.model import Model
 from pydpend.model.file import MOST
 from pydpend.output import AnyPath, path_of, whole, write_text

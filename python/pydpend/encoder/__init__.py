@@ -11,7 +11,7 @@ from pydpend.encoder.calibration import (
     calibrate,
     read_calibration,
 )
-from pydpend.encoder.compare import Comparison, compare
+from pydpend.encoder.comparison import Comparison, compare
 from pydpend.encoder.convert import encoder_angles
 from pydpend.encoder.holds import Hold, hold_of, read_holds
 from pydpend.encoder.signal import EncoderSignal, read_encoder

@@ -106,6 +106,11 @@ class Calibration:
         """Standard uncertainty of one reading's angle from its noise, rad."""
         return self.noise_v / abs(self.slope_v_per_rad)
 
+    def to_dict(self) -> dict[str, Any]:
+        """`to_json` as plain values."""
+        value: dict[str, Any] = json.loads(self.to_json())
+        return value
+
     def to_json(self) -> str:
         """All of it, as ``pydpend calibrate`` writes it."""
         low, high = self.interval_95

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pydpend.angles.table import LinkAngles
-from pydpend.angles.unwrap import unwrap
 from pydpend.encoder.calibration import Calibration
 from pydpend.encoder.signal import EncoderSignal
 from pydpend.errors import CALIBRATE, EncoderError, Setting, fault
+from pydpend.kinematics.table import LinkAngles
+from pydpend.kinematics.unwrap import unwrap
 
 Floats = NDArray[np.float64]
 

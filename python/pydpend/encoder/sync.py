@@ -14,8 +14,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from pydpend.angles.table import LinkAngles
 from pydpend.errors import EncoderError, fault, one_of
+from pydpend.kinematics.table import LinkAngles
 from pydpend.series import correlation_time, highpass_noise
 
 Floats = NDArray[np.float64]

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pydpend.errors import ModelError, fault
+from pydpend.tabular import html_table
 
 Array = npt.NDArray[np.float64]
 
@@ -26,7 +27,7 @@ CONSTANTS = (
 """The constants with a covariance, in its order."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Model:
     """A planar double pendulum in SI units; angles counter-clockwise positive, zero hanging.
 
@@ -95,6 +96,17 @@ class Model:
             raise ModelError(
                 fault(self.name, f"covariance of shape {np.shape(self.covariance)}", "It must be (9, 9)")
             )
+
+    def __repr__(self) -> str:
+        """A line for people."""
+        links = f"{self.links} link{'s'[: self.links > 1]}"
+        return f"<Model {self.name}: {links}, psi {self.psi_kg_m2:.4g} kg m2, sigma {self.sigma_j:.4g} J>"
+
+    def _repr_html_(self) -> str:
+        """The constants with their standard uncertainties, for a notebook."""
+        known = self.sigmas()
+        rows = ((name, f"{getattr(self, name):.6g}", f"{known[name]:.2g}") for name in CONSTANTS)
+        return html_table(self.name, ("constant, SI", "value", "standard uncertainty"), rows)
 
     @classmethod
     def one_link(

@@ -10,7 +10,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from pydpend.angles.increments import (
+from pydpend.errors import AnglesError, fault
+from pydpend.kinematics.increments import (
     arcsin_steps,
     by_changing_vectors,
     by_increments,
@@ -18,9 +19,8 @@ from pydpend.angles.increments import (
     steps,
     vectors_of,
 )
-from pydpend.angles.markers import BodyMarkers
-from pydpend.angles.table import LinkAngles
-from pydpend.errors import AnglesError, fault
+from pydpend.kinematics.markers import BodyMarkers
+from pydpend.kinematics.table import LinkAngles
 from pydpend.plots.style import COLORS, new_figure, plain, style
 
 Floats = NDArray[np.float64]

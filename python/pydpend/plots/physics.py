@@ -14,7 +14,7 @@ from pydpend.model import Model
 from pydpend.output import AnyPath, path_of
 from pydpend.plots.moving import check_film, pictures_of, write_film
 from pydpend.plots.style import COLORS, new_figure, style
-from pydpend.simulate import LAWS, Simulation
+from pydpend.simulation import LAWS, Simulation
 
 Array = npt.NDArray[np.float64]
 

@@ -84,7 +84,7 @@ class Reset(_Block):
     """Whether a film moves with them."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Film(_Block):
     """A film in the page. Frame k shows the recording at ``times_s[k]``; its own rate is ``rate_hz``."""
 
@@ -101,7 +101,7 @@ class Film(_Block):
         return base64.b64encode(self.mp4).decode("ascii")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Series:
     """One curve; one without a label is not in the legend.
 
@@ -123,7 +123,7 @@ def band(sigma: NDArray[np.float64]) -> tuple[Series, Series]:
     return Series("± sigma", sigma, None, edge=True), Series("", -sigma, None, band=(1, 0), edge=True)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Chart(_Block):
     """Curves over a common x that can be zoomed; charts of a ``group`` move together."""
 
@@ -138,7 +138,7 @@ class Chart(_Block):
     key: tuple[tuple[str, str], ...] = ()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class StatusMap(_Block):
     """What was known of each node over time. ``runs[n]``: (status code, from s, to s).
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pydpend.angles import LinkAngles
+from pydpend.kinematics import LinkAngles
 from pydpend.nodes import Nodes
 from pydpend.plots.encoder import calibration_figure
 from pydpend.plots.style import inline_svg
@@ -33,7 +33,7 @@ MOST_PLACES = 6
 """Curves of places in one chart."""
 
 
-@dataclass
+@dataclass(eq=False)
 class Part:
     """What one recording adds to the page."""
 

@@ -8,22 +8,20 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pydpend.errors import AnglesError, Setting, fault
 from pydpend.instants import seconds_of_numpy
-
-if TYPE_CHECKING:
-    import pandas as pd
+from pydpend.tabular import TableResult, html_table
 
 Floats = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
-class LinkAngles:
+@dataclass(frozen=True, eq=False, repr=False)
+class LinkAngles(TableResult):
     """Angles of one or two links at T instants.
 
     ``t_s`` (T,): s, finite, strictly increasing; dates become seconds from the first. ``phi_rad`` (T, L), L = 1
@@ -126,11 +124,23 @@ class LinkAngles:
             out[f"sigma{k + 1}_rad"] = self.sigma_rad[:, k]
         return out
 
-    def to_dataframe(self) -> pd.DataFrame:
-        """The table as a pandas frame (pandas must be installed)."""
-        import pandas as pd
+    def __repr__(self) -> str:
+        """A line for people."""
+        seen = " and ".join(f"{100 * part:.1f} %" for part in self.seen.mean(axis=0))
+        span = f"{self.t_s[0]:g} to {self.t_s[-1]:g} s"
+        links = f"{self.links} link{'s'[: self.links > 1]}"
+        return f"<LinkAngles {self.name}: {self.t_s.size} times x {links}, {span}, {seen} seen>"
 
-        return pd.DataFrame(self.to_columns())
+    def _repr_html_(self) -> str:
+        """What is known of each link, for a notebook."""
+        rows = []
+        for k in range(self.links):
+            seen = self.seen[:, k]
+            turns = float(np.ptp(self.phi_rad[seen, k])) / (2 * math.pi) if seen.any() else math.nan
+            sigma = self.sigma_rad[np.isfinite(self.sigma_rad[:, k]), k]
+            error = f"{math.degrees(float(np.median(sigma))):.4f} deg" if sigma.size else "not stated"
+            rows.append((f"phi{k + 1}", f"{100 * seen.mean():.1f} %", f"{turns:.2f} turns", error))
+        return html_table(repr(self)[1:-1], ("angle", "seen", "range", "median standard uncertainty"), rows)
 
 
 def check_table(

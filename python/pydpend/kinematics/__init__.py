@@ -8,16 +8,16 @@ that calls them.
 
 from __future__ import annotations
 
-from pydpend.angles.estimate import angles, find_linkage
-from pydpend.angles.files import read_angles, write_angles, written_files
-from pydpend.angles.hanging import parse_zero, roll_sigma
-from pydpend.angles.linkage import Linkage, Shape
-from pydpend.angles.misfit import misfits
-from pydpend.angles.pairwise import PairAngles, pair_angles
-from pydpend.angles.pose import Pose, fit_pose
-from pydpend.angles.swing import Swing, find_swing
-from pydpend.angles.table import LinkAngles
-from pydpend.angles.zero import Rest, find_rest
+from pydpend.kinematics.estimate import angles, find_linkage
+from pydpend.kinematics.files import read_angles, write_angles, written_files
+from pydpend.kinematics.hanging import parse_zero, roll_sigma
+from pydpend.kinematics.linkage import Linkage, Shape
+from pydpend.kinematics.misfit import misfits
+from pydpend.kinematics.pairwise import PairAngles, pair_angles
+from pydpend.kinematics.pose import Pose, fit_pose
+from pydpend.kinematics.swing import Swing, find_swing
+from pydpend.kinematics.table import LinkAngles
+from pydpend.kinematics.zero import Rest, find_rest
 
 __all__ = [
     "LinkAngles",

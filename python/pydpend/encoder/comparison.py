@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pydpend.angles.table import LinkAngles
 from pydpend.encoder.sync import Course, Synchronisation, synchronise
 from pydpend.errors import EncoderError, fault
+from pydpend.kinematics.table import LinkAngles
 from pydpend.series import correlation_time, highpass_noise
+from pydpend.tabular import TableResult
 
 Floats = NDArray[np.float64]
 
@@ -31,7 +32,7 @@ video's angle is a thousand times more."""
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class Comparison(TableResult):
     """The encoder's readings on the video's clock, and how far the video is from them.
 
     ``t_s`` (n,): video time. ``video_rad``, ``encoder_rad`` (n,): angles; the encoder's with its whole
@@ -77,7 +78,11 @@ class Comparison:
     """How many of the video's angles and the encoder's readings were left out, by the regression too."""
 
     def to_json(self) -> str:
-        """All numbers, angles in degrees too where people read them."""
+        """`to_dict` as JSON."""
+        return json.dumps(self.to_dict(), indent=2) + "\n"
+
+    def to_dict(self) -> dict[str, Any]:
+        """All numbers, angles in degrees too where people read them; None for what is not known."""
         s = self.sync
         value: dict[str, Any] = {
             "video": self.name,
@@ -126,7 +131,8 @@ class Comparison:
             "notes": list(self.notes),
             "left_out": self.left_out,
         }
-        return json.dumps(_plain(value), indent=2) + "\n"
+        plain: dict[str, Any] = _plain(value)
+        return plain
 
     def to_columns(self) -> dict[str, Floats]:
         """The residual series as columns of a table."""

@@ -16,6 +16,7 @@ import numpy.typing as npt
 from pydpend import _tracker
 from pydpend.errors import SimulationError, fault
 from pydpend.model import Damping, Model, parameters
+from pydpend.tabular import TableResult, by_link, html_table
 
 Array = npt.NDArray[np.float64]
 
@@ -52,8 +53,8 @@ class Event:
     after: str
 
 
-@dataclass(frozen=True)
-class Simulation:
+@dataclass(frozen=True, eq=False, repr=False)
+class Simulation(TableResult):
     """A motion and its energies. Angles counter-clockwise positive, zero hanging."""
 
     t_s: Array
@@ -80,6 +81,31 @@ class Simulation:
     balance: float
     """Largest ``|E + W - E0|`` over the samples, relative to ``|E0|`` (to the energy's range where E0 is
     0)."""
+
+    def __repr__(self) -> str:
+        """A line for people."""
+        span = f"{self.t_s[0]:g} to {self.t_s[-1]:g} s" if self.t_s.size else "no time"
+        return (
+            f"<Simulation: {self.t_s.size} times, {span}, {self.status}, energy balance {self.balance:.1e}>"
+        )
+
+    def _repr_html_(self) -> str:
+        """The first rows, for a notebook."""
+        columns = self.to_columns()
+        rows = ([f"{v[i]:.6g}" for v in columns.values()] for i in range(min(5, self.t_s.size)))
+        return html_table(repr(self)[1:-1], list(columns), rows)
+
+    def to_columns(self) -> dict[str, Array]:
+        """``time_s``, angles, rates, accelerations, joint forces and dry torques of both, energy and works, SI."""
+        both = {
+            "phi#_rad": self.phi_rad,
+            "w#_rad_s": self.w_rad_s,
+            "a#_rad_s2": self.a_rad_s2,
+            "normal#_n": self.normal_n,
+            "dry#_n_m": self.dry_n_m,
+        }
+        works = {f"{law}_j": self.works_j[:, k] for k, law in enumerate(LAWS)}
+        return by_link({"time_s": self.t_s} | both | {"energy_j": self.energy_j} | works)
 
 
 def simulate(
@@ -131,7 +157,7 @@ def simulate(
     )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Ensemble:
     """Many motions sampled at the same times."""
 

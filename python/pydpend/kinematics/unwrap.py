@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pydpend.angles.table import Floats
+from pydpend.kinematics.table import Floats
 
 RATE_SAMPLES = 8
 """Rates beside a gap come from a straight line or parabola through up to this many frames."""

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from pydpend.angles.table import Floats
 from pydpend.errors import CHECK, AnglesError, Setting, fault
+from pydpend.kinematics.table import Floats
 
 if TYPE_CHECKING:
     from pydpend.nodes import Nodes, Rig

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pydpend.angles.linkage import (
+from pydpend.errors import Setting
+from pydpend.kinematics.linkage import (
     FIT_FRAMES,
     Frames,
     Linkage,
@@ -19,10 +20,9 @@ from pydpend.angles.linkage import (
     regular,
     remaining,
 )
-from pydpend.angles.pose import Pose, evenly, rotate
-from pydpend.angles.scale import hidden_factor, inflation, partly_hidden, pooled_scale2, reject_limit
-from pydpend.angles.table import Floats
-from pydpend.errors import Setting
+from pydpend.kinematics.pose import Pose, evenly, rotate
+from pydpend.kinematics.scale import hidden_factor, inflation, partly_hidden, pooled_scale2, reject_limit
+from pydpend.kinematics.table import Floats
 
 _STEPS = 6
 """Gauss-Newton steps per frame; from the rigid pose two are enough, from one marker four."""
@@ -183,7 +183,7 @@ def _all_frames(linkage: Linkage, frames: Frames, start: Floats) -> LinkageAngle
 @dataclass(frozen=True, eq=False)
 class _Solved:
     """Angles (T, L) of some frames, normalised misfits d2 (T, N), chi2 and dof (T,), standard errors (T, L), and what
-    :func:`~pydpend.angles.pose.pooled_scale2` is made of, for each angle (T, L).
+    :func:`~pydpend.kinematics.pose.pooled_scale2` is made of, for each angle (T, L).
     """
 
     theta: Floats

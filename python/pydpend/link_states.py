@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from pydpend import _tracker
 from pydpend.errors import AnglesError, fault
+from pydpend.tabular import TableResult, by_link, html_table
 
 Array = npt.NDArray[np.float64]
 
@@ -28,7 +29,7 @@ chance."""
 
 
 class Angles(Protocol):
-    """What is needed of `pydpend.angles.LinkAngles`."""
+    """What is needed of `pydpend.kinematics.LinkAngles`."""
 
     @property
     def t_s(self) -> Array: ...
@@ -38,8 +39,8 @@ class Angles(Protocol):
     def sigma_rad(self) -> Array: ...
 
 
-@dataclass(frozen=True)
-class LinkStates:
+@dataclass(frozen=True, eq=False, repr=False)
+class LinkStates(TableResult):
     """States of the links. Counter-clockwise positive, zero hanging; SI."""
 
     t_s: Array
@@ -57,6 +58,25 @@ class LinkStates:
     method: str
     status: str = "done"
     message: str = ""
+
+    def __repr__(self) -> str:
+        """A line for people."""
+        links = self.phi_rad.shape[1]
+        return f"<LinkStates: {self.t_s.size} times x {links} link{'s'[: links > 1]}, {self.method}, {self.status}>"
+
+    def _repr_html_(self) -> str:
+        """The first rows, for a notebook."""
+        columns = self.to_columns()
+        rows = ([f"{v[i]:.6g}" for v in columns.values()] for i in range(min(5, self.t_s.size)))
+        return html_table(repr(self)[1:-1], list(columns), rows)
+
+    def to_columns(self) -> dict[str, Array]:
+        """``time_s``, and of each link angle, rate and acceleration with their standard errors, SI."""
+        names = ("phi#_rad", "w#_rad_s", "a#_rad_s2")
+        values = (self.phi_rad, self.w_rad_s, self.a_rad_s2)
+        sigmas = np.sqrt(np.diagonal(self.covariance, axis1=2, axis2=3))
+        columns = {"time_s": self.t_s} | dict(zip(names, values, strict=True))
+        return by_link(columns | {f"sigma_{name}": sigmas[:, :, k] for k, name in enumerate(names)})
 
 
 def states(

@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
-from pydpend.angles.hanging import Raw, zero_for
-from pydpend.angles.linkage import Linkage, Shape, first_shape
-from pydpend.angles.linkage_frames import checked_sigma, fit_linkage
-from pydpend.angles.markers import BodyMarkers, body_markers, to_image
-from pydpend.angles.pairwise import pair_angles
-from pydpend.angles.pose import Pose, fit_pose
-from pydpend.angles.table import Floats, LinkAngles
-from pydpend.angles.unwrap import unwrap
 from pydpend.errors import CHECK, AnglesError, Setting, fault, one_of
+from pydpend.kinematics.hanging import Raw, zero_for
+from pydpend.kinematics.linkage import Linkage, Shape, first_shape
+from pydpend.kinematics.linkage_frames import checked_sigma, fit_linkage
+from pydpend.kinematics.markers import BodyMarkers, body_markers, to_image
+from pydpend.kinematics.pairwise import pair_angles
+from pydpend.kinematics.pose import Pose, fit_pose
+from pydpend.kinematics.table import Floats, LinkAngles
+from pydpend.kinematics.unwrap import unwrap
 
 if TYPE_CHECKING:
     from pydpend.nodes import Nodes, Rig

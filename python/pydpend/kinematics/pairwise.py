@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pydpend.angles.markers import BodyMarkers
-from pydpend.angles.table import Floats
 from pydpend.errors import AnglesError, fault
+from pydpend.kinematics.markers import BodyMarkers
+from pydpend.kinematics.table import Floats
 
 
 @dataclass(frozen=True, eq=False)

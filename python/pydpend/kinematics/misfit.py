@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pydpend.angles.markers import body_markers
-from pydpend.angles.pose import fit_pose, rotate
-from pydpend.angles.table import Floats
+from pydpend.kinematics.markers import body_markers
+from pydpend.kinematics.pose import fit_pose, rotate
+from pydpend.kinematics.table import Floats
 
 if TYPE_CHECKING:
     from pydpend.nodes import Nodes

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pydpend.angles.table import Floats
+from pydpend.kinematics.table import Floats
 
 CENTRES = 800
 """Instants at which the equations are asked, at most."""

@@ -12,7 +12,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from pydpend.angles.table import Floats
+from pydpend.kinematics.table import Floats
 
 PRIOR_DOF = 20.0
 """The stated sigmas count as much as this many degrees of freedom when the residuals rescale them."""

@@ -1,6 +1,6 @@
 """Reading and writing angles tables.
 
-Owns: the file forms of :class:`~pydpend.angles.table.LinkAngles`: Parquet and CSV with units in the column
+Owns: the file forms of :class:`~pydpend.kinematics.table.LinkAngles`: Parquet and CSV with units in the column
 names, and the folder of ``.npy`` files in which the paper's authors published theirs.
 """
 
@@ -16,13 +16,13 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from pydpend.angles.table import Floats, LinkAngles, check_table
 from pydpend.arrays import read_npy
 from pydpend.columns import Columns, read_columns
 from pydpend.documents import parse_json, read_text
 from pydpend.errors import AnglesError, Setting, fault
 from pydpend.instants import stamp_in
 from pydpend.kinds import expect
+from pydpend.kinematics.table import Floats, LinkAngles, check_table
 from pydpend.output import AnyPath, path_of, whole, write_text
 from pydpend.units import unit_at_end, unit_called
 

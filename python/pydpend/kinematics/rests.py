@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pydpend.angles.swing import Swing, within_half_turn
-from pydpend.angles.table import Floats
-from pydpend.angles.vertical import ROLL_SIGMA_DEG, Down
-from pydpend.angles.zero import GIVE_ZERO, Rest
 from pydpend.errors import AnglesError, fault
+from pydpend.kinematics.swing import Swing, within_half_turn
+from pydpend.kinematics.table import Floats
+from pydpend.kinematics.vertical import ROLL_SIGMA_DEG, Down
+from pydpend.kinematics.zero import GIVE_ZERO, Rest
 
 HANGS_WITHIN_RAD = np.radians(60.0)
 """A link that hangs points down in the picture to within this, or the film is rolled."""

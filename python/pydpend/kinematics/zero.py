@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pydpend.angles.table import Floats, LinkAngles
 from pydpend.errors import AnglesError, Setting, fault
+from pydpend.kinematics.table import Floats, LinkAngles
 from pydpend.series import correlation_time
 
 REST_WITHIN_RAD = np.radians(0.1)

@@ -17,8 +17,9 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from pydpend.angles.markers import BodyMarkers
-from pydpend.angles.scale import (
+from pydpend.errors import AnglesError, Setting, fault
+from pydpend.kinematics.markers import BodyMarkers
+from pydpend.kinematics.scale import (
     PRIOR_DOF,
     hidden_factor,
     inflation,
@@ -27,8 +28,7 @@ from pydpend.angles.scale import (
     reject_limit,
     suspects,
 )
-from pydpend.angles.table import Floats
-from pydpend.errors import AnglesError, Setting, fault
+from pydpend.kinematics.table import Floats
 
 LEAST_COVERED = 1.5
 """Suspects that miss by less than this factor are no worse than others: errors along the way of motion do as much."""

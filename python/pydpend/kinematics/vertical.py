@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pydpend.angles.linkage import Shape
-from pydpend.angles.markers import BodyMarkers, to_world
-from pydpend.angles.swing import within_half_turn
-from pydpend.angles.table import Floats
 from pydpend.errors import AnglesError, Setting, fault
+from pydpend.kinematics.linkage import Shape
+from pydpend.kinematics.markers import BodyMarkers, to_world
+from pydpend.kinematics.swing import within_half_turn
+from pydpend.kinematics.table import Floats
 
 if TYPE_CHECKING:
     from pydpend.nodes import Nodes

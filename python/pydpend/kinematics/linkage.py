@@ -14,11 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pydpend.angles.markers import BodyMarkers
-from pydpend.angles.pose import Pose, evenly, rotate
-from pydpend.angles.scale import pooled_scale2
-from pydpend.angles.table import Floats
 from pydpend.errors import AnglesError, Setting, fault
+from pydpend.kinematics.markers import BodyMarkers
+from pydpend.kinematics.pose import Pose, evenly, rotate
+from pydpend.kinematics.scale import pooled_scale2
+from pydpend.kinematics.table import Floats
 
 FIT_FRAMES = 4000
 """The shape is fitted to at most this many frames, evenly spread: its error is then far below a marker's."""

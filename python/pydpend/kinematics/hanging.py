@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from pydpend.angles.linkage import Shape
-from pydpend.angles.markers import BodyMarkers, body_markers
-from pydpend.angles.pose import solve
-from pydpend.angles.rests import (
+from pydpend.errors import AnglesError, Setting, fault
+from pydpend.kinematics.linkage import Shape
+from pydpend.kinematics.markers import BodyMarkers, body_markers
+from pydpend.kinematics.pose import solve
+from pydpend.kinematics.rests import (
     HANGS_WITHIN_RAD,
     confirmed_sigma,
     hanging_rests,
@@ -21,12 +22,11 @@ from pydpend.angles.rests import (
     unconfirmed,
     unconfirmed_sigma,
 )
-from pydpend.angles.swing import Swing, find_swing
-from pydpend.angles.table import Floats, LinkAngles
-from pydpend.angles.unwrap import unwrap
-from pydpend.angles.vertical import ROLL_SIGMA_DEG, picture_down, vertical_zero
-from pydpend.angles.zero import find_rest, zero_of
-from pydpend.errors import AnglesError, Setting, fault
+from pydpend.kinematics.swing import Swing, find_swing
+from pydpend.kinematics.table import Floats, LinkAngles
+from pydpend.kinematics.unwrap import unwrap
+from pydpend.kinematics.vertical import ROLL_SIGMA_DEG, picture_down, vertical_zero
+from pydpend.kinematics.zero import find_rest, zero_of
 from pydpend.nodes import Nodes
 from pydpend.number_words import numbers
 from pydpend.series import highpass_noise

@@ -1,0 +1,57 @@
+"""Results that are tables: to pandas, to Arrow and to a notebook, from their columns."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Mapping, Sequence
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import pyarrow as pa
+
+
+class TableResult(ABC):
+    """A result whose rows are a table."""
+
+    @abstractmethod
+    def to_columns(self) -> Mapping[str, NDArray[Any]]:
+        """The table's columns by name, with their units at the end of the names."""
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """The table as a pandas frame (pandas must be installed); NaN where there is no number."""
+        import pandas as pd
+
+        return pd.DataFrame(dict(self.to_columns()))
+
+    def to_arrow(self) -> pa.Table:
+        """The table as Arrow has it; null where there is no number."""
+        import pyarrow as pa
+
+        return pa.table({name: pa.array(v, from_pandas=True) for name, v in self.to_columns().items()})
+
+    def __arrow_c_stream__(self, requested_schema: object | None = None) -> object:
+        """The table as an Arrow stream: ``pyarrow.table(result)``, ``polars.DataFrame(result)``."""
+        return self.to_arrow().__arrow_c_stream__(requested_schema)
+
+
+def by_link(columns: Mapping[str, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
+    """Columns of arrays (T,) and (T, L): ``"phi#_rad"`` becomes ``phi1_rad``, ``phi2_rad``."""
+    out = {}
+    for name, values in columns.items():
+        if values.ndim == 1:
+            out[name] = values
+        else:
+            out |= {name.replace("#", str(k + 1)): values[:, k] for k in range(values.shape[1])}
+    return out
+
+
+def html_table(title: str, header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A small table for a notebook."""
+    head = "".join(f"<th>{escape(cell)}</th>" for cell in header)
+    body = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
+    return f"<table><caption>{escape(title)}</caption><tr>{head}</tr>{body}</table>"
