@@ -34,7 +34,7 @@ def film(folder: Path, name: str, frames: int, **more: Any) -> Path:
 
 
 def memory(folder: Path) -> None:
-    short = film(folder, "short.mp4", 2000, speed="veryfast")
+    short = film(folder, "short.mp4", 2000, x264_preset="veryfast")
     long = folder / "long.mp4"
     loop: list[str | Path] = ["ffmpeg", "-v", "error", "-stream_loop", "19", "-i", short, "-c", "copy", long]
     subprocess.run(loop, check=True)
@@ -56,7 +56,7 @@ def in_turn(turns: int, *work: Callable[[], object]) -> list[list[float]]:
 
 
 def door(folder: Path) -> None:
-    path = film(folder, "door.mp4", 2000, speed="veryfast")
+    path = film(folder, "door.mp4", 2000, x264_preset="veryfast")
     out = folder / "door.parquet"
 
     def binary() -> None:

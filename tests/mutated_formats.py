@@ -41,7 +41,7 @@ def _remuxed(name: str, *options: str) -> Callable[[Path], None]:
 
     def make(folder: Path) -> None:
         # Long enough for a stream whose first pictures lie some way in.
-        _film("from.mkv", "--frames", "60")(folder)
+        _film("from.mkv", "--frame-count", "60")(folder)
         _run("ffmpeg", "-v", "error", "-r", "25", "-i", folder / "from.mkv", *options, folder / name)
         (folder / "from.mkv").unlink()
 
@@ -134,7 +134,7 @@ def _films() -> dict[str, Format]:
 def _made() -> Path:
     """Tables and a run folder that many formats share."""
     folder = Path(mkdtemp(prefix="mutate-"))
-    _film("film.mp4", "--frames", "40")(folder)
+    _film("film.mp4", "--frame-count", "40")(folder)
     for name in ("nodes.parquet", "nodes.csv"):
         dp.track(folder / "film.mp4", folder / "rig.toml", output=folder / name, progress=False)
     times = np.arange(0, 3, 2e-3)
@@ -303,7 +303,7 @@ def _documents() -> dict[str, Format]:
     def plots(*figures: str) -> tuple[tuple[str, ...], ...]:
         return tuple(("pydpend", "plot", figure, "HERE/run", "-o", "OUT.svg") for figure in figures)
 
-    film = ("tracker", "film", "HERE/scene.toml", "-q", "-o", "OUT.y4m", "--frames", "2")
+    film = ("tracker", "film", "HERE/scene.toml", "-q", "-o", "OUT.y4m", "--frame-count", "2")
     return {
         "rig": Format(_film("film.avi"), "rig.toml", True, _reads("film.avi")[1:]),
         "model": document("model.toml", ((*fitted, "HERE/model.toml"),), "model.toml", "drop.parquet"),

@@ -94,7 +94,7 @@ def test_a_players_rate_is_said_with_its_factor(tmp_path: Path, capsys: pytest.C
     t = np.arange(60) / 30
     phi = np.stack([0.4 * np.sin(3 * t), 0.5 * np.sin(2 * t)], axis=1)
     film = dp.film(
-        "clean", tmp_path / "slow.mp4", motion=(t, phi), frames=60, rate_hz=30.0, speed="ultrafast"
+        "clean", tmp_path / "slow.mp4", motion=(t, phi), frames=60, rate_hz=30.0, x264_preset="ultrafast"
     )
     rig = tmp_path / "rig.toml"
     rig.write_text(film.rig_toml(), encoding="utf-8")

@@ -34,7 +34,7 @@ PACKAGE = ROOT / "python" / "pydpend"
 DEMO = ROOT / "fixtures" / "demo"
 TRACKER_SOURCE = ROOT / "crates" / "tracker" / "src"
 
-FLAG = re.compile(r"(?<![\w-])--[a-z][a-z-]*")
+FLAG = re.compile(r"(?<![\w-])--[a-z][a-z0-9-]*")
 KEYWORD = re.compile(r"\b[a-z_]+=(?:'|\.\.\.|True|False)")
 
 

@@ -40,7 +40,7 @@ def one(trial: Path, seed: int, frames: int | None, folder: Path) -> str:
         comments="",
     )
     film = [str(TRACKER), "film", "--preset", "clean", "--seed", str(seed), "--motion", str(motion), "-q"]
-    film += ["--frames", str(n), "--truth", str(truth), "-o", "-"]
+    film += ["--frame-count", str(n), "--truth", str(truth), "-o", "-"]
     with subprocess.Popen(film, stdout=subprocess.PIPE) as made:
         track = [str(TRACKER), "track", "-", "-o", str(nodes), "--quiet"]
         subprocess.run(track, stdin=made.stdout, check=True)

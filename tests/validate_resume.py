@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 TRACKER = Path(__file__).parent.parent / "target" / "release" / "tracker"
-FILMS = {"h264.mp4": ["--speed", "veryfast"], "mjpeg.avi": ["--codec", "mjpeg"], "photron.mraw": []}
+FILMS = {"h264.mp4": ["--x264-preset", "veryfast"], "mjpeg.avi": ["--codec", "mjpeg"], "photron.mraw": []}
 FRAMES = 1500
 
 
@@ -50,7 +50,7 @@ def sweep(folder: Path, kills: int, seed: int) -> int:
     different = 0
     for name, options in FILMS.items():
         film = folder / name
-        make = [str(TRACKER), "film", "--preset", "clean", "--frames", str(FRAMES), "-q", "-o", str(film)]
+        make = [str(TRACKER), "film", "--preset", "clean", "--frame-count", str(FRAMES), "-q", "-o", str(film)]
         subprocess.run([*make, *options], check=True)
         begin = time.monotonic()
         whole = track(film, folder / "whole.parquet", "--force")

@@ -206,7 +206,7 @@ class Film:
         truth: str | None,
         codec: str | None,
         quality: int | None,
-        speed: str | None,
+        x264_preset: str | None,
         gray_only: bool,
         bits: int | None,
         safe_csv: bool,

@@ -130,7 +130,7 @@ class Film:
         *,
         codec: Codec | None = None,
         quality: int | None = None,
-        speed: str | None = None,
+        x264_preset: str | None = None,
         gray_only: bool = False,
         bits: int | None = None,
         safe_csv: bool = False,
@@ -140,7 +140,7 @@ class Film:
 
         The ending of ``output`` decides the form: .mp4 .mov .mkv .avi, .mraw (with its .cih), .tif (pages), .y4m, or
         numbered images as in ``frames/%05d.png``. ``quality``: H.264's rate factor 0 to 51 or MJPEG's 1 to 31.
-        ``bits``: of a .mraw, 8, 10, 12 or 16. ``safe_csv``: as in `Nodes.write`, for the truth. ``force``: replace
+        ``x264_preset``: of H.264, ultrafast to placebo. ``bits``: of a .mraw, 8, 10, 12 or 16. ``safe_csv``: as in `Nodes.write`, for the truth. ``force``: replace
         files that are there already; each takes its name when it is whole.
 
         Raises :class:`pydpend.FilmError` if the form cannot hold the film, a file is there already or is the scene's,
@@ -151,7 +151,7 @@ class Film:
             None if truth is None else os.fsdecode(truth),
             codec,
             quality,
-            speed,
+            x264_preset,
             gray_only,
             bits,
             safe_csv,
@@ -171,7 +171,7 @@ def film(
     rate_hz: float | None = None,
     codec: Codec | None = None,
     quality: int | None = None,
-    speed: str | None = None,
+    x264_preset: str | None = None,
     gray_only: bool = False,
     bits: int | None = None,
     safe_csv: bool = False,
@@ -184,7 +184,7 @@ def film(
         truth,
         codec=codec,
         quality=quality,
-        speed=speed,
+        x264_preset=x264_preset,
         gray_only=gray_only,
         bits=bits,
         safe_csv=safe_csv,

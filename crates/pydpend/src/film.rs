@@ -134,7 +134,7 @@ impl PyFilm {
     }
 
     /// Writes the film and, if wanted, its truth.
-    #[pyo3(signature = (output, truth, codec, quality, speed, gray_only, bits, safe_csv, replace, reads))]
+    #[pyo3(signature = (output, truth, codec, quality, x264_preset, gray_only, bits, safe_csv, replace, reads))]
     #[expect(clippy::too_many_arguments, reason = "the options of one call of Python's")]
     fn write(
         &self,
@@ -143,7 +143,7 @@ impl PyFilm {
         truth: Option<PathBuf>,
         codec: Option<&str>,
         quality: Option<u32>,
-        speed: Option<String>,
+        x264_preset: Option<String>,
         gray_only: bool,
         bits: Option<u32>,
         safe_csv: bool,
@@ -165,7 +165,7 @@ impl PyFilm {
         let options = WriteOptions {
             codec,
             quality,
-            speed,
+            x264_preset,
             gray_only,
             bits,
             truth,

@@ -301,7 +301,7 @@ fn h264(folder: &Path) {
         let (part, path) = (folder.join("part.mp4"), folder.join("film.mp4"));
         let options = WriteOptions {
             quality: Some(quality),
-            speed: Some("veryfast".into()),
+            x264_preset: Some("veryfast".into()),
             ..WriteOptions::default()
         };
         write(&Film::new(&long_scene(H264_FRAMES)).unwrap(), &part, &options, &mut |_| Ok(())).unwrap();

@@ -52,14 +52,14 @@ pub enum Setting {
     Resume,
     /// Nodes, bodies and joints.
     Rig,
-    /// How much time H.264 takes.
-    Speed,
     /// How many threads.
     Threads,
     /// What is bright enough to be a marker.
     Threshold,
     /// Width of a drawn film.
     Width,
+    /// How much time H.264 takes.
+    X264Preset,
 }
 
 impl Setting {
@@ -85,10 +85,10 @@ impl Setting {
         Self::Quality,
         Self::Resume,
         Self::Rig,
-        Self::Speed,
         Self::Threads,
         Self::Threshold,
         Self::Width,
+        Self::X264Preset,
     ];
 
     /// Its name, in lower case with underscores.
@@ -114,10 +114,10 @@ impl Setting {
             Self::Quality => "quality",
             Self::Resume => "resume",
             Self::Rig => "rig",
-            Self::Speed => "speed",
             Self::Threads => "threads",
             Self::Threshold => "threshold",
             Self::Width => "width",
+            Self::X264Preset => "x264_preset",
         }
     }
 

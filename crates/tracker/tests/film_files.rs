@@ -172,7 +172,7 @@ fn what_cannot_be_written_is_refused() {
     let text = WriteOptions { truth: Some(folder.path().join("t.txt")), ..WriteOptions::default() };
     assert!(message("a.mkv", &text).contains(".parquet or .csv"));
     // Options that the form has not, and values that are none.
-    let speed = |word: &str| WriteOptions { speed: Some(word.into()), ..WriteOptions::default() };
+    let speed = |word: &str| WriteOptions { x264_preset: Some(word.into()), ..WriteOptions::default() };
     let quality = WriteOptions { quality: Some(3), ..WriteOptions::default() };
     let gray = WriteOptions { gray_only: true, ..WriteOptions::default() };
     let codec = WriteOptions { codec: Some(Codec::Raw), ..WriteOptions::default() };
@@ -233,7 +233,7 @@ fn setup(scene: &Scene) -> Setup {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("film.mp4");
     let options =
-        WriteOptions { speed: Some("ultrafast".into()), quality: Some(10), ..WriteOptions::default() };
+        WriteOptions { x264_preset: Some("ultrafast".into()), quality: Some(10), ..WriteOptions::default() };
     write(&Film::new(scene).unwrap(), &path, &options, &mut |_| Ok(())).unwrap();
     let settings = RunSettings { input: path.display().to_string(), ..Default::default() };
     find(&settings, &mut Silent).unwrap()

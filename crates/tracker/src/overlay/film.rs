@@ -121,7 +121,7 @@ pub fn film(
             time_base: TimeBase { numerator: 1, denominator: u64::from(settings.play_fps) },
             codec: Codec::H264,
             quality: Some(settings.quality),
-            speed: Some("veryfast".into()),
+            x264_preset: Some("veryfast".into()),
             gray_only: false,
         },
     )?;

@@ -12,6 +12,7 @@ mod norpix;
 mod open;
 mod opencv;
 mod options;
+mod orientation;
 mod raw;
 
 pub use crate::frame::{Ending, FrameSource, SourceInfo};

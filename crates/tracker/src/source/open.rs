@@ -55,8 +55,9 @@ pub fn open(name: &str, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
         return Ok(Box::new(images::SequenceSource::open(name, options)?));
     }
     let input = Input::of(name, options)?;
-    // FFmpeg would take its name for a pattern of others.
-    if matches!(input, Input::File(_)) && images::names::is_pattern(name) && images::names::is_picture(name) {
+    // FFmpeg would take its name for a pattern of others, and does not turn a picture as its tag says.
+    let is_ours = || images::names::is_pattern(name) || images::is_turned(&path(name));
+    if matches!(input, Input::File(_)) && images::names::is_picture(name) && is_ours() {
         return Ok(Box::new(images::SequenceSource::open_one(name, options)?));
     }
     if let Input::File(_) = &input {

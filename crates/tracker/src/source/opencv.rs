@@ -5,12 +5,16 @@
 //! frames (version 4.6 gives 0), so times are the container's. It turns films of 90 and 270 degrees the wrong way
 //! (version 4.6 again) and mirrors none, so pictures are turned here.
 
+use std::fs::File;
+use std::os::fd::AsRawFd;
+
 use opencv::core::Mat;
 use opencv::imgproc;
 use opencv::prelude::{MatTraitConst, MatTraitConstManual, VideoCaptureTrait, VideoCaptureTraitConst};
 use opencv::videoio::{self, VideoCapture};
 
-use super::ffmpeg::{FfmpegSource, Orientation, display_times};
+use super::ffmpeg::{FfmpegSource, display_times};
+use super::orientation::Orientation;
 use super::{Input, OpenOptions};
 use crate::error::{Error, Fault, Result};
 use crate::frame::{Ending, Frame, FrameSource, PixelFormat, SourceInfo};
@@ -82,8 +86,17 @@ fn open(name: &str, orientation: Orientation) -> Result<VideoCapture> {
                 .advice("Leave out " + Setting::Decoder.set_to("opencv")),
         )
     };
-    // With its protocol, a name is never taken for an address.
-    let mut capture = VideoCapture::from_file(format!("file:{name}").as_str(), videoio::CAP_FFMPEG)
+    // With its protocol, a name is never taken for an address. OpenCV takes names in UTF-8 only: a file of another name is
+    // opened here and named by its number, by which FFmpeg opens it again.
+    let path = crate::name::path(name);
+    let (address, _open) = match path.to_str() {
+        Some(name) => (format!("file:{name}"), None),
+        None => {
+            let file = File::open(&path).map_err(|e| failed(format!(" ({e})")))?;
+            (format!("file:/dev/fd/{}", file.as_raw_fd()), Some(file))
+        }
+    };
+    let mut capture = VideoCapture::from_file(&address, videoio::CAP_FFMPEG)
         .map_err(|e| failed(format!(" ({})", e.message)))?;
     if !capture.is_opened().unwrap_or(false) {
         return Err(failed(String::new()));

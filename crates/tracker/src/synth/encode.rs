@@ -47,7 +47,7 @@ pub struct VideoSettings {
     /// H.264: constant rate factor, 0 (no loss) to 51; MJPEG: quantiser, 1 (best) to 31. `None` is 12 and 2.
     pub quality: Option<u32>,
     /// H.264: x264's preset; `None` is `medium`.
-    pub speed: Option<String>,
+    pub x264_preset: Option<String>,
     /// H.264: a plane of brightness and nothing else. Smaller, but some players need colour planes, which otherwise
     /// are there and empty.
     pub gray_only: bool,
@@ -129,7 +129,7 @@ impl VideoWriter {
         match settings.codec {
             Codec::H264 => {
                 options.set("crf", &settings.quality.unwrap_or(12).to_string());
-                options.set("preset", settings.speed.as_deref().unwrap_or("medium"));
+                options.set("preset", settings.x264_preset.as_deref().unwrap_or("medium"));
                 // x264's output depends on its number of threads; a fixed one makes files repeatable.
                 options.set("threads", "2");
             }

@@ -156,7 +156,7 @@ fn video(film: &Film, path: &Path, options: &WriteOptions) -> Result<VideoWriter
             time_base: film.time_base(),
             codec,
             quality: options.quality,
-            speed: options.speed.clone(),
+            x264_preset: options.x264_preset.clone(),
             gray_only: options.gray_only,
         },
     )

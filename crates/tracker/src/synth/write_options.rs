@@ -16,7 +16,7 @@ pub struct WriteOptions {
     /// H.264: constant rate factor 0 to 51; MJPEG: 1 to 31; smaller is better and larger.
     pub quality: Option<u32>,
     /// H.264: x264's preset, e.g. `fast`.
-    pub speed: Option<String>,
+    pub x264_preset: Option<String>,
     /// H.264: no colour planes.
     pub gray_only: bool,
     /// Bits per pixel of a Photron recording: 8, 10, 12 or 16.
@@ -32,7 +32,7 @@ pub struct WriteOptions {
 }
 
 /// Presets of x264, the fastest first.
-pub const SPEEDS: [&str; 10] = [
+pub const X264_PRESETS: [&str; 10] = [
     "ultrafast",
     "superfast",
     "veryfast",
@@ -86,7 +86,7 @@ impl WriteOptions {
                 self.quality.is_some() && !h264 && form != Form::Video(Codec::Mjpeg),
                 "H.264 and MJPEG films",
             ),
-            (Setting::Speed, self.speed.is_some() && !h264, "H.264 films"),
+            (Setting::X264Preset, self.x264_preset.is_some() && !h264, "H.264 films"),
             (Setting::GrayOnly, self.gray_only && !h264, "H.264 films"),
             (Setting::Bits, self.bits.is_some() && form != Form::Photron, "Photron's .mraw"),
         ];
@@ -96,10 +96,10 @@ impl WriteOptions {
                     .advice("Leave it out, or choose another ending or codec"),
             ));
         }
-        match &self.speed {
-            Some(speed) if !SPEEDS.contains(&speed.as_str()) => Err(Error::Film(
-                Fault::of(Setting::Speed, format!("{speed:?} is not known"))
-                    .advice(format!("Give one of {}", SPEEDS.join(", "))),
+        match &self.x264_preset {
+            Some(name) if !X264_PRESETS.contains(&name.as_str()) => Err(Error::Film(
+                Fault::of(Setting::X264Preset, format!("{name:?} is not known"))
+                    .advice(format!("Give one of {}", X264_PRESETS.join(", "))),
             )),
             _ => Ok(()),
         }

@@ -19,6 +19,7 @@ mod mraw;
 mod mutants;
 mod norpix;
 mod opencv;
+mod orientation;
 mod pixels;
 mod program;
 mod tiffs;

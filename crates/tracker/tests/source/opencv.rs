@@ -208,3 +208,23 @@ fn every_fixture_that_opencv_reads_has_the_same_markers() {
     }
     assert_eq!((read, refused), (5, 1));
 }
+
+#[test]
+fn a_name_that_is_not_utf_8_is_read() {
+    use std::ffi::OsStr;
+    use std::os::unix::ffi::OsStrExt;
+    if !have_ffmpeg() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let film = encode(folder.path(), "a.mp4", 6, &["-c:v", "libx264", "-pix_fmt", "yuv420p"]);
+    // Latin-1, and a character that stands for a byte where names are carried as text.
+    for name in [&b"fl\xe4che.mp4"[..], b"\xff", "a\u{10ffe4}.mp4".as_bytes()] {
+        let path = folder.path().join(OsStr::from_bytes(name));
+        std::fs::copy(&film, &path).unwrap();
+        let options = OpenOptions { decoder: Decoder::Opencv, ..OpenOptions::default() };
+        let mut source = open(&tracker::name::text(&path), &options).unwrap();
+        assert_eq!(source.sample(3).unwrap().len(), 3, "{name:?}");
+        assert_eq!(read_all(&mut *source).len(), 6, "{name:?}");
+    }
+}

@@ -21,7 +21,7 @@ fn film(folder: &Path, name: &str, more: &[&str]) -> (PathBuf, String) {
     let (path, rig) = (folder.join(name), folder.join("rig.toml").display().to_string());
     let frames = COUNT.to_string();
     let mut arguments =
-        vec!["film", "--preset", "clean", "--frames", &frames, "-q", "--force", "--rig", &rig, "-o"];
+        vec!["film", "--preset", "clean", "--frame-count", &frames, "-q", "--force", "--rig", &rig, "-o"];
     arguments.push(path.to_str().unwrap());
     arguments.extend(more);
     let done = tracker(&arguments, Stdio::null());
@@ -61,7 +61,7 @@ fn a_program_may_send_its_film_through_a_pipe() {
         return;
     }
     let folder = tempfile::tempdir().unwrap();
-    let (path, rig) = film(folder.path(), "a.mp4", &["--speed", "ultrafast"]);
+    let (path, rig) = film(folder.path(), "a.mp4", &["--x264-preset", "ultrafast"]);
     let (_, direct) = track(path.to_str().unwrap(), &rig, &folder.path().join("a.csv"), Stdio::null());
     let mut sender = Command::new("ffmpeg")
         .args(["-v", "error", "-i"])

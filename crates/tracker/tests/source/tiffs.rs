@@ -221,6 +221,35 @@ fn pictures_behind_the_only_page_are_frames() {
 }
 
 #[test]
+fn pictures_behind_a_page_that_is_to_be_turned_are_turned() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.tif");
+    for bits in [8, 16] {
+        for (number, size) in [(3, (W, H)), (6, (H, W)), (8, (H, W))] {
+            let data: Vec<u8> = (0..3).flat_map(|k| packed(&values(k, bits), bits as usize, false)).collect();
+            let more =
+                vec![(270, Text("ImageJ=1.54f\nimages=3\nframes=3\n".into())), (274, Short(vec![number]))];
+            let page = with(tags(bits as u16, 1, 1), more);
+            std::fs::write(&path, Tiff::new(false).page(page, &data, data.len() / 3).bytes).unwrap();
+            let mut source = open(path.to_str().unwrap(), &OpenOptions::default()).unwrap();
+            for frame in source.sample(3).unwrap().into_iter().chain(read_all(&mut *source)) {
+                assert_eq!((frame.width as usize, frame.height as usize), size, "{bits} bit, {number}");
+                let (shown, stored) = (samples(&frame).unwrap(), values(frame.index as usize, bits));
+                for (at, value) in shown.iter().enumerate() {
+                    let (x, y) = (at % size.0, at / size.0);
+                    let from = match number {
+                        3 => (H - 1 - y) * W + W - 1 - x,
+                        6 => (H - 1 - x) * W + y,
+                        _ => x * W + W - 1 - y,
+                    };
+                    assert_eq!(*value, stored[from], "{bits} bit, {number}, ({x}, {y})");
+                }
+            }
+        }
+    }
+}
+
+#[test]
 fn channels_colours_and_white_zeros_behind_one_page() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.tif");

@@ -391,7 +391,18 @@ fn a_table_of_coarse_ticks_is_that_of_fine_ones() {
         let (to, rig) = (word(name), word("rig.toml"));
         tracker(
             &[
-                "film", "--preset", "clean", "--frames", "40", "--fps", fps, "-q", "--rig", &rig, "-o", &to,
+                "film",
+                "--preset",
+                "clean",
+                "--frame-count",
+                "40",
+                "--fps",
+                fps,
+                "-q",
+                "--rig",
+                &rig,
+                "-o",
+                &to,
                 "--force",
             ],
             &[status],

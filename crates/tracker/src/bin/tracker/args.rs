@@ -4,7 +4,7 @@
 
 use std::process::ExitCode;
 
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use crate::words::CommandLine;
 use crate::{check, completions, film, info, overlay, score, setup, track};
@@ -34,7 +34,7 @@ enum Command {
     #[command(after_help = "Examples:\n  tracker check drop.parquet")]
     Check(check::Args),
     #[command(
-        after_help = "Examples:\n  tracker film --preset clean --print-scene > scene.toml\n  tracker film scene.toml --frames 500 -o try.mp4 --truth truth.parquet"
+        after_help = "Examples:\n  tracker film --preset clean --print-scene > scene.toml\n  tracker film scene.toml --frame-count 500 -o try.mp4 --truth truth.parquet"
     )]
     Film(film::Args),
     #[command(after_help = "Examples:\n  tracker score try.parquet truth.parquet")]
@@ -46,6 +46,14 @@ enum Command {
 }
 
 impl Cli {
+    /// What was typed. A number below zero behind an option is its value, to be judged as such.
+    pub fn read() -> Result<Self, clap::Error> {
+        let takes_number = |a: &clap::Arg| a.get_action().takes_values() && !a.is_positional();
+        let signed = |a: clap::Arg| if takes_number(&a) { a.allow_negative_numbers(true) } else { a };
+        let command = Self::command().mut_subcommands(|c| c.mut_args(signed));
+        Self::from_arg_matches(&command.try_get_matches()?)
+    }
+
     /// The subcommand's way of writing settings and steps.
     pub fn front(&self) -> CommandLine {
         let subcommand = match self.command {

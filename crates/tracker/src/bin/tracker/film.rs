@@ -45,8 +45,8 @@ pub struct Args {
     #[arg(long)]
     seed: Option<u64>,
     /// Number of frames; replaces the scene's.
-    #[arg(long, value_name = "N")]
-    frames: Option<u64>,
+    #[arg(long, alias = "frames", value_name = "N")]
+    frame_count: Option<u64>,
     /// Frames per second; replaces the scene's.
     #[arg(long, value_name = "F")]
     fps: Option<f64>,
@@ -57,8 +57,8 @@ pub struct Args {
     #[arg(long, value_name = "Q", requires = "output")]
     quality: Option<u32>,
     /// H.264: x264's preset, e.g. ultrafast, medium, veryslow.
-    #[arg(long, value_name = "PRESET", requires = "output")]
-    speed: Option<String>,
+    #[arg(long, alias = "speed", value_name = "PRESET", requires = "output")]
+    x264_preset: Option<String>,
     /// H.264: no colour planes; smaller, but not every player shows it.
     #[arg(long, alias = "gray", requires = "output")]
     gray_only: bool,
@@ -96,7 +96,7 @@ impl Args {
             (None, None) => anyhow::bail!("a scene is missing. Give one, or --preset"),
         };
         scene.seed = self.seed.unwrap_or(scene.seed);
-        scene.frames = self.frames.unwrap_or(scene.frames);
+        scene.frames = self.frame_count.unwrap_or(scene.frames);
         scene.rate_hz = self.fps.unwrap_or(scene.rate_hz);
         Ok(scene)
     }
@@ -133,7 +133,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let options = WriteOptions {
         codec: args.codec(),
         quality: args.quality,
-        speed: args.speed.clone(),
+        x264_preset: args.x264_preset.clone(),
         gray_only: args.gray_only,
         bits: args.bits,
         truth: args.truth.clone(),

@@ -19,11 +19,10 @@ mod words;
 
 use std::process::ExitCode;
 
-use clap::Parser;
 use tracker::error::Error;
 
 fn main() -> ExitCode {
-    let cli = match args::Cli::try_parse() {
+    let cli = match args::Cli::read() {
         Ok(cli) => cli,
         Err(error) => {
             let Some(line) = refusal::line(&error) else { error.exit() };

@@ -42,7 +42,7 @@ pub struct Args {
     decode: DecodeArgs,
     #[command(flatten)]
     interlaced: InterlacedArgs,
-    /// Replace the film if it is there already
+    /// Replace files that are there already
     #[arg(long)]
     force: bool,
     /// Print no progress

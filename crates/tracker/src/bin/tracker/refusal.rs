@@ -1,6 +1,7 @@
 //! A command line that cannot be understood, in one line: what is wrong, and the choices or the nearest word.
 
 use std::error::Error;
+use std::num::{IntErrorKind, ParseFloatError, ParseIntError};
 
 use clap::CommandFactory;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
@@ -34,7 +35,7 @@ pub fn line(error: &clap::Error) -> Option<String> {
             Some(format!("{argument}: {value:?} is not known. Give {known}"))
         }
         ErrorKind::ValueValidation => {
-            let why = error.source().map(ToString::to_string).unwrap_or_default();
+            let why = error.source().map(why).unwrap_or_default();
             Some(format!("{argument}: {value:?} cannot be ({why})"))
         }
         ErrorKind::UnknownArgument => {
@@ -51,6 +52,17 @@ pub fn line(error: &clap::Error) -> Option<String> {
         }
         _ => None,
     }
+}
+
+/// Why a value cannot be.
+fn why(source: &(dyn Error + 'static)) -> String {
+    let whole = source.downcast_ref::<ParseIntError>().map(|e| match e.kind() {
+        IntErrorKind::PosOverflow => "the number is too large".to_owned(),
+        // No option takes whole numbers below zero.
+        _ => "expected a whole number of 0 or more".to_owned(),
+    });
+    let number = || source.is::<ParseFloatError>().then(|| "expected a number".to_owned());
+    whole.or_else(number).unwrap_or_else(|| source.to_string())
 }
 
 fn unknown_option(option: &str, near: &[String]) -> String {

@@ -38,7 +38,7 @@ pub struct Args {
     /// Go on where an earlier run stopped
     #[arg(long, conflicts_with = "force")]
     resume: bool,
-    /// Replace the table if it is there already
+    /// Replace files that are there already
     #[arg(long)]
     force: bool,
     /// In a CSV put a ' before names that a spreadsheet would take for a formula; readers of ours take it off again

@@ -7,11 +7,12 @@ use ffmpeg_next::ffi;
 use super::claims::claims;
 use super::codec_name;
 use super::demux::Demuxer;
-use super::layout::{Layout, Orientation};
+use super::layout::Layout;
 use crate::error::{Error, Fault, Result};
 use crate::frame::{RateOrigin, SourceInfo, TimeBase};
 use crate::message::Message;
 use crate::pixel_aspect::PixelAspect;
+use crate::source::orientation::Orientation;
 use crate::source::{OpenOptions, clock};
 
 /// What is known of a recording before any of it is decoded, and how its pictures are to be turned.
@@ -160,9 +161,7 @@ fn turn(demuxer: &Demuxer, warnings: &mut Vec<Message>) -> Orientation {
     let orientation = Orientation::from_matrix(at(0), at(1), at(3), at(4));
     match orientation {
         Some(o) => {
-            if let Some(words) = o.words() {
-                warnings.push(format!("turned as the file says: {words}").into());
-            }
+            warnings.extend(o.warning());
             o
         }
         None => {

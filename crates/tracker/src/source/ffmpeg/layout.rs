@@ -1,6 +1,6 @@
 //! Turns a decoder's picture into one plane of brightness: lent where it can be, converted once where not.
 //!
-//! Owns: [`Layout`], [`Orientation`]. Must not: change a value where the recording has a luma plane.
+//! Owns: [`Layout`]. Must not: change a value where the recording has a luma plane.
 
 use std::ffi::CStr;
 use std::ptr;
@@ -10,6 +10,7 @@ use ffmpeg_next::ffi;
 use super::decode::Picture;
 use crate::error::{Error, Fault, Result};
 use crate::frame::{Bytes, PixelFormat};
+use crate::source::orientation::Orientation;
 
 /// Weights of red, green and blue in brightness (ITU-R BT.601), over 2^14; their sum is 2^14, so gray stays
 /// what it is. OpenCV's `cvtColor` has the same.
@@ -273,94 +274,9 @@ impl Bytes for Lent {
     }
 }
 
-/// How the picture must be turned to be seen as it was filmed: first transposed, then mirrored.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) struct Orientation {
-    /// Rows become columns.
-    pub transposed: bool,
-    /// Left and right are exchanged, after that.
-    pub mirrored_x: bool,
-    /// Top and bottom are exchanged, after that.
-    pub mirrored_y: bool,
-}
-
-impl Orientation {
-    /// From the first two columns of a display matrix, row by row: a point (x, y) is shown at
-    /// (a x + c y, b x + d y). `None` for turns that are not by a right angle.
-    pub(super) fn from_matrix(a: i32, b: i32, c: i32, d: i32) -> Option<Self> {
-        match (a, b, c, d) {
-            (a, 0, 0, d) if a != 0 && d != 0 => {
-                Some(Self { transposed: false, mirrored_x: a < 0, mirrored_y: d < 0 })
-            }
-            (0, b, c, 0) if b != 0 && c != 0 => {
-                Some(Self { transposed: true, mirrored_x: c < 0, mirrored_y: b < 0 })
-            }
-            _ => None,
-        }
-    }
-
-    /// Width and height after turning.
-    pub(crate) fn size(self, width: u32, height: u32) -> (u32, u32) {
-        if self.transposed { (height, width) } else { (width, height) }
-    }
-
-    /// In words, clockwise; `None` if nothing is turned.
-    pub(super) fn words(self) -> Option<&'static str> {
-        match (self.transposed, self.mirrored_x, self.mirrored_y) {
-            (false, false, false) => None,
-            (false, true, true) => Some("180 degrees"),
-            (true, true, false) => Some("90 degrees clockwise"),
-            (true, false, true) => Some("90 degrees counter-clockwise"),
-            (false, true, false) => Some("mirrored left to right"),
-            (false, false, true) => Some("mirrored top to bottom"),
-            (true, false, false) => Some("mirrored at its diagonal"),
-            (true, true, true) => Some("mirrored at its other diagonal"),
-        }
-    }
-
-    /// The turned samples and their row length in pixels.
-    pub(crate) fn apply(
-        self,
-        samples: Vec<u8>,
-        width: usize,
-        height: usize,
-        bytes: usize,
-    ) -> (Vec<u8>, usize) {
-        if self == Self::default() {
-            return (samples, width);
-        }
-        let (w, h) = if self.transposed { (height, width) } else { (width, height) };
-        let mut turned = vec![0u8; samples.len()];
-        for y in 0..h {
-            let v = if self.mirrored_y { h - 1 - y } else { y };
-            for x in 0..w {
-                let u = if self.mirrored_x { w - 1 - x } else { x };
-                let from = if self.transposed { (u * width + v) * bytes } else { (v * width + u) * bytes };
-                let to = (y * w + x) * bytes;
-                turned[to..to + bytes].copy_from_slice(&samples[from..from + bytes]);
-            }
-        }
-        (turned, w)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn turns_move_every_pixel_to_its_place() {
-        // 1 2 3
-        // 4 5 6
-        let picture = vec![1, 2, 3, 4, 5, 6];
-        let turn = |transposed, mirrored_x, mirrored_y| {
-            Orientation { transposed, mirrored_x, mirrored_y }.apply(picture.clone(), 3, 2, 1)
-        };
-        assert_eq!(turn(false, true, true), (vec![6, 5, 4, 3, 2, 1], 3));
-        assert_eq!(turn(true, true, false), (vec![4, 1, 5, 2, 6, 3], 2), "clockwise");
-        assert_eq!(turn(true, false, true), (vec![3, 6, 2, 5, 1, 4], 2), "counter-clockwise");
-        assert_eq!(turn(true, false, false), (vec![1, 4, 2, 5, 3, 6], 2));
-    }
 
     #[test]
     fn gray_stays_what_it_is_when_weighted() {

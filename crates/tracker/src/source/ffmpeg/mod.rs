@@ -24,7 +24,6 @@ mod stamps;
 mod structure;
 mod words;
 
-pub(crate) use layout::Orientation;
 pub use source::FfmpegSource;
 pub(crate) use stamps::display_times;
 use words::{codec_name, message};

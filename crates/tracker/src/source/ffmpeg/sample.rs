@@ -7,10 +7,11 @@ use ffmpeg_next::ffi;
 use super::decode::{Decoder, Picture, Received};
 use super::demux::{Demuxer, Packet, Read};
 use super::fields::{self, FieldOrder};
-use super::layout::{Layout, Orientation};
+use super::layout::Layout;
 use super::source::{FfmpegSource, Shared};
 use crate::error::{Error, Fault, Result};
 use crate::frame::{Frame, SourceInfo};
+use crate::source::orientation::Orientation;
 use crate::source::{Interlaced, cores};
 
 /// Most bytes of a pipe's first frames that are kept to be handed out again.

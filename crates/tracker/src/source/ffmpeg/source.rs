@@ -12,13 +12,16 @@ use super::demux::{Demuxer, Packet};
 use super::describe::{describe, step, stream_base};
 use super::feed::{Feed, Given};
 use super::fields::{self, FieldOrder};
-use super::layout::{Layout, Orientation};
+use super::layout::Layout;
 use super::lost::Lost;
 use super::order::{Order, Sent};
 use super::stamps::{Stamps, Survey, display_times};
-use crate::error::{Error, Fault, Result};
+use crate::error::{Error, Fault, Place, Result};
 use crate::frame::{Bytes, Ending, Frame, FrameSource, SourceInfo};
 use crate::gaps::Gaps;
+use crate::message::Setting;
+use crate::pixel_aspect::PixelAspect;
+use crate::source::orientation::Orientation;
 use crate::source::{Input, Interlaced, OpenOptions};
 
 /// A frame on its way out: its time, and its plane with the bytes of a row.
@@ -40,6 +43,8 @@ pub struct FfmpegSource {
     pub(super) layout: Layout,
     pub(super) orientation: Orientation,
     pub(super) interlaced: Interlaced,
+    /// Width to height of a pixel by the first picture; `None` before it.
+    coded_aspect: Option<PixelAspect>,
     pub(super) stamps: Stamps,
     /// Ticks from frame to frame by the rate that the container claims; 1 if it claims none.
     pub(super) step: i64,
@@ -139,6 +144,7 @@ impl FfmpegSource {
             layout,
             orientation,
             interlaced: options.interlaced,
+            coded_aspect: None,
             stamps: Stamps::new(unstamped, step),
             step,
             order: Order::new(if unstamped && !intra_only { REORDER } else { 0 }),
@@ -278,6 +284,7 @@ impl FfmpegSource {
                 if let (Interlaced::Refuse, Some(order)) = (self.interlaced, FieldOrder::of(picture.get())) {
                     return Err(fields::refusal(&self.info.name, order));
                 }
+                self.check_aspect(&picture)?;
                 self.take(picture);
             }
             Received::Hungry if self.draining => self.finish(),
@@ -292,6 +299,34 @@ impl FfmpegSource {
             }
         }
         Ok(())
+    }
+
+    /// Refuses pixels of another shape than those before, unless the user says what is true of all.
+    fn check_aspect(&mut self, picture: &Picture) -> Result<()> {
+        if picture.is_damaged() || !self.info.pixel_aspect_origin.is_recording() {
+            return Ok(());
+        }
+        let told = picture.get().sample_aspect_ratio;
+        let [width, height] = [told.num, told.den].map(|n| u64::try_from(n).unwrap_or(0));
+        let aspect = PixelAspect::new(width, height).unwrap_or_default();
+        let before = *self.coded_aspect.get_or_insert(aspect);
+        if before.agrees(aspect) {
+            return Ok(());
+        }
+        let index = self.next_index + (self.ready.len() + self.held.len()) as u64;
+        Err(Error::Source(
+            Fault::new(
+                &self.info.name,
+                format!("its pixels are {aspect} (width:height) from here on, and {before} before"),
+            )
+            .at(Place::Frame(index))
+            .advice(
+                "Give the frames of one shape with "
+                    + Setting::Frames
+                    + ", or what is true of all with "
+                    + Setting::PixelAspect,
+            ),
+        ))
     }
 
     /// Puts a picture into the queue, and before it frames without a plane for those that will not come.

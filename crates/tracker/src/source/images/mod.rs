@@ -3,6 +3,7 @@
 //! Owns: [`SequenceSource`], [`StackSource`].
 
 pub mod names;
+mod orientation_tag;
 mod picture;
 pub mod picture_file;
 mod pixel_size;
@@ -12,5 +13,6 @@ mod stack;
 mod tiff_layout;
 mod tiff_page;
 
+pub(crate) use orientation_tag::is_turned;
 pub use sequence::SequenceSource;
 pub use stack::StackSource;

@@ -1,10 +1,13 @@
 //! Holds a decoded picture and turns it into a frame.
 //!
-//! Owns: [`Picture`]. Must not: decode.
+//! Owns: [`Picture`], [`Alike`]. Must not: decode.
 
-use crate::error::Result;
+use super::pixel_size::{self, PixelSize};
+use crate::error::{Error, Fault, Place, Result};
 use crate::frame::{Frame, PixelFormat, RateOrigin, SourceInfo, TimeBase};
 use crate::message::{Message, Setting};
+use crate::pixel_aspect::PixelAspect;
+use crate::source::orientation::Orientation;
 use crate::source::{OpenOptions, clock};
 
 /// A decoded picture.
@@ -20,6 +23,57 @@ pub struct Picture {
     pub samples: Vec<u8>,
     /// What the samples were before they were made brightness, if they were anything else.
     pub converted_from: Option<String>,
+    /// How it was turned, as its file says.
+    pub(crate) orientation: Orientation,
+    /// How large its pixels are, once it is turned, as its file says.
+    pub(crate) pixel_size: Option<PixelSize>,
+}
+
+impl Picture {
+    /// As a file says that it is to be looked at.
+    #[must_use]
+    pub(super) fn shown(self, orientation: Orientation, pixel_size: Option<PixelSize>) -> Self {
+        let sample_bytes = if self.depth_bits > 8 { 2 } else { 1 };
+        let (width, height) = (self.width as usize, self.height as usize);
+        if self.samples.len() < width * height * sample_bytes {
+            return self;
+        }
+        let (samples, _) = orientation.apply(self.samples, width, height, sample_bytes);
+        let (width, height) = orientation.size(self.width, self.height);
+        let pixel_size = pixel_size.map(|size| if orientation.transposed { size.turned() } else { size });
+        Self { width, height, samples, orientation, pixel_size, ..self }
+    }
+}
+
+/// What all pictures of a recording must say alike, or markers would jump.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Alike {
+    pub orientation: Orientation,
+    /// Width to height of a pixel; `None` where the user says it.
+    pub aspect: Option<PixelAspect>,
+}
+
+impl Alike {
+    /// # Errors
+    /// [`Error::Source`] if the picture of frame `index` is to be turned otherwise than the others, or has other pixels.
+    pub(super) fn check(&self, name: &str, index: u64, picture: &Picture) -> Result<()> {
+        let fault = |problem: String| Fault::new(name, problem).at(Place::Frame(index));
+        if picture.orientation != self.orientation {
+            let [own, others] = [picture.orientation, self.orientation].map(Orientation::words_or_none);
+            return Err(Error::Source(
+                fault(format!("its tag Orientation says {own}, that of the others {others}"))
+                    .advice("Write the same tag into all pictures, or none"),
+            ));
+        }
+        let own = pixel_size::aspect(picture.pixel_size, &mut Vec::new());
+        match self.aspect {
+            Some(others) if !others.agrees(own) => Err(Error::Source(
+                fault(format!("its pixels are {own} (width:height), those of the others {others}"))
+                    .advice("Say what is true of all with " + Setting::PixelAspect),
+            )),
+            _ => Ok(()),
+        }
+    }
 }
 
 /// Time base, rate and its origin for pictures, which have no times of their own.

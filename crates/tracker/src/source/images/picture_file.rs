@@ -14,7 +14,8 @@ use tiff::decoder::Decoder;
 use super::picture::Picture;
 use super::planes::are_behind;
 use super::tiff_layout::is_reduced;
-use super::tiff_page;
+use super::{orientation_tag, pixel_size, tiff_page};
+use crate::source::orientation::Orientation;
 
 /// Reads a picture file; an error is a clause without a full stop.
 pub fn read(path: &Path) -> Result<Picture, String> {
@@ -29,7 +30,9 @@ pub fn read(path: &Path) -> Result<Picture, String> {
         file.seek(SeekFrom::Start(0)).map_err(|e| e.to_string())?;
         let size = file.metadata().map_err(|e| e.to_string())?.len();
         let mut decoder = Decoder::new(BufReader::new(file)).map_err(|e| e.to_string())?;
-        let picture = tiff_page::read(&mut decoder)?;
+        let (orientation, size_of_pixel) =
+            (orientation_tag::of_tiff(&mut decoder), pixel_size::of_tiff(&mut decoder));
+        let picture = tiff_page::read(&mut decoder)?.shown(orientation, size_of_pixel);
         let several = || "it holds several pictures, and in a folder each file is one".to_owned();
         if !decoder.more_images() && are_behind(&mut decoder, size) {
             return Err(several());
@@ -45,8 +48,12 @@ pub fn read(path: &Path) -> Result<Picture, String> {
     believable(head, &mut file)?;
     // From memory: a name for OpenCV would have to be UTF-8.
     let bytes = std::fs::read(path).map_err(|e| format!("it cannot be read ({e})"))?;
+    let (orientation, size_of_pixel) = (orientation_tag::of_file(&bytes), pixel_size::of_png(&bytes));
     let bytes = Vector::<u8>::from_slice(&bytes);
-    gray(imgcodecs::imdecode(&bytes, imgcodecs::IMREAD_UNCHANGED).map_err(|e| short(&e.message))?)
+    // Unchanged, and so not turned.
+    let picture =
+        gray(imgcodecs::imdecode(&bytes, imgcodecs::IMREAD_UNCHANGED).map_err(|e| short(&e.message))?)?;
+    Ok(picture.shown(orientation, size_of_pixel))
 }
 
 /// Decodes a JPEG picture that lies in memory; an error is a clause without a full stop.
@@ -86,7 +93,15 @@ fn gray(color: opencv::core::Mat) -> Result<Picture, String> {
     let size = |n: i32| u32::try_from(n).map_err(|e| e.to_string());
     // OpenCV's 16-bit samples are in this machine's order; all machines that we are built for are little-endian.
     let samples = gray.data_bytes().map_err(|e| short(&e.message))?.to_vec();
-    Ok(Picture { width: size(gray.cols())?, height: size(gray.rows())?, depth_bits, samples, converted_from })
+    Ok(Picture {
+        width: size(gray.cols())?,
+        height: size(gray.rows())?,
+        depth_bits,
+        samples,
+        converted_from,
+        orientation: Orientation::default(),
+        pixel_size: None,
+    })
 }
 
 /// Refuses a header that promises more pixels than the file can hold, before anything is allocated.

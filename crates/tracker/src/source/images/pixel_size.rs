@@ -1,10 +1,8 @@
 //! Computes the pixel aspect from the resolutions that a picture file says.
 //!
-//! Owns: [`of_file`], [`of_tiff`], [`aspect`]. Must not: read samples.
+//! Owns: [`PixelSize`], [`of_png`], [`of_tiff`], [`aspect`]. Must not: read samples.
 
-use std::fs::File;
-use std::io::{BufReader, Read, Seek, SeekFrom};
-use std::path::Path;
+use std::io::{Read, Seek};
 
 use tiff::decoder::Decoder;
 use tiff::decoder::ifd::Value;
@@ -15,10 +13,18 @@ use crate::pixel_aspect::PixelAspect;
 
 /// Width and height of a pixel, in units of their own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct PixelSize {
+pub(crate) struct PixelSize {
     sides: [u64; 2],
     /// Whether they may as well be the other way round.
     doubtful: bool,
+}
+
+impl PixelSize {
+    /// Of the picture turned by a quarter.
+    pub(super) fn turned(self) -> Self {
+        let [width, height] = self.sides;
+        Self { sides: [height, width], ..self }
+    }
 }
 
 /// Width to height of a pixel by what a picture says of it, where that can be believed.
@@ -37,18 +43,6 @@ pub(super) fn aspect(said: Option<PixelSize>, warnings: &mut Vec<Message>) -> Pi
     PixelAspect::SQUARE
 }
 
-/// What a TIFF or PNG file says.
-pub(super) fn of_file(path: &Path) -> Option<PixelSize> {
-    let mut file = File::open(path).ok()?;
-    let mut start = [0; 8];
-    file.read_exact(&mut start).ok()?;
-    if &start == b"\x89PNG\r\n\x1a\n" {
-        return of_png(&mut file);
-    }
-    file.seek(SeekFrom::Start(0)).ok()?;
-    of_tiff(&mut Decoder::new(BufReader::new(file)).ok()?)
-}
-
 /// By the resolutions of a page, which are pixels for one length.
 pub(super) fn of_tiff<R: Read + Seek>(decoder: &mut Decoder<R>) -> Option<PixelSize> {
     let mut resolution = |tag| match decoder.find_tag(tag) {
@@ -63,24 +57,22 @@ pub(super) fn of_tiff<R: Read + Seek>(decoder: &mut Decoder<R>) -> Option<PixelS
 /// Chunks of a PNG file before its pixels that are looked at, at most.
 const CHUNKS: usize = 64;
 
-/// By the chunk `pHYs` of a PNG file behind its first eight bytes, which has pixels for one length and then its unit.
-/// Without one only their ratio counts, for which FFmpeg writes width and height of a pixel.
-fn of_png(file: &mut File) -> Option<PixelSize> {
-    let number = |b: &[u8]| b.first_chunk().map_or(0, |b| u32::from_be_bytes(*b));
+/// By the chunk `pHYs` of a PNG file, which has pixels for one length and then its unit. Without one only their ratio
+/// counts, for which FFmpeg writes width and height of a pixel.
+pub(super) fn of_png(bytes: &[u8]) -> Option<PixelSize> {
+    let number = |at: usize| bytes.get(at..)?.first_chunk().map(|b| u32::from_be_bytes(*b));
+    let mut at = bytes.starts_with(b"\x89PNG\r\n\x1a\n").then_some(8)?;
     for _ in 0..CHUNKS {
-        let mut head = [0; 8];
-        file.read_exact(&mut head).ok()?;
-        match &head[4..] {
+        let data = at + 8;
+        match bytes.get(at + 4..data)? {
             b"pHYs" => {
-                let mut value = [0; 9];
-                file.read_exact(&mut value).ok()?;
-                let sides = [number(&value[4..]).into(), number(&value).into()];
-                return Some(PixelSize { sides, doubtful: value[8] == 0 });
+                let sides = [number(data + 4)?.into(), number(data)?.into()];
+                return Some(PixelSize { sides, doubtful: *bytes.get(data + 8)? == 0 });
             }
             b"IDAT" => return None,
             // A checksum follows each chunk.
-            _ => file.seek(SeekFrom::Current(i64::from(number(&head)) + 4)).ok()?,
-        };
+            _ => at = data.checked_add(number(at)? as usize)?.checked_add(4)?,
+        }
     }
     None
 }

@@ -7,11 +7,12 @@ use std::path::PathBuf;
 
 use rayon::prelude::*;
 
-use super::picture::{Picture, format, frame, rate};
+use super::picture::{Alike, Picture, format, frame, rate};
 use super::{names, picture_file, pixel_size};
 use crate::error::{Error, Fault, Result};
 use crate::frame::{Ending, Frame, FrameSource, RateClaims, SourceInfo};
 use crate::message::Message;
+use crate::name::text;
 use crate::source::OpenOptions;
 
 /// Bytes of pictures decoded ahead at most.
@@ -24,6 +25,7 @@ const LOOKED_FOR: usize = 16;
 /// Picture files in the order of their numbers.
 pub struct SequenceSource {
     info: SourceInfo,
+    alike: Alike,
     files: Vec<Option<PathBuf>>,
     next_file: usize,
     batch: usize,
@@ -72,6 +74,11 @@ fn size_of_most<'a>(
     Ok((picture, path))
 }
 
+/// A file and the picture in it, or what is wrong; `None` where the numbering leaves one out.
+fn read(file: &Option<PathBuf>) -> Option<(&PathBuf, std::result::Result<Picture, String>)> {
+    file.as_ref().map(|path| (path, picture_file::read(path)))
+}
+
 impl SequenceSource {
     /// Opens a folder or a pattern.
     ///
@@ -91,7 +98,12 @@ impl SequenceSource {
         let ending = path.extension().map_or(String::new(), |e| e.to_string_lossy().to_lowercase());
         let size_bytes = files.iter().flatten().map(|f| std::fs::metadata(f).map_or(0, |m| m.len())).sum();
         let (pixel_aspect, pixel_aspect_origin) =
-            options.aspect(pixel_size::aspect(pixel_size::of_file(path), &mut warnings));
+            options.aspect(pixel_size::aspect(first.pixel_size, &mut warnings));
+        warnings.extend(first.orientation.warning());
+        let alike = Alike {
+            orientation: first.orientation,
+            aspect: Some(pixel_aspect).filter(|_| pixel_aspect_origin.is_recording()),
+        };
         let info = SourceInfo {
             name: name.to_owned(),
             container: "pictures".into(),
@@ -115,6 +127,7 @@ impl SequenceSource {
         let batch = (AHEAD_BYTES / first.samples.len().max(1)).clamp(1, 2 * threads::count());
         Ok(Self {
             info,
+            alike,
             files,
             next_file: 0,
             batch,
@@ -137,18 +150,40 @@ impl SequenceSource {
     }
 
     /// Decodes the next few pictures side by side.
-    fn read_batch(&mut self) {
+    ///
+    /// # Errors
+    /// [`Error::Source`] if one is to be looked at otherwise than the others.
+    fn read_batch(&mut self) -> Result<()> {
         let end = (self.next_file + self.batch).min(self.files.len());
         let range = self.next_file..end;
-        let read = |path: &Option<PathBuf>| path.as_ref().map(|p| picture_file::read(p));
         let files = &self.files[range.clone()];
         let pictures: Vec<_> = threads::install(|| files.par_iter().map(read).collect());
         for (index, picture) in range.zip(pictures) {
-            let picture =
-                picture.and_then(|p| p.map_err(|e| self.damaged.push(format!("picture {index}: {e}"))).ok());
+            let picture = match picture {
+                Some((path, Ok(picture))) => {
+                    if self.is_one_of_them(&picture) {
+                        self.alike.check(&text(path), index as u64, &picture)?;
+                    }
+                    Some(picture)
+                }
+                Some((_, Err(e))) => {
+                    self.damaged.push(format!("picture {index}: {e}"));
+                    None
+                }
+                None => None,
+            };
             self.ready.push_back(frame(&self.info, index as u64, picture));
         }
         self.next_file = end;
+        Ok(())
+    }
+
+    /// Whether a picture has the size of the others as it is stored; else its frame stays empty.
+    fn is_one_of_them(&self, picture: &Picture) -> bool {
+        let [own, others] = [(picture.width, picture.height), (self.info.width, self.info.height)];
+        own == others
+            || picture.orientation.transposed != self.alike.orientation.transposed
+                && own == (others.1, others.0)
     }
 
     /// At the end: if the last pictures cannot be read, the recording ended before them.
@@ -173,7 +208,7 @@ impl FrameSource for SequenceSource {
     fn next_frame(&mut self) -> Result<Option<Frame>> {
         // A frame without pixels waits until it is known whether a good one follows.
         while self.next_file < self.files.len() && self.ready.iter().all(|f| f.plane.is_none()) {
-            self.read_batch();
+            self.read_batch()?;
             if self.next_file == self.files.len() {
                 self.trim();
             }

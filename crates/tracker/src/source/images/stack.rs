@@ -5,20 +5,22 @@ use std::io::BufReader;
 
 use tiff::decoder::Decoder;
 
-use super::picture::{Picture, format, frame, rate};
+use super::picture::{Alike, Picture, format, frame, rate};
 use super::planes::{self, Planes};
 use super::tiff_layout::{Layout, is_reduced};
-use super::{pixel_size, tiff_page};
+use super::{orientation_tag, pixel_size, tiff_page};
 use crate::error::{Error, Fault, Result};
 use crate::frame::{Ending, Frame, FrameSource, RateClaims, SourceInfo};
 use crate::message::Message;
 use crate::name::path;
 use crate::source::OpenOptions;
+use crate::source::orientation::Orientation;
 use crate::source::raw::RawFrames;
 
 /// A multi-page TIFF.
 pub struct StackSource {
     info: SourceInfo,
+    alike: Alike,
     pictures: Pictures,
     next: u64,
     ending: Ending,
@@ -83,14 +85,20 @@ impl StackSource {
         warnings.extend(planes::channels_of_ome(&mut pages.decoder, &layout).map(Message::from));
         let size_bytes = std::fs::metadata(path(name)).ok().map(|m| m.len());
         let (time_base, rate_hz, rate_origin) = rate(options, &mut warnings)?;
+        let orientation = orientation_tag::of_tiff(&mut pages.decoder);
+        warnings.extend(orientation.warning());
         let said = pixel_size::of_tiff(&mut pages.decoder);
+        let said = said.map(|size| if orientation.transposed { size.turned() } else { size });
         let (pixel_aspect, pixel_aspect_origin) = options.aspect(pixel_size::aspect(said, &mut warnings));
+        let aspect = Some(pixel_aspect).filter(|_| pixel_aspect_origin.is_recording());
+        let alike = Alike { orientation, aspect };
+        let (width, height) = orientation.size(layout.width, layout.height);
         let mut info = SourceInfo {
             name: name.to_owned(),
             container: "TIFF".into(),
             codec: format!("{} bit pages", layout.bits),
-            width: layout.width,
-            height: layout.height,
+            width,
+            height,
             pixel_aspect,
             pixel_aspect_origin,
             format: format(layout.bits),
@@ -130,6 +138,7 @@ impl StackSource {
             let raw = RawFrames::new(file, name, planes.stored);
             return Ok(Self {
                 info,
+                alike,
                 pictures: Pictures::Planes(raw, planes),
                 next: 0,
                 ending: Ending::Complete,
@@ -140,6 +149,7 @@ impl StackSource {
         info.converted_from = first.converted_from;
         Ok(Self {
             info,
+            alike,
             pictures: Pictures::Pages(Some(Box::new(Pages::open(name)?))),
             next: 0,
             ending: Ending::Complete,
@@ -150,7 +160,7 @@ impl StackSource {
         if next > 0 && !pages.turn()? {
             return Ok(None);
         }
-        tiff_page::read(&mut pages.decoder).map(Some)
+        page(pages).map(Some)
     }
 
     /// The end that comes before all that the description declares.
@@ -168,9 +178,25 @@ impl StackSource {
 
     fn plane(&self, raw: &RawFrames, planes: &Planes, index: u64, copy: bool) -> Result<Frame> {
         let at = planes.place(index);
+        let orientation = self.alike.orientation;
+        if orientation != Orientation::default() {
+            let stored = raw.copy(index, at, planes.bytes)?;
+            let (width, height) = orientation.size(self.info.width, self.info.height);
+            let sample_bytes = if planes.depth_bits > 8 { 2 } else { 1 };
+            let (turned, _) =
+                orientation.apply(stored.bytes().to_vec(), width as usize, height as usize, sample_bytes);
+            return Ok(Frame { plane: Some(Box::new(turned)), ..frame(&self.info, index, None) });
+        }
         let plane = if copy { raw.copy(index, at, planes.bytes)? } else { raw.lend(index, at, planes.bytes) };
         Ok(Frame { plane: Some(plane), ..frame(&self.info, index, None) })
     }
+}
+
+/// The page at which a file stands, turned as it says.
+fn page(pages: &mut Pages) -> std::result::Result<Picture, String> {
+    let decoder = &mut pages.decoder;
+    let (orientation, size) = (orientation_tag::of_tiff(decoder), pixel_size::of_tiff(decoder));
+    Ok(tiff_page::read(decoder)?.shown(orientation, size))
 }
 
 fn decoder(name: &str) -> Result<Decoder<BufReader<File>>> {
@@ -198,6 +224,11 @@ impl FrameSource for StackSource {
         };
         match read {
             Ok(Some(picture)) => {
+                if (picture.width, picture.height) == (self.info.width, self.info.height)
+                    || picture.orientation != self.alike.orientation
+                {
+                    self.alike.check(&self.info.name, self.next, &picture)?;
+                }
                 self.next += 1;
                 return Ok(Some(frame(&self.info, self.next - 1, Some(picture))));
             }
@@ -243,7 +274,7 @@ impl FrameSource for StackSource {
                 break;
             }
             if wanted.next_if_eq(&at).is_some() {
-                let picture = tiff_page::read(&mut reader.decoder).ok();
+                let picture = page(&mut reader).ok();
                 frames.extend(Some(frame(&self.info, at, picture)).filter(|f| f.plane.is_some()));
             }
         }

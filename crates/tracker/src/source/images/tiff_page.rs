@@ -11,6 +11,7 @@ use tiff::tags::Tag;
 
 use super::picture::Picture;
 use super::tiff_layout::{Layout, PALETTE};
+use crate::source::orientation::Orientation;
 use crate::source::raw::brightness;
 
 /// Reads the page at which a TIFF decoder stands.
@@ -82,6 +83,8 @@ fn own<R: Read + Seek>(decoder: &mut Decoder<R>, layout: &Layout) -> Result<Pict
         depth_bits: bits.max(8),
         samples,
         converted_from: what,
+        orientation: Orientation::default(),
+        pixel_size: None,
     })
 }
 
@@ -131,7 +134,15 @@ fn by_library<R: Read + Seek>(decoder: &mut Decoder<R>, layout: &Layout) -> Resu
     };
     let converted_from =
         converted_from.or_else(|| (layout.bits < 8).then(|| format!("{} bit, spread over 8", layout.bits)));
-    Ok(Picture { width: layout.width, height: layout.height, depth_bits, samples, converted_from })
+    Ok(Picture {
+        width: layout.width,
+        height: layout.height,
+        depth_bits,
+        samples,
+        converted_from,
+        orientation: Orientation::default(),
+        pixel_size: None,
+    })
 }
 
 fn weigh<T: Copy + Into<u32>>(v: &[T], at: usize, apart: usize) -> u32 {
