@@ -95,7 +95,7 @@ fn tiff(path: &Path, pages: &[(u16, u32)]) {
 /// The picture as the standard shows it: where in the stored one the pixel at (x, y) of the shown one is.
 fn seen(stored: &[u32], number: u16) -> ((u32, u32), Vec<u32>) {
     let (w, h) = (WIDTH, HEIGHT);
-    let (across, down) = if number >= 5 { (h, w) } else { (w, h) };
+    let (across, down) = if (5..=8).contains(&number) { (h, w) } else { (w, h) };
     let from = |x: usize, y: usize| match number {
         2 => (w - 1 - x, y),
         3 => (w - 1 - x, h - 1 - y),
