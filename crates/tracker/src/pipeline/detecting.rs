@@ -10,8 +10,8 @@ use std::time::Duration;
 
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
 
-use super::Observer;
 use super::ahead::{Ahead, Batch, End};
+use super::observer::Observer;
 use crate::detect::{DetectSettings, Detection, Detector, Levels};
 use crate::error::{Error, Fault, Place, Result};
 use crate::frame::FrameSource;

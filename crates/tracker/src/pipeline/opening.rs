@@ -8,7 +8,7 @@ use std::time::Duration;
 use crossbeam_channel::{RecvTimeoutError, bounded};
 use rayon::ThreadPoolBuilder;
 
-use super::Observer;
+use super::observer::Observer;
 use crate::detect::{DetectSettings, Levels};
 use crate::error::{Error, Fault, Result};
 use crate::frame::{Frame, FrameSource};

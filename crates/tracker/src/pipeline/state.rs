@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
-use super::RunSettings;
 use super::ahead::End;
+use super::settings::RunSettings;
 use crate::detect::{DetectSettings, Levels};
 use crate::error::{Error, Fault, Place, Result};
 use crate::frame::{Ending, RateOrigin};

@@ -1,0 +1,200 @@
+//! From detections to the table: the rig is found if it is not given, markers are followed, rows are written.
+
+use std::sync::atomic::Ordering;
+
+use serde_json::json;
+
+use super::ahead::End;
+use super::observer::{Observer, Stage};
+use super::opening::{Attended, on_threads};
+use super::reading::Run;
+use super::state;
+use super::summary::RunSummary;
+use super::times::times;
+use crate::discover::{Discovery, discover};
+use crate::error::{Error, Fault, Result};
+use crate::frame::Ending;
+use crate::gaps::Damage;
+use crate::message::Message;
+use crate::name::shown;
+use crate::rig::Rig;
+use crate::source::Interlaced;
+use crate::table::{NodeTable, Rows, RunEnding, SCHEMA_VERSION, SourceFacts, TableMeta, TableWriter, Tally};
+use crate::timing::{self, Clock, Steps, Timing};
+use crate::track::track_recording;
+
+impl Run<'_> {
+    /// Finds the rig if it is not given, follows the markers, writes the table.
+    pub fn finish(&mut self, end: Option<End>, observer: &mut dyn Observer) -> Result<RunSummary> {
+        if self.store.is_empty() && end.is_none() {
+            return Err(Error::Interrupted);
+        }
+        let stopped = end.is_none();
+        let followed = self.follow(end, observer);
+        if stopped && matches!(followed, Err(Error::Rig(_))) {
+            // Too little was seen for a table; the state to go on from is there.
+            return Err(Error::Interrupted);
+        }
+        followed
+    }
+
+    /// Finds the rig in what was detected, which is not all where the reading was `stopped`.
+    fn find(&self, stopped: bool, observer: &mut dyn Observer) -> Result<Discovery> {
+        observer.stage(Stage::Rig, None);
+        let image_px = [self.facts.width, self.facts.height];
+        let leave = |o: &mut dyn Observer| if stopped { o.abandoned() } else { o.interrupted() };
+        let mut found = Attended::default().run(observer, leave, |attended| {
+            on_threads(self.settings.threads, || discover(&self.store, image_px, &attended.stop))
+        })?;
+        self.store.check()?;
+        found.rig.region = found.rig.region.or_else(|| self.detect.region.clone());
+        found.rig.lens = found.rig.lens.or_else(|| self.detect.lens.clone());
+        Ok(found)
+    }
+
+    fn follow(&mut self, end: Option<End>, observer: &mut dyn Observer) -> Result<RunSummary> {
+        if self.store.is_empty() {
+            return Err(self.no_frames(end.map(|e| e.ending)));
+        }
+        let (timing, clock) = self.times()?;
+        self.warnings.extend(timing::notes(&timing));
+        let rig = match &self.settings.rig {
+            // The same but for rounding, or it would have been refused.
+            Some(rig) => Rig { pixel_aspect: self.facts.pixel_aspect, ..rig.clone() },
+            None => {
+                let mut found = self.find(end.is_none(), observer)?;
+                self.warnings.append(&mut found.warnings);
+                found.rig
+            }
+        };
+        let total = self.store.len() as u64;
+        observer.stage(Stage::Track, Some(total));
+        let mut writer = match &self.settings.output {
+            Some(output) => Some(TableWriter::create(output, &rig, self.settings.cells)?),
+            None => None,
+        };
+        let mut rows = self.settings.collect.then(Rows::default);
+        let mut tally = Tally::new(&rig);
+        // A run that was stopped while it read is only stopped here if the user does not want to wait.
+        let mut stop = end.is_none();
+        let reading_was_stopped = stop;
+        let mut done = 0;
+        let mut damage =
+            Damage { gaps: end.as_ref().map(|e| e.gaps.clone()).unwrap_or_default(), ..Damage::default() };
+        let attended = Attended::default();
+        let leave = |o: &mut dyn Observer| if reading_was_stopped { o.abandoned() } else { o.interrupted() };
+        let tracked = attended.run(observer, leave, |attended| {
+            track_recording(&self.store, &rig, &attended.stop, &mut |stamp, observations| {
+                let time_s = clock.seconds(done, stamp.ticks);
+                if let Some(writer) = &mut writer {
+                    writer.push(stamp.index, time_s, observations)?;
+                }
+                if let Some(rows) = &mut rows {
+                    rows.push(stamp.index, time_s, observations);
+                }
+                tally.push(observations);
+                if !stamp.decoded {
+                    damage.undecoded.push(stamp.index);
+                }
+                done += 1;
+                attended.done.store(done, Ordering::Relaxed);
+                attended.stop.heed()
+            })
+        });
+        stop |= attended.stop.asked();
+        match tracked {
+            Ok(_) => observer.progress(done),
+            Err(Error::Interrupted) if done > 0 => {}
+            Err(error) => return Err(error),
+        }
+        self.store.check()?;
+        let meta = TableMeta {
+            schema_version: SCHEMA_VERSION,
+            tool: TableMeta::this_tool(),
+            settings: self.settings_json(),
+            source: SourceFacts {
+                rate_hz: timing.rate_hz,
+                rate_origin: timing.rate_origin,
+                ..self.facts.clone()
+            },
+            time: Some(timing),
+            ending: match end.map(|e| e.ending) {
+                _ if stop => RunEnding::Interrupted,
+                Some(Ending::Early { frames, byte, reason }) => {
+                    RunEnding::Early { frames, byte, reason: self.base_names(&reason) }
+                }
+                _ if damage.is_damaged() => RunEnding::Damaged,
+                _ => RunEnding::Complete,
+            },
+            rig,
+            damage,
+        };
+        self.warnings.extend(meta.damage.gaps.dropped_words().map(Message::from));
+        if let Some(writer) = writer {
+            writer.finish(&meta)?;
+        }
+        if let (Some(output), false) = (&self.settings.output, stop) {
+            state::remove(output)?;
+        }
+        Ok(RunSummary {
+            frames: done,
+            resumed: self.resumed,
+            resumable: stop && self.settings.output.is_some() && !self.files.is_empty(),
+            nodes: tally.summary(),
+            warnings: std::mem::take(&mut self.warnings),
+            table: rows.map(|rows| NodeTable { meta: meta.clone(), rows }),
+            meta,
+        })
+    }
+
+    /// What the frames' times are, from all their stamps.
+    fn times(&self) -> Result<(Timing, Clock)> {
+        let mut steps = Steps::default();
+        for i in 0..self.store.len() {
+            steps.push(self.store.stamp(i).ticks);
+        }
+        let first = self.store.stamp(0).index;
+        self.store.check()?;
+        times(&self.info, &steps, first)
+    }
+
+    fn no_frames(&self, ending: Option<Ending>) -> Error {
+        let fault = match (&self.settings.frames, ending) {
+            (_, Some(Ending::Early { reason, .. })) => {
+                Fault::new(&self.settings.input, format!("not one frame could be read ({reason})"))
+                    .advice("Copy the recording again")
+            }
+            (Some(frames), _) => {
+                Fault::new(&self.settings.input, format!("it ends before frame {}", frames.start))
+                    .advice("Give a range of frames that are there")
+            }
+            (None, _) => {
+                Fault::new(&self.settings.input, "it has no frames").advice("Copy the recording again")
+            }
+        };
+        Error::Source(fault)
+    }
+
+    /// What was asked for and what was learned. Neither threads nor folders: they change nothing.
+    fn settings_json(&self) -> serde_json::Value {
+        let mut settings = json!({
+            "detect": self.detect,
+            "levels": *self.levels,
+            "fps": self.settings.open.fps,
+            "decoder": self.settings.open.decoder,
+            "frames": self.settings.frames_json(),
+            "rig": if self.settings.rig.is_some() { "given" } else { "found" },
+        });
+        if self.settings.open.interlaced != Interlaced::Refuse {
+            settings["interlaced"] = self.settings.interlaced_json();
+        }
+        settings
+    }
+
+    /// A message with the recording's name without its folder.
+    fn base_names(&self, words: &str) -> String {
+        words
+            .replace(&self.settings.input, &self.facts.name)
+            .replace(&shown(&self.settings.input), &self.facts.name)
+    }
+}

@@ -1,0 +1,40 @@
+//! The steps of a run, in their order.
+//!
+//! Owns: [`run`]. Must not: print, read a clock, or do any of the steps' work.
+
+use super::observer::{Observer, Stage};
+use super::opening::open;
+use super::reading::Run;
+use super::request::{Request, already_done, check};
+use super::settings::RunSettings;
+use super::state;
+use super::summary::RunSummary;
+use crate::error::{Error, Result};
+
+/// Follows the markers of a recording and writes the table.
+///
+/// If the observer asks to stop, the table of what was done so far is written and says so; with an output the
+/// state to go on from is kept beside it.
+///
+/// # Errors
+/// The error of the part that failed; [`Error::Interrupted`] if the run was stopped before there was anything to
+/// write; [`Error::Table`] if the output is there already.
+pub fn run(settings: &RunSettings, observer: &mut dyn Observer) -> Result<RunSummary> {
+    let files = check(settings)?;
+    observer.stage(Stage::Open, None);
+    let source = open(&settings.input, &settings.open, observer)?;
+    let request = Request::new(settings, source.info(), files)?;
+    if let Some(done) = already_done(settings, &request)? {
+        return Ok(done);
+    }
+    let (mut run, source) = Run::begin(settings, request, source, observer)?;
+    let fresh = run.resumed == 0;
+    let outcome = run.detect(source, observer).and_then(|end| run.finish(end, observer));
+    // Only a run that was stopped or ran out of disk can go on; any other would fail again.
+    if let (Err(error), Some(output), true) = (&outcome, &settings.output, fresh)
+        && !matches!(error, Error::Table(_) | Error::Interrupted)
+    {
+        let _ = state::remove(output);
+    }
+    outcome
+}

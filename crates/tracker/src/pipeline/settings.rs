@@ -1,0 +1,64 @@
+//! What a run is asked for.
+//!
+//! Owns: [`RunSettings`], [`Existing`]. Must not: look at a recording.
+
+use std::ops::Range;
+use std::path::PathBuf;
+
+use serde_json::json;
+
+use crate::csv_text::Cells;
+use crate::detect::DetectSettings;
+use crate::rig::Rig;
+use crate::source::{Interlaced, OpenOptions};
+
+/// What to do where the output is there already.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Existing {
+    /// Refuse.
+    #[default]
+    Refuse,
+    /// Begin anew and replace it.
+    Replace,
+    /// Go on where an earlier run stopped; begin anew where none did.
+    Resume,
+}
+
+/// What to run.
+#[derive(Debug, Clone, Default)]
+pub struct RunSettings {
+    /// The recording, as [`crate::source::open`] takes it.
+    pub input: String,
+    /// The table; `None` only collects rows in memory.
+    pub output: Option<PathBuf>,
+    /// What to do where the output is there already.
+    pub existing: Existing,
+    /// Whether the summary holds the table.
+    pub collect: bool,
+    /// The rig; `None` is found in the recording.
+    pub rig: Option<Rig>,
+    /// How the recording is read.
+    pub open: OpenOptions,
+    /// Frames to follow, the last one not among them; `None` is all.
+    pub frames: Option<Range<u64>>,
+    /// How markers are detected.
+    pub detect: DetectSettings,
+    /// Threads for detection; 0 is one for each core. The result is the same for any number.
+    pub threads: usize,
+    /// How a CSV writes names.
+    pub cells: Cells,
+    /// Files besides the recording that are read, which the output never replaces.
+    pub reads: Vec<PathBuf>,
+}
+
+impl RunSettings {
+    /// How interlaced film is read, `null` unless that was said.
+    pub(super) fn interlaced_json(&self) -> serde_json::Value {
+        json!(Some(self.open.interlaced).filter(|i| *i != Interlaced::Refuse))
+    }
+
+    /// The first frame and one past the last; `null` for an open end, as in `--frames 5..`.
+    pub(super) fn frames_json(&self) -> serde_json::Value {
+        json!(self.frames.as_ref().map(|r| [Some(r.start), (r.end < u64::MAX).then_some(r.end)]))
+    }
+}

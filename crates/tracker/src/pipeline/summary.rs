@@ -1,0 +1,30 @@
+//! What came of a run: [`RunSummary`].
+
+use crate::message::Message;
+use crate::table::{NodeSummary, NodeTable, TableMeta};
+
+/// What came of a run.
+#[derive(Debug, Clone)]
+pub struct RunSummary {
+    /// What the table says of itself.
+    pub meta: TableMeta,
+    /// Frames in the table.
+    pub frames: u64,
+    /// Frames taken over from an earlier run.
+    pub resumed: u64,
+    /// Whether a run that was stopped can go on, with what it left beside the table.
+    pub resumable: bool,
+    /// What became of each node.
+    pub nodes: Vec<NodeSummary>,
+    /// What a user should know, a sentence each.
+    pub warnings: Vec<Message>,
+    /// The table, if it was asked for.
+    pub table: Option<NodeTable>,
+}
+
+impl RunSummary {
+    /// Names of nodes that were never seen or stayed lost: gone at the end for longer than they ever were before.
+    pub fn lost(&self) -> Vec<&str> {
+        self.nodes.iter().filter(|n| n.stayed_lost()).map(|n| n.node.as_str()).collect()
+    }
+}
