@@ -115,6 +115,7 @@ fn joint(a: &Found, b: Option<&Found>) -> Option<Turning> {
 ///
 /// # Errors
 /// [`crate::error::Error::Interrupted`] once `stop` was asked for.
+#[expect(clippy::too_many_lines, reason = "joining, ordering, naming and placing, in order")]
 pub fn arrange(
     found: &[Found],
     reference: usize,

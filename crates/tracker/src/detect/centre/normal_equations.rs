@@ -162,6 +162,7 @@ impl<const N: usize> Job for Equations<'_, N> {
     type Outcome = Normal<N>;
 
     #[inline(always)]
+    #[expect(clippy::too_many_lines, reason = "one loop over vectors, which no call may interrupt")]
     fn run<V: Eight>(self, token: V::Token) -> Normal<N> {
         let Self { model, ring, p } = self;
         let all = |v: f32| V::splat(token, v);

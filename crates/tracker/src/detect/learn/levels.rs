@@ -42,6 +42,7 @@ impl Levels {
         threads::install(|| Self::learn_here(samples, settings))
     }
 
+    #[expect(clippy::too_many_lines, reason = "four steps in order, each with its heading")]
     fn learn_here(samples: &[Frame], settings: &DetectSettings) -> Result<Self> {
         // Step 1: unpack.
         let mut planes = Vec::new();

@@ -31,6 +31,7 @@ const ROUND: f64 = 1.4;
 const MOST: usize = 60;
 
 /// Learns the marker and the noise from blobs of pixels of the given sides; `None` where they are no discs.
+#[expect(clippy::too_many_lines, reason = "the steps of one estimate, in order")]
 pub(crate) fn learn(
     samples: &[Sample<'_>],
     side: Side,
