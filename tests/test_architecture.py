@@ -106,19 +106,10 @@ def test_rust_arrows_go_right(crate: str) -> None:
     assert_right(Crate(CRATES[crate]).graph(), RUST_GROUPS[crate])
 
 
-# Still to be taken apart.
-CIRCLES_LEFT = {"pipeline"}
-FRONTS_LEFT = {("pipeline",)}
-
-
 @pytest.mark.parametrize("part", [*CRATES, "python"])
 def test_no_file_needs_one_that_needs_it(part: str) -> None:
     graph = python_graph() if part == "python" else Crate(CRATES[part]).graph()
-    found = [
-        ["::".join(module) for module in circle]
-        for circle in circles(graph)
-        if circle[0][0] not in CIRCLES_LEFT
-    ]
+    found = [["::".join(module) for module in circle] for circle in circles(graph)]
     assert not found, f"circles between files: {found}. Move what both need to a file of its own"
     if not circles(graph):
         print(
@@ -131,10 +122,10 @@ def test_no_file_needs_one_that_needs_it(part: str) -> None:
 def test_the_front_of_a_folder_defines_nothing(crate: str) -> None:
     read = Crate(CRATES[crate])
     for module, file in read.files.items():
-        if file.name == "mod.rs" and module not in FRONTS_LEFT:
+        if file.name == "mod.rs":
             assert not read.defined(module), f"{file.relative_to(ROOT)} defines {read.defined(module)}"
         inner = {other for other in read.files if other[:-1] == module and module}
-        assert file.stem in ("mod", "lib", "main") or not inner or module in FRONTS_LEFT, (
+        assert file.stem in ("mod", "lib", "main") or not inner, (
             f"{file.relative_to(ROOT)} stands beside its folder: make it mod.rs, and let it define nothing"
         )
 

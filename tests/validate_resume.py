@@ -50,7 +50,17 @@ def sweep(folder: Path, kills: int, seed: int) -> int:
     different = 0
     for name, options in FILMS.items():
         film = folder / name
-        make = [str(TRACKER), "film", "--preset", "clean", "--frame-count", str(FRAMES), "-q", "-o", str(film)]
+        make = [
+            str(TRACKER),
+            "film",
+            "--preset",
+            "clean",
+            "--frame-count",
+            str(FRAMES),
+            "-q",
+            "-o",
+            str(film),
+        ]
         subprocess.run([*make, *options], check=True)
         begin = time.monotonic()
         whole = track(film, folder / "whole.parquet", "--force")

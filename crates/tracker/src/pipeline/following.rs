@@ -58,15 +58,7 @@ impl Run<'_> {
         }
         let (timing, clock) = self.times()?;
         self.warnings.extend(timing::notes(&timing));
-        let rig = match &self.settings.rig {
-            // The same but for rounding, or it would have been refused.
-            Some(rig) => Rig { pixel_aspect: self.facts.pixel_aspect, ..rig.clone() },
-            None => {
-                let mut found = self.find(end.is_none(), observer)?;
-                self.warnings.append(&mut found.warnings);
-                found.rig
-            }
-        };
+        let rig = self.rig(end.is_none(), observer)?;
         let total = self.store.len() as u64;
         observer.stage(Stage::Track, Some(total));
         let mut writer = match &self.settings.output {
@@ -108,27 +100,8 @@ impl Run<'_> {
             Err(error) => return Err(error),
         }
         self.store.check()?;
-        let meta = TableMeta {
-            schema_version: SCHEMA_VERSION,
-            tool: TableMeta::this_tool(),
-            settings: self.settings_json(),
-            source: SourceFacts {
-                rate_hz: timing.rate_hz,
-                rate_origin: timing.rate_origin,
-                ..self.facts.clone()
-            },
-            time: Some(timing),
-            ending: match end.map(|e| e.ending) {
-                _ if stop => RunEnding::Interrupted,
-                Some(Ending::Early { frames, byte, reason }) => {
-                    RunEnding::Early { frames, byte, reason: self.base_names(&reason) }
-                }
-                _ if damage.is_damaged() => RunEnding::Damaged,
-                _ => RunEnding::Complete,
-            },
-            rig,
-            damage,
-        };
+        let ending = end.map(|e| e.ending).filter(|_| !stop);
+        let meta = self.meta(rig, timing, damage, ending);
         self.warnings.extend(meta.damage.gaps.dropped_words().map(Message::from));
         if let Some(writer) = writer {
             writer.finish(&meta)?;
@@ -145,6 +118,42 @@ impl Run<'_> {
             table: rows.map(|rows| NodeTable { meta: meta.clone(), rows }),
             meta,
         })
+    }
+
+    /// The rig that is given, or the one found.
+    fn rig(&mut self, stopped: bool, observer: &mut dyn Observer) -> Result<Rig> {
+        if let Some(rig) = &self.settings.rig {
+            // The same but for rounding, or it would have been refused.
+            return Ok(Rig { pixel_aspect: self.facts.pixel_aspect, ..rig.clone() });
+        }
+        let mut found = self.find(stopped, observer)?;
+        self.warnings.append(&mut found.warnings);
+        Ok(found.rig)
+    }
+
+    /// The table's metadata; `ending` is the recording's, `None` where the run was stopped.
+    fn meta(&self, rig: Rig, timing: Timing, damage: Damage, ending: Option<Ending>) -> TableMeta {
+        TableMeta {
+            schema_version: SCHEMA_VERSION,
+            tool: TableMeta::this_tool(),
+            settings: self.settings_json(),
+            source: SourceFacts {
+                rate_hz: timing.rate_hz,
+                rate_origin: timing.rate_origin,
+                ..self.facts.clone()
+            },
+            time: Some(timing),
+            ending: match ending {
+                None => RunEnding::Interrupted,
+                Some(Ending::Early { frames, byte, reason }) => {
+                    RunEnding::Early { frames, byte, reason: self.base_names(&reason) }
+                }
+                Some(_) if damage.is_damaged() => RunEnding::Damaged,
+                Some(_) => RunEnding::Complete,
+            },
+            rig,
+            damage,
+        }
     }
 
     /// What the frames' times are, from all their stamps.

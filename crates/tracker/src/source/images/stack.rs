@@ -6,7 +6,7 @@ use std::io::BufReader;
 use tiff::decoder::Decoder;
 
 use super::picture::{Alike, Picture, format, frame, rate};
-use super::planes::{self, Planes};
+use super::planes::{self, Declared, Planes};
 use super::tiff_layout::{Layout, is_reduced};
 use super::{orientation_tag, pixel_size, tiff_page};
 use crate::error::{Error, Fault, Result};
@@ -65,6 +65,18 @@ impl Pages {
     }
 }
 
+/// The error for a file of one page whose other pictures cannot be found, for the `problem`.
+fn no_pages(name: &str, declared: &Declared, problem: &str) -> Error {
+    let (by, pictures) = (declared.by, declared.pictures);
+    Error::Source(
+        Fault::new(
+            name,
+            format!("{by} says that it holds {pictures} pictures, but there is one page and {problem}"),
+        )
+        .advice("Save it with a page for each picture"),
+    )
+}
+
 impl StackSource {
     /// Opens a TIFF file.
     ///
@@ -119,18 +131,8 @@ impl StackSource {
         };
         let more = declared.filter(|_| !pages.decoder.more_images());
         if let Some(declared) = more {
-            let planes = Planes::new(&layout, declared.pictures, size_bytes.unwrap_or(0)).map_err(|e| {
-                Error::Source(
-                    Fault::new(
-                        name,
-                        format!(
-                            "{} says that it holds {} pictures, but there is one page and {e}",
-                            declared.by, declared.pictures
-                        ),
-                    )
-                    .advice("Save it with a page for each picture"),
-                )
-            })?;
+            let planes = Planes::new(&layout, declared.pictures, size_bytes.unwrap_or(0))
+                .map_err(|e| no_pages(name, &declared, &e))?;
             info.codec = format!("{} bit pictures behind one page", layout.bits);
             info.converted_from = planes.converted_from();
             (info.depth_bits, info.format) = (planes.depth_bits, format(planes.depth_bits));
