@@ -140,8 +140,9 @@ class Film:
 
         The ending of ``output`` decides the form: .mp4 .mov .mkv .avi, .mraw (with its .cih), .tif (pages), .y4m, or
         numbered images as in ``frames/%05d.png``. ``quality``: H.264's rate factor 0 to 51 or MJPEG's 1 to 31.
-        ``x264_preset``: of H.264, ultrafast to placebo. ``bits``: of a .mraw, 8, 10, 12 or 16. ``safe_csv``: as in `Nodes.write`, for the truth. ``force``: replace
-        files that are there already; each takes its name when it is whole.
+        ``x264_preset``: of H.264, ultrafast to placebo. ``bits``: of a .mraw, 8, 10, 12 or 16. ``safe_csv``: as in
+        `Nodes.write`, for the truth. ``force``: replace files that are there already; each takes its name when it is
+        whole.
 
         Raises :class:`pydpend.FilmError` if the form cannot hold the film, a file is there already or is the scene's,
         or the film cannot be written.
