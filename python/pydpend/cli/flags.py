@@ -22,8 +22,10 @@ def add_fields(p: argparse.ArgumentParser, options: type, fields: Iterable[Field
         else:
             number = {"number": float, "whole": int}.get(kind, str)
             choices = choices_of(f) or None
+            unit = "S" if f.name.endswith("_s") else None
+            told = text if f.default in (None, "") else f"{text} (default {f.default})"
             p.add_argument(
-                flag_of(f.name), dest=f.name, type=number, choices=choices, default=None, help=text
+                flag_of(f.name), dest=f.name, type=number, choices=choices, metavar=unit, help=told
             )
 
 
