@@ -148,6 +148,32 @@ fn a_film_without_its_end_is_cut() {
     }
 }
 
+#[test]
+fn damage_between_the_header_and_the_first_picture_is_told() {
+    if !have_ffmpeg() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    // Byte at which the first picture is, and how many bytes are gone: that picture, and some after it.
+    let films = OTHERS.iter().filter(|(name, _)| ["t.ogv", "a.nut"].contains(name));
+    for (name, arguments) in films {
+        let path = encode(folder.path(), name, COUNT, arguments);
+        let whole = std::fs::read(&path).unwrap();
+        let first = if *name == "t.ogv" {
+            // The third page begins the film's pictures.
+            whole.windows(5).enumerate().filter(|(_, w)| *w == b"OggS\0").nth(2).unwrap().0
+        } else {
+            whole.windows(8).position(|w| w == 0x4E4B_E4AD_EECA_4569_u64.to_be_bytes()).unwrap()
+        };
+        let mut bytes = whole.clone();
+        bytes.drain(first + 2..first + whole.len() / 4);
+        std::fs::write(&path, &bytes).unwrap();
+        let (frames, _, gaps, _) = read(&path);
+        assert!(frames.len() < COUNT && gaps.is_damage(), "{name}: {} frames, {gaps:?}", frames.len());
+        assert!(gaps.places.iter().any(|g| g.after.is_none()), "{name}: {gaps:?}");
+    }
+}
+
 /// Arguments that make MPEG program streams, in which packets lack display times.
 const PROGRAM_STREAMS: [(&str, &[&str]); 9] = [
     ("2.mpg", &["-c:v", "mpeg2video", "-bf", "0"]),

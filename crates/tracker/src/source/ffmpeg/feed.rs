@@ -86,7 +86,8 @@ impl Feed {
     /// again.
     pub(super) fn new(demuxer: Demuxer, name: &str, is_file: bool, first: usize) -> Result<Self> {
         let container = demuxer.container();
-        let structure = is_file.then(|| Structure::of(&container, name, demuxer.stream().id)).flatten();
+        let (id, is_alone) = (demuxer.stream().id, demuxer.streams() == 1);
+        let structure = is_file.then(|| Structure::of(&container, name, id, is_alone)).flatten();
         let slots = (is_file && container == "avi").then(|| Slots::read(name, demuxer.index())).flatten();
         let fields = Fields::of(&demuxer);
         let numbers_in_film = FrameNumbers::of(demuxer.parameters().codec_id, demuxer.codec_bytes());
@@ -135,7 +136,7 @@ impl Feed {
     pub(super) fn is_blind(&self) -> bool {
         let container = self.demuxer.container();
         let is_numbered = self.slots.is_some() || ["avi", "cine"].contains(&container.as_str());
-        !is_numbered && (self.structure.is_none() || ["flv", "mpeg"].contains(&container.as_str()))
+        !is_numbered && (self.structure.is_none() || ["flv", "mpeg", "nut"].contains(&container.as_str()))
     }
 
     /// Why nothing more could be read, if that is not the end of the file.
@@ -221,6 +222,12 @@ impl Feed {
     /// time that a player fills its buffer; Ogg and MPEG program streams give none, and the library's is what it finds.
     pub(super) fn declares_length(&self) -> bool {
         !["flv", "asf", "ogg", "mpeg"].contains(&self.demuxer.container().as_str())
+    }
+
+    /// Whether pictures follow the file's header at once, so that damage between the two may have cost some. Others' headers
+    /// hold much that no picture needs.
+    pub(super) fn begins_with_pictures(&self) -> bool {
+        ["flv", "asf", "ogg", "nut"].contains(&self.demuxer.container().as_str())
     }
 
     /// Whether the packet read last reaches the end that the container declares.

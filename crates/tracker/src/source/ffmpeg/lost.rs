@@ -13,6 +13,8 @@ use crate::timing::{Steps, grid_gaps};
 const MOST_BREAKS: usize = 10_000;
 /// Stretches of equal steps that are remembered (16 MiB), as many as places where film goes on; more are a variable rate.
 const MOST_RUNS: usize = 1 << 20;
+/// Frames that a recorder may leave out: at 100 000 per s half a day. A time that is further off is damaged.
+const MOST_DROPPED: u64 = 1 << 32;
 /// Part of all steps that must be the usual one, give or take a tick, for a film to be called evenly spaced.
 const EVEN: f64 = 0.8;
 /// Usual steps, in ticks, from which a step shows by itself whether a frame lacks, though its ends are rounded.
@@ -35,6 +37,8 @@ pub(super) struct Lost {
     goes_on: BTreeSet<i64>,
     /// Whether frames can be cut out of the file without a trace.
     is_blind: bool,
+    /// The file is damaged before its first packet.
+    begins_broken: bool,
 }
 
 /// A step between two frames, ticks, and the frames that lack in it.
@@ -58,7 +62,13 @@ impl Lost {
             damaged: Vec::new(),
             goes_on: BTreeSet::new(),
             is_blind,
+            begins_broken: false,
         }
+    }
+
+    /// The file is damaged before its first packet, and packets may be gone there.
+    pub(super) fn begins_broken(&mut self) {
+        self.begins_broken = true;
     }
 
     /// Packets before the one of this time are gone.
@@ -96,6 +106,9 @@ impl Lost {
     /// What is not there between the frames handed out so far.
     pub(super) fn gaps(&self) -> Gaps {
         let mut gaps = Gaps::default();
+        if self.begins_broken {
+            gaps.push(Gap { after: None, frames: None, cause: Cause::Damage });
+        }
         let Some((usual, wide)) = self.on_grid().or_else(|| self.by_steps()) else {
             // Where frames come at any time, a break that frames follow is all that tells of a loss.
             for frames in self.breaks.iter().filter_map(|(_, f)| *f) {
@@ -106,7 +119,8 @@ impl Lost {
         let reach = (REORDER as f64 * usual) as i64;
         for wide in wide {
             let near = wide.from.saturating_sub(reach)..=wide.to.saturating_add(reach);
-            let cause = if self.damaged.iter().any(|at| near.contains(at)) {
+            let is_damaged = wide.frames > MOST_DROPPED || self.damaged.iter().any(|at| near.contains(at));
+            let cause = if is_damaged {
                 Cause::Damage
             } else if self.is_blind && self.goes_on.range(wide.to..=*near.end()).next().is_none() {
                 Cause::Unknown

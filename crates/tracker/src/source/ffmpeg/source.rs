@@ -201,7 +201,9 @@ impl FfmpegSource {
             key = self.stamps.key(&fields, self.packets as i64);
             self.packets += 1;
             let time = self.stamps.time(key);
-            if given.after_loss {
+            if self.packets == 1 && given.after_damage && self.feed.begins_with_pictures() {
+                self.lost.begins_broken();
+            } else if given.after_loss {
                 self.lost.broken(time);
             } else if given.after_damage {
                 self.lost.damaged(time);

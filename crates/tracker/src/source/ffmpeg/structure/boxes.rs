@@ -1,10 +1,14 @@
 //! Walks MP4 and QuickTime: boxes that fill the file, and in a fragmented film fragments that are numbered (ISO/IEC 14496-12).
 
+use std::collections::VecDeque;
+use std::ops::Range;
+
 use super::bytes::Bytes;
 use super::{Fit, Walk};
 
-/// Boxes of a fragmented film's fragment: index, its header.
+/// Boxes of a fragmented film's fragment: its header, what it holds.
 const FRAGMENT: [u8; 4] = *b"moof";
+const BODY: [u8; 4] = *b"mdat";
 
 /// Where the boxes stop to fit together, found before the first packet: there are few.
 #[derive(Debug, Default)]
@@ -12,12 +16,18 @@ pub(super) struct Boxes {
     /// Places where the chain of boxes or of fragments is broken, rising, and how.
     breaks: Vec<(u64, Fit)>,
     next: usize,
+    /// What fragments hold, where there is one stream only: the reader gives packets of each, or it passed over it.
+    bodies: VecDeque<Range<u64>>,
+    /// It gave one of the first of these.
+    is_given: bool,
 }
 
 impl Boxes {
-    pub(super) fn new(file: &mut Bytes) -> Self {
+    /// `is_alone` is whether the file holds one stream only.
+    pub(super) fn new(file: &mut Bytes, is_alone: bool) -> Self {
         let mut boxes = Self::default();
         let (mut at, mut number) = (0, None);
+        let mut follows_header = false;
         while at < file.length() {
             let Some((end, kind)) = header(file, at) else {
                 boxes.breaks.push((at, Fit::Broken));
@@ -30,6 +40,10 @@ impl Boxes {
                 }
                 number = this;
             }
+            if kind == BODY && follows_header && is_alone {
+                boxes.bodies.push_back(at..end);
+            }
+            follows_header = kind == FRAGMENT;
             at = end;
         }
         boxes
@@ -62,6 +76,13 @@ impl Walk for Boxes {
             worst = worst.max(*fit);
             self.next += 1;
         }
+        while self.bodies.front().is_some_and(|body| body.end <= to) {
+            self.bodies.pop_front();
+            if !std::mem::take(&mut self.is_given) {
+                worst = worst.max(Fit::Jump);
+            }
+        }
+        self.is_given |= self.bodies.front().is_some_and(|body| body.contains(&to));
         worst
     }
 

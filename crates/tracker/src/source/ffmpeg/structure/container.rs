@@ -6,7 +6,7 @@ use std::fs::File;
 
 use super::bytes::Bytes;
 use super::walk::{Fit, Walk};
-use super::{asf, boxes, flv, gif, matroska, ogg, pages, program, transport};
+use super::{asf, boxes, flv, gif, matroska, nut, ogg, pages, program, transport};
 
 /// Follows the elements of a file from packet to packet.
 pub(in super::super) struct Structure {
@@ -16,8 +16,8 @@ pub(in super::super) struct Structure {
 
 impl Structure {
     /// The structure of a file, by its container's short names; `None` where none is known or the file cannot be
-    /// read again. `stream_id` is the stream's number in the container.
-    pub(in super::super) fn of(container: &str, path: &str, stream_id: i32) -> Option<Self> {
+    /// read again. `stream_id` is the stream's number in the container, `is_alone` whether it is the only one.
+    pub(in super::super) fn of(container: &str, path: &str, stream_id: i32, is_alone: bool) -> Option<Self> {
         let has = |name: &str| container.split(',').any(|c| c == name);
         let mut file = Bytes::new(File::open(path).ok()?)?;
         let walk: Box<dyn Walk> = if has("matroska") {
@@ -25,13 +25,15 @@ impl Structure {
         } else if has("mpegts") {
             Box::new(transport::Transport::new(&mut file, stream_id)?)
         } else if has("mp4") {
-            Box::new(boxes::Boxes::new(&mut file))
+            Box::new(boxes::Boxes::new(&mut file, is_alone))
         } else if has("gif") {
             Box::new(gif::Gif::default())
         } else if has("flv") {
             Box::new(flv::Flv::new(&mut file)?)
         } else if has("ogg") {
             Box::new(pages::Paged::new(ogg::Ogg::default(), 0))
+        } else if has("nut") {
+            Box::new(nut::Nut::default())
         } else if has("mpeg") {
             Box::new(program::Program::default())
         } else if has("asf") {

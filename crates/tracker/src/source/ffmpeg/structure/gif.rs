@@ -9,6 +9,8 @@ pub(super) struct Gif {
     at: u64,
     ended: bool,
     adrift: bool,
+    /// A picture's data went on through others.
+    swallowed: bool,
 }
 
 /// Bytes of a colour table, by the byte that tells of it.
@@ -27,6 +29,16 @@ fn chain(file: &mut Bytes, mut at: u64) -> Option<u64> {
     }
 }
 
+/// Whether the data of a picture holds the beginning of another (graphic control extension, then an image): a length in
+/// the chain is damaged, and the chain went on through the pictures after it. By chance one in 10^14 bytes begins so.
+fn swallows(file: &mut Bytes, begin: u64, end: u64) -> bool {
+    const CONTROL: [u8; 4] = [0, 0x21, 0xF9, 4];
+    const IMAGE: [u8; 2] = [0, 0x2C];
+    let mut data = vec![0; usize::try_from(end.saturating_sub(begin)).unwrap_or(0)];
+    file.fill(begin, &mut data).is_some()
+        && data.windows(10).any(|w| w.starts_with(&CONTROL) && w.ends_with(&IMAGE))
+}
+
 impl Gif {
     fn step(&mut self, file: &mut Bytes) -> Option<()> {
         if self.at == 0 {
@@ -39,7 +51,10 @@ impl Gif {
             0x21 => chain(file, self.at + 2)?,
             0x2C => {
                 let place: [u8; 10] = file.array(self.at)?;
-                chain(file, self.at + 10 + table(place[9]) + 1)?
+                let begin = self.at + 10 + table(place[9]) + 1;
+                let end = chain(file, begin)?;
+                self.swallowed |= swallows(file, begin, end);
+                end
             }
             0x3B => {
                 self.ended = true;
@@ -58,7 +73,7 @@ impl Walk for Gif {
         }
         // After a break nothing tells a block from what a block holds.
         self.adrift |= self.ended || self.at != to;
-        if self.adrift { Fit::Broken } else { Fit::Whole }
+        if std::mem::take(&mut self.swallowed) || self.adrift { Fit::Broken } else { Fit::Whole }
     }
 
     fn rest(&mut self, file: &mut Bytes) -> Fit {
@@ -68,6 +83,6 @@ impl Walk for Gif {
         // The end may be padded, but a film that goes on after it was not at its end.
         let padding = file.length().saturating_sub(self.at).min(16);
         let padded = (0..padding).all(|k| file.array(self.at + k) == Some([0]));
-        if self.adrift || !padded { Fit::Broken } else { Fit::Whole }
+        if self.adrift || self.swallowed || !padded { Fit::Broken } else { Fit::Whole }
     }
 }

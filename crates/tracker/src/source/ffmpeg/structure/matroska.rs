@@ -13,6 +13,9 @@ const IN_SEGMENT: [u32; 7] =
     [0x114D_9B74, 0x1549_A966, 0x1654_AE6B, 0x1C53_BB6B, 0x1941_A469, 0x1043_A770, 0x1254_C367];
 /// What a cluster holds: time, silent tracks, place, length of the one before, blocks alone, in groups, encrypted.
 const IN_CLUSTER: [u32; 7] = [0xE7, 0x5854, 0xA7, 0xAB, 0xA3, 0xA0, 0xAF];
+/// Those of them that are a number, which has eight bytes at most.
+const NUMBERS: [u32; 3] = [0xE7, 0xA7, 0xAB];
+const LONGEST_NUMBER: u64 = 8;
 /// What a group of a block holds, met where its own header was lost: block, length, references, padding, additions.
 const IN_GROUP: [u32; 6] = [0xA1, 0x9B, 0xFB, 0xFA, 0x75A2, 0x75A1];
 const TRACKS: u32 = 0x1654_AE6B;
@@ -129,6 +132,9 @@ impl Matroska {
         if let Some(known) = self.cluster {
             if in_cluster || known.is_none() && IN_GROUP.contains(&id) {
                 let end = element.end.filter(|e| fits(*e))?;
+                if NUMBERS.contains(&id) && end - element.begin > LONGEST_NUMBER {
+                    return None;
+                }
                 self.at = end;
                 let is_packet = (element.begin..end).contains(&to);
                 self.block(file, &element, end, is_packet);
