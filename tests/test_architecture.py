@@ -55,12 +55,12 @@ def top_modules() -> list[str]:
 RUST_GROUPS: dict[str, tuple[tuple[str, ...], ...]] = {
     "tracker": (
         ("message", "name", "csv_text", "error", "stop", "output", "packed", "kind"),
-        ("pixel_aspect", "gaps", "frame", "observation", "timing", "peak_level", "rig"),
+        ("pixel_aspect", "gaps", "frame", "gray", "observation", "timing", "peak_level", "rig"),
         ("source",),
         ("detect",),
         ("table", "store"),
         ("rigid",),
-        ("discover", "track"),
+        ("discover", "moving", "track"),
         ("synth",),
         ("residual", "score"),
         ("pipeline",),

@@ -60,5 +60,6 @@ pub fn frame_of(
         format,
         depth_bits,
         plane: Some(Box::new(bytes)),
+        colour: None,
     })
 }

@@ -76,6 +76,7 @@ pub fn open_options(py: Python<'_>, given: &OpenArguments) -> PyResult<OpenOptio
         )?,
         allow_protocol: *allow_protocol,
         threads: *threads,
+        colour: false,
     })
 }
 

@@ -136,6 +136,21 @@ pub enum Error {
 }
 
 impl Error {
+    /// The same error with more of what was wrong.
+    #[must_use]
+    pub fn and_also(mut self, more: &str) -> Self {
+        if let Self::Source(f)
+        | Self::Detect(f)
+        | Self::Rig(f)
+        | Self::Table(f)
+        | Self::Film(f)
+        | Self::Argument(f) = &mut self
+        {
+            f.problem = f.problem.clone() + format!("; {more}");
+        }
+        self
+    }
+
     /// What it says, with the settings it names as data.
     pub fn message(&self) -> Message {
         match self {

@@ -92,6 +92,9 @@ pub struct Frame {
     pub depth_bits: u32,
     /// The plane; `None` for a frame that could not be decoded. It still has its index and time.
     pub plane: Option<Box<dyn Bytes>>,
+    /// Blue and red colour differences, a byte a pixel about 128, row by row without gaps; `None` where the recording has no
+    /// colour or nobody asked for it.
+    pub colour: Option<[Vec<u8>; 2]>,
 }
 
 impl Frame {

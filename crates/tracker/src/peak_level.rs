@@ -145,6 +145,7 @@ mod tests {
                         format,
                         depth_bits: bits as u32,
                         plane: Some(Box::new(bytes.clone())),
+                        colour: None,
                     };
                     assert_eq!(peak_level(&frame), Ok(Some(top)), "{format:?} {width} x {height}, {at}");
                     frame.plane = Some(Box::new(bytes[..bytes.len() - 1].to_vec()));
@@ -160,6 +161,7 @@ mod tests {
                     depth_bits: 16,
                     // 255 only between the rows.
                     plane: Some(Box::new([vec![1; 2 * width], vec![255; 3], vec![1; 2 * width]].concat())),
+                    colour: None,
                 };
                 assert_eq!(peak_level(&dark), Ok(Some(257)));
             }

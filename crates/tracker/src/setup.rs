@@ -57,12 +57,12 @@ pub fn find(settings: &RunSettings, observer: &mut dyn Observer) -> Result<Setup
         warnings.push(format!("the recording ended early: {reason}").into());
     }
     let rig = summary.meta.rig;
-    if let Some(table) = &summary.table {
+    if let (Some(table), false) = (&summary.table, summary.moving) {
         warnings
             .extend(advise(&rig, &table.rows, summary.meta.source.rate_hz).into_iter().map(Message::from));
     }
     let index = rig.reference_frame.unwrap_or(0);
-    let (frame, detections) = frame_at(&settings, index, observer)?;
+    let (frame, detections) = frame_at(&settings, index, !summary.moving, observer)?;
     let saturated = detections.iter().filter(|d| d.flags.has(Flags::SATURATED)).count();
     if saturated > 0 {
         warnings.push(format!(
@@ -75,24 +75,32 @@ pub fn find(settings: &RunSettings, observer: &mut dyn Observer) -> Result<Setup
     Ok(Setup { rig, warnings, ending: summary.meta.ending, picture })
 }
 
-/// A frame of a recording and what is detected in it.
+/// A frame of a recording and, if that is wanted, what is detected in it.
 fn frame_at(
     settings: &RunSettings,
     index: u64,
+    detects: bool,
     observer: &mut dyn Observer,
 ) -> Result<(Frame, Vec<Detection>)> {
     let RunSettings { input, open, detect, threads, .. } = settings;
-    let source = pipeline::open(input, open, observer)?;
-    let (mut source, samples) = pipeline::sample(source, 24, observer)?;
-    let detect = &DetectSettings { pixel_aspect: source.info().pixel_aspect, ..detect.clone() };
-    let levels = pipeline::learn(samples, detect, *threads, observer)?;
+    let mut source = pipeline::open(input, open, observer)?;
+    let detect = DetectSettings { pixel_aspect: source.info().pixel_aspect, ..detect.clone() };
+    let mut detector = None;
+    if detects {
+        let (whole, samples) = pipeline::sample(source, 24, observer)?;
+        source = whole;
+        let levels = pipeline::learn(samples, &detect, *threads, observer)?;
+        detector = Some(Detector::new(Arc::new(levels), &detect)?);
+    }
     let mut detections = Vec::new();
     while let Some(frame) = source.next_frame()? {
         if observer.interrupted() {
             return Err(Error::Interrupted);
         }
         if frame.index == index {
-            Detector::new(Arc::new(levels), detect)?.detect(&frame, &mut detections)?;
+            if let Some(detector) = &mut detector {
+                detector.detect(&frame, &mut detections)?;
+            }
             return Ok((frame, detections));
         }
     }

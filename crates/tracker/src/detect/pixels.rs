@@ -221,6 +221,7 @@ mod tests {
                 format,
                 depth_bits: bits as u32,
                 plane: Some(Box::new(pack(&values, bits))),
+                colour: None,
             };
             let pixels = Pixels::of(&frame).unwrap().unwrap();
             for y in 0..h {
@@ -244,6 +245,7 @@ mod tests {
             format: PixelFormat::Gray8,
             depth_bits: 8,
             plane: Some(Box::new(vec![0u8; 15])),
+            colour: None,
         };
         let text = Pixels::of(&frame).err().unwrap().to_string();
         assert!(text.contains("frame 3") && text.contains("16 bytes") && text.contains("15"), "{text}");

@@ -71,6 +71,7 @@ impl Scene {
             format,
             depth_bits: bits,
             plane: Some(Box::new(bytes)),
+            colour: None,
         }
     }
 }

@@ -334,6 +334,7 @@ mod tests {
             format: PixelFormat::Gray8,
             depth_bits: 8,
             plane: Some(Box::new(vec![level; 128 * 96])),
+            colour: None,
         }
     }
 

@@ -5,6 +5,8 @@ use std::sync::atomic::Ordering;
 use serde_json::json;
 
 use super::ahead::End;
+use super::clutter::is_cluttered;
+use super::moving::{self, Outcome};
 use super::observer::{Observer, Stage};
 use super::opening::{Attended, on_threads};
 use super::reading::Run;
@@ -25,11 +27,27 @@ use crate::track::track_recording;
 
 impl Run<'_> {
     /// Finds the rig if it is not given, follows the markers, writes the table.
-    pub fn finish(&mut self, end: Option<End>, observer: &mut dyn Observer) -> Result<RunSummary> {
+    /// Where there is clutter what moves is looked at first; why it is `unclear` is told.
+    pub fn finish(
+        &mut self,
+        end: Option<End>,
+        observer: &mut dyn Observer,
+        unclear: &mut Option<String>,
+    ) -> Result<RunSummary> {
         if self.store.is_empty() && end.is_none() {
             return Err(Error::Interrupted);
         }
         let stopped = end.is_none();
+        let settings = self.settings;
+        if !stopped && settings.rig.is_none() && moving::applies(settings) && is_cluttered(&self.store)? {
+            match moving::run(settings, observer)? {
+                Outcome::Followed(summary) => {
+                    settings.output.as_ref().map_or(Ok(()), |output| state::remove(output))?;
+                    return Ok(*summary);
+                }
+                Outcome::Unclear(why) => *unclear = Some(why),
+            }
+        }
         let followed = self.follow(end, observer);
         if stopped && matches!(followed, Err(Error::Rig(_))) {
             // Too little was seen for a table; the state to go on from is there.
@@ -113,6 +131,7 @@ impl Run<'_> {
             frames: done,
             resumed: self.resumed,
             resumable: stop && self.settings.output.is_some() && !self.files.is_empty(),
+            moving: false,
             nodes: tally.summary(),
             warnings: std::mem::take(&mut self.warnings),
             table: rows.map(|rows| NodeTable { meta: meta.clone(), rows }),

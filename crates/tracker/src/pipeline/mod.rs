@@ -1,8 +1,10 @@
 //! The one way through: source, detect, track, table, in that order, for every front end.
 
 mod ahead;
+mod clutter;
 mod detecting;
 mod following;
+mod moving;
 mod observer;
 mod opening;
 mod reading;

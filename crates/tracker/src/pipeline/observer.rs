@@ -15,6 +15,8 @@ pub enum Stage {
     Rig,
     /// Following the markers and writing the table.
     Track,
+    /// Looking at what moves, where no markers stand out.
+    Moving,
     /// Drawing the table into the recording.
     Draw,
 }
@@ -28,6 +30,7 @@ impl Stage {
             Stage::Detect => "detecting",
             Stage::Rig => "finding the rig",
             Stage::Track => "tracking",
+            Stage::Moving => "looking at what moves",
             Stage::Draw => "drawing",
         }
     }

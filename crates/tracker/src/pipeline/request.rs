@@ -4,6 +4,7 @@
 
 use std::path::PathBuf;
 
+use super::moving::MOVING;
 use super::settings::{Existing, RunSettings};
 use super::state::{State, anew, partial_path};
 use super::summary::RunSummary;
@@ -116,6 +117,7 @@ pub(super) fn already_done(settings: &RunSettings, request: &Request) -> Result<
         frames: table.frames() as u64,
         resumed: table.frames() as u64,
         resumable: false,
+        moving: table.meta.settings.get(MOVING).is_some(),
         nodes: table.summary(),
         warnings: vec![format!("{} was complete already", text(output)).into()],
         meta: table.meta.clone(),
@@ -124,7 +126,7 @@ pub(super) fn already_done(settings: &RunSettings, request: &Request) -> Result<
 }
 
 /// Whether a rig belongs to a recording of this size and of these pixels.
-fn fits(rig: &Rig, facts: &SourceFacts) -> Result<()> {
+pub(super) fn fits(rig: &Rig, facts: &SourceFacts) -> Result<()> {
     let image_px = [facts.width, facts.height];
     if rig.image_px != image_px {
         let [w, h] = rig.image_px;

@@ -2,6 +2,7 @@
 //!
 //! Owns: [`run`]. Must not: print, read a clock, or do any of the steps' work.
 
+use super::moving::{self, Outcome};
 use super::observer::{Observer, Stage};
 use super::opening::open;
 use super::reading::Run;
@@ -11,7 +12,8 @@ use super::state;
 use super::summary::RunSummary;
 use crate::error::{Error, Result};
 
-/// Follows the markers of a recording and writes the table.
+/// Follows the markers of a recording and writes the table. Where none stand out, what moves is followed if it is clear what is
+/// meant.
 ///
 /// If the observer asks to stop, the table of what was done so far is written and says so; with an output the
 /// state to go on from is kept beside it.
@@ -20,6 +22,35 @@ use crate::error::{Error, Result};
 /// The error of the part that failed; [`Error::Interrupted`] if the run was stopped before there was anything to
 /// write; [`Error::Table`] if the output is there already.
 pub fn run(settings: &RunSettings, observer: &mut dyn Observer) -> Result<RunSummary> {
+    let mut unclear = None;
+    let markers = run_markers(settings, observer, &mut unclear);
+    if !moving::is_wanted(&markers) || !moving::applies(settings) {
+        return markers;
+    }
+    let why = match unclear {
+        Some(why) => why,
+        None => match moving::run(settings, observer) {
+            Ok(Outcome::Followed(summary)) => return Ok(*summary),
+            Ok(Outcome::Unclear(why)) => why,
+            Err(Error::Interrupted) => return Err(Error::Interrupted),
+            Err(_) => return markers,
+        },
+    };
+    match markers {
+        Ok(mut summary) => {
+            summary.warnings.push(format!("markers are seen in few frames, and {why}").into());
+            Ok(summary)
+        }
+        Err(error) => Err(error.and_also(&why)),
+    }
+}
+
+/// Follows markers that stand out. Where what moves was looked at first, why it is `unclear` is told.
+fn run_markers(
+    settings: &RunSettings,
+    observer: &mut dyn Observer,
+    unclear: &mut Option<String>,
+) -> Result<RunSummary> {
     let files = check(settings)?;
     observer.stage(Stage::Open, None);
     let source = open(&settings.input, &settings.open, observer)?;
@@ -29,7 +60,7 @@ pub fn run(settings: &RunSettings, observer: &mut dyn Observer) -> Result<RunSum
     }
     let (mut run, source) = Run::begin(settings, request, source, observer)?;
     let fresh = run.resumed == 0;
-    let outcome = run.detect(source, observer).and_then(|end| run.finish(end, observer));
+    let outcome = run.detect(source, observer).and_then(|end| run.finish(end, observer, unclear));
     // Only a run that was stopped or ran out of disk can go on; any other would fail again.
     if let (Err(error), Some(output), true) = (&outcome, &settings.output, fresh)
         && !matches!(error, Error::Table(_) | Error::Interrupted)

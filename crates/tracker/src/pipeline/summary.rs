@@ -14,6 +14,8 @@ pub struct RunSummary {
     pub resumed: u64,
     /// Whether a run that was stopped can go on, with what it left beside the table.
     pub resumable: bool,
+    /// Whether what moves was followed, because no markers stand out.
+    pub moving: bool,
     /// What became of each node.
     pub nodes: Vec<NodeSummary>,
     /// What a user should know, a sentence each.

@@ -144,6 +144,7 @@ fn frame(info: &SourceInfo, index: u64, ticks: i64, plane: Option<Vec<u8>>) -> F
         format: PixelFormat::Gray8,
         depth_bits: 8,
         plane: plane.map(|p| Box::new(p) as _),
+        colour: None,
     }
 }
 

@@ -42,6 +42,8 @@ pub struct OpenOptions {
     pub allow_protocol: bool,
     /// Decoding threads; 0 is one for each core.
     pub threads: usize,
+    /// Whether frames bring their colour, where the reader gives it (FFmpeg's does).
+    pub colour: bool,
 }
 
 impl OpenOptions {

@@ -132,6 +132,7 @@ impl Film {
             format: self.format(),
             depth_bits: self.scene.camera.depth_bits,
             plane: Some(Box::new(plane)),
+            colour: None,
         }
     }
 }

@@ -33,6 +33,7 @@ impl DecodeArgs {
             interlaced,
             allow_protocol: self.allow_protocol,
             threads,
+            colour: false,
         }
     }
 }

@@ -62,6 +62,7 @@ fn two_bars_that_touch_are_flagged_and_one_is_not() {
             format: PixelFormat::Gray8,
             depth_bits: 8,
             plane: Some(Box::new(bytes)),
+            colour: None,
         }
     };
     let settings = DetectSettings { threshold: Threshold::Raw(100.0), ..Default::default() };

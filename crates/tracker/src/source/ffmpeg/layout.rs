@@ -28,6 +28,7 @@ pub(super) struct Layout {
     pub name: String,
     raw: i32,
     kind: Kind,
+    has_colour: bool,
 }
 
 enum Kind {
@@ -137,7 +138,8 @@ impl Layout {
             (Kind::Gather(first), first.depth)
         };
         let format = if depth_bits > 8 { PixelFormat::Gray16 } else { PixelFormat::Gray8 };
-        Ok(Self { format, depth_bits, name: label, raw, kind })
+        let has_colour = descriptor.nb_components >= 3 || has(ffi::AV_PIX_FMT_FLAG_PAL);
+        Ok(Self { format, depth_bits, name: label, raw, kind, has_colour })
     }
 
     /// Whether pictures have this layout.
@@ -202,19 +204,63 @@ impl Layout {
                     }
                 }
             }
-            Kind::Scale => self.scale(&picture, width, height, &mut samples)?,
+            Kind::Scale => self.scale(&picture, width, &mut samples)?,
         }
         let (turned, row_pixels) = orientation.apply(samples, width, height, bytes);
         Some((Box::new(turned), row_pixels * bytes))
     }
 
-    fn scale(&self, picture: &Picture, width: usize, height: usize, to: &mut [u8]) -> Option<()> {
-        let from = pixel_format(self.raw)?;
+    /// Blue and red colour differences of a picture, a byte a pixel about 128; `None` where it has none.
+    pub(super) fn colour(&self, picture: &Picture, orientation: Orientation) -> Option<[Vec<u8>; 2]> {
+        if !self.has_colour {
+            return None;
+        }
+        let width = usize::try_from(picture.get().width).ok().filter(|w| *w > 0)?;
+        let height = usize::try_from(picture.get().height).ok().filter(|h| *h > 0)?;
+        let size = width.checked_mul(height)?;
+        let mut planes = [vec![0u8; size], vec![0u8; size], vec![0u8; size]];
+        let into = ffi::AVPixelFormat::AV_PIX_FMT_YUV444P;
+        let [luma, blue, red] = &mut planes;
+        self.converted(picture, into, [(luma, width), (blue, width), (red, width)])?;
+        let [_, blue, red] = planes;
+        Some([blue, red].map(|plane| orientation.apply(plane, width, height, 1).0))
+    }
+
+    fn scale(&self, picture: &Picture, width: usize, to: &mut [u8]) -> Option<()> {
         let into = match self.format {
             PixelFormat::Gray8 => ffi::AVPixelFormat::AV_PIX_FMT_GRAY8,
             _ => ffi::AVPixelFormat::AV_PIX_FMT_GRAY16LE,
         };
-        let (w, h) = (width as i32, height as i32);
+        self.converted(picture, into, [(&mut *to, width * self.sample_bytes())])?;
+        // libswscale stretches shallower samples to 16 bits; what is handed out keeps the recording's depth.
+        if self.format == PixelFormat::Gray16 && self.depth_bits < 16 {
+            for pair in to.chunks_exact_mut(2) {
+                let value = u16::from_le_bytes([pair[0], pair[1]]) >> (16 - self.depth_bits);
+                pair.copy_from_slice(&value.to_le_bytes());
+            }
+        }
+        Some(())
+    }
+
+    /// Converts a picture into planes of another pixel format, each with the bytes of its rows; `None` where libswscale
+    /// cannot, or a plane is too small.
+    fn converted<const N: usize>(
+        &self,
+        picture: &Picture,
+        into: ffi::AVPixelFormat,
+        to: [(&mut [u8], usize); N],
+    ) -> Option<()> {
+        let from = pixel_format(self.raw)?;
+        let frame = picture.get();
+        let (w, h) = (frame.width, frame.height);
+        let rows = usize::try_from(h).ok()?;
+        let (mut planes, mut strides) = ([ptr::null_mut(); 4], [0; 4]);
+        for ((plane, stride), (bytes, row_bytes)) in planes.iter_mut().zip(&mut strides).zip(to) {
+            if bytes.len() < row_bytes.checked_mul(rows)? {
+                return None;
+            }
+            (*plane, *stride) = (bytes.as_mut_ptr(), i32::try_from(row_bytes).ok()?);
+        }
         let flags = ffi::SWS_BILINEAR | ffi::SWS_ACCURATE_RND | ffi::SWS_BITEXACT | ffi::SWS_FULL_CHR_H_INP;
         // SAFETY: plain values; null filters and parameters are allowed; null is checked.
         let context = unsafe {
@@ -223,13 +269,11 @@ impl Layout {
         if context.is_null() {
             return None;
         }
-        let frame = picture.get();
-        let planes = [to.as_mut_ptr(), ptr::null_mut(), ptr::null_mut(), ptr::null_mut()];
-        let strides = [(width * self.sample_bytes()) as i32, 0, 0, 0];
-        // SAFETY: the source planes are those of a decoded frame of this format and size, the destination has
-        // `height` rows of `strides[0]` bytes, and the context is freed once after its only use.
-        let rows = unsafe {
-            let rows = ffi::sws_scale(
+        // SAFETY: the source planes are those of a decoded frame of this format and size; each destination plane was
+        // just checked to hold `h` rows of its stride, which the callers make as wide as a row of `into`; the context is
+        // freed once after its only use.
+        let done = unsafe {
+            let done = ffi::sws_scale(
                 context,
                 frame.data.as_ptr().cast::<*const u8>(),
                 frame.linesize.as_ptr(),
@@ -239,19 +283,9 @@ impl Layout {
                 strides.as_ptr(),
             );
             ffi::sws_freeContext(context);
-            rows
+            done
         };
-        if rows != h {
-            return None;
-        }
-        // libswscale stretches shallower samples to 16 bits; what is handed out keeps the recording's depth.
-        if self.format == PixelFormat::Gray16 && self.depth_bits < 16 {
-            for pair in to.chunks_exact_mut(2) {
-                let value = u16::from_le_bytes([pair[0], pair[1]]) >> (16 - self.depth_bits);
-                pair.copy_from_slice(&value.to_le_bytes());
-            }
-        }
-        Some(())
+        (done == h).then_some(())
     }
 }
 

@@ -10,7 +10,7 @@ use super::fields::{self, FieldOrder};
 use super::layout::Layout;
 use super::source::{FfmpegSource, Shared};
 use crate::error::{Error, Fault, Result};
-use crate::frame::{Frame, SourceInfo};
+use crate::frame::{Bytes, Frame, SourceInfo};
 use crate::source::orientation::Orientation;
 use crate::source::{Interlaced, cores};
 
@@ -89,10 +89,11 @@ impl FfmpegSource {
         while samples.len() < count && bytes < PIPE_BYTES {
             let Some(mut frame) = self.decode_next()? else { break };
             if let Some(plane) = frame.plane.take() {
-                let shared: Arc<dyn crate::frame::Bytes> = Arc::from(plane);
+                let shared: Arc<dyn Bytes> = Arc::from(plane);
                 bytes += shared.bytes().len();
                 frame.plane = Some(Box::new(Shared(Arc::clone(&shared))));
-                samples.push(Frame { plane: Some(Box::new(Shared(shared))), ..frame });
+                let plane: Box<dyn Bytes> = Box::new(Shared(shared));
+                samples.push(Frame { plane: Some(plane), colour: frame.colour.clone(), ..frame });
             }
             self.replay.push_back(frame);
         }

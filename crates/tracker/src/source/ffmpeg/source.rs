@@ -28,6 +28,7 @@ use crate::source::{Input, Interlaced, OpenOptions};
 pub(super) struct Ready {
     pub(super) ticks: i64,
     pub(super) plane: Option<(Box<dyn Bytes>, usize)>,
+    pub(super) colour: Option<[Vec<u8>; 2]>,
     pub(super) byte: Option<u64>,
 }
 
@@ -43,6 +44,8 @@ pub struct FfmpegSource {
     pub(super) layout: Layout,
     pub(super) orientation: Orientation,
     pub(super) interlaced: Interlaced,
+    /// Whether frames bring their colour.
+    pub(super) colour: bool,
     /// Width to height of a pixel by the first picture; `None` before it.
     coded_aspect: Option<PixelAspect>,
     pub(super) stamps: Stamps,
@@ -144,6 +147,7 @@ impl FfmpegSource {
             layout,
             orientation,
             interlaced: options.interlaced,
+            colour: options.colour,
             coded_aspect: None,
             stamps: Stamps::new(unstamped, step),
             step,
@@ -351,10 +355,11 @@ impl FfmpegSource {
             let (w, h) = (picture.get().width.unsigned_abs(), picture.get().height.unsigned_abs());
             self.orientation.size(w, h) == (self.info.width, self.info.height)
         };
-        let plane = if damaged || suspect || self.tainted || !fits {
-            None
+        let (colour, plane) = if damaged || suspect || self.tainted || !fits {
+            (None, None)
         } else {
-            self.layout.plane(picture, self.orientation)
+            let colour = if self.colour { self.layout.colour(&picture, self.orientation) } else { None };
+            (colour, self.layout.plane(picture, self.orientation))
         };
         let usual = self.stamps.last();
         let ticks = self.stamps.ticks(key);
@@ -364,7 +369,7 @@ impl FfmpegSource {
             && usual
                 .is_some_and(|(last, longest)| ticks.saturating_sub(last) > longest.saturating_mul(3) / 2);
         let plane = if after_hole && self.is_cut() { None } else { plane };
-        let ready = Ready { ticks, plane, byte };
+        let ready = Ready { ticks, plane, colour, byte };
         if ready.plane.is_some() {
             self.ready.append(&mut self.held);
             self.ready.push_back(ready);
@@ -375,7 +380,7 @@ impl FfmpegSource {
 
     pub(super) fn hold(&mut self, lost: Sent) {
         let ticks = self.stamps.ticks(lost.key);
-        self.held.push_back(Ready { ticks, plane: None, byte: lost.byte });
+        self.held.push_back(Ready { ticks, plane: None, colour: None, byte: lost.byte });
     }
 
     pub(super) fn make(&mut self, ready: Ready) -> Frame {
@@ -395,6 +400,7 @@ impl FfmpegSource {
             format: self.info.format,
             depth_bits: self.info.depth_bits,
             plane,
+            colour: ready.colour,
         }
     }
 

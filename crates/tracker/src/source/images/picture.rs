@@ -110,5 +110,6 @@ pub(super) fn frame(info: &SourceInfo, index: u64, picture: Option<Picture>) -> 
         format: info.format,
         depth_bits: info.depth_bits,
         plane: picture.filter(fits).map(|p| Box::new(p.samples) as _),
+        colour: None,
     }
 }

@@ -120,6 +120,7 @@ impl MrawSource {
             format,
             depth_bits: self.packing.depth_bits,
             plane: Some(plane),
+            colour: None,
         }
     }
 }

@@ -142,6 +142,7 @@ impl NorpixSource {
             format: self.info.format,
             depth_bits: self.info.depth_bits,
             plane,
+            colour: None,
         }
     }
 

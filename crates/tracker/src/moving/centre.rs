@@ -1,0 +1,224 @@
+//! The centre of a marker: the middle of the region around a spot that stands out from what is behind it.
+//!
+//! Owns: [`Model`], [`Centres`], [`refine`]. Must not: link.
+
+use std::f64::consts::PI;
+
+use rayon::prelude::*;
+
+use super::backdrop::Backdrop;
+use super::own_colour::own_colour;
+use super::picture::Film;
+use super::response::Direction;
+use super::spot::Spot;
+use super::track::Track;
+use super::tracklet::median;
+use super::window::{Region, Window};
+use crate::error::Result;
+
+/// Radius from which on a marker in colour is looked at along its own direction, px.
+const OWN_COLOUR_FROM_PX: f64 = 6.0;
+/// Places after which the radius is learned anew.
+const RADIUS_AFTER: [usize; 3] = [5, 10, 15];
+/// A region that is farther than this from where the marker's usually are is another region, in radii: two discs so far apart
+/// have less than half of their area in common.
+const OTHER_REGION_RADII: f64 = 0.8;
+/// Area of a region over the usual one.
+const AREA_RATIO: std::ops::Range<f64> = 0.45..2.2;
+/// Area of a silhouette over that of the region along one colour direction: as large as the marker itself may be where the
+/// direction sees only part of it, and not that of an arm or a hand that carries it.
+const SILHOUETTE_RATIO: std::ops::Range<f64> = 0.7..3.0;
+/// Part of the contrast by which the level is raised and lowered to see how far the centre depends on it.
+const LEVEL_STEP: f64 = 0.2;
+/// Part of that difference which is not known of the centre; the tests hold what it makes of the stated uncertainty.
+const LEVEL_DOUBT: f64 = 0.12;
+/// The same part of the difference between the silhouette's centre and the region's.
+const SILHOUETTE_DOUBT: f64 = 0.5;
+/// What the filter's answer alone leaves open of a centre, in radii.
+const COARSE_DOUBT_RADII: f64 = 0.3;
+
+/// What refining a track's places gave.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Centres {
+    /// Radius of the marker, px.
+    pub radius_px: f64,
+    /// Part of the places at which a compact region was found.
+    pub found: f64,
+}
+
+/// How a marker is looked at: colour direction, bright (1) or dark (-1), octave.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Model {
+    /// Colour direction.
+    pub direction: Direction,
+    /// 1 for markers that are more than their surroundings along it, -1 for less.
+    pub sign: f32,
+    /// Octave.
+    pub octave: usize,
+}
+
+impl Model {
+    /// Radius of the disc that it answers most to, px.
+    pub fn radius_px(&self) -> f64 {
+        2.0 * (1usize << self.octave) as f64
+    }
+
+    /// The octave on which centres are taken.
+    pub fn fine_octave(&self) -> usize {
+        self.octave.saturating_sub(2)
+    }
+}
+
+/// Places of a track, evenly chosen, at most `most`: (piece, spot in it).
+pub fn chosen(track: &Track, most: usize) -> Vec<(usize, usize)> {
+    let all: Vec<(usize, usize)> =
+        track.pieces.iter().enumerate().flat_map(|(p, t)| (0..t.spots.len()).map(move |i| (p, i))).collect();
+    if all.len() <= most {
+        return all;
+    }
+    (0..most).map(|k| all[(k as f64 * (all.len() - 1) as f64 / (most - 1).max(1) as f64) as usize]).collect()
+}
+
+/// A centre that was found, px of the octave.
+#[derive(Debug, Clone, Copy)]
+struct Found {
+    region: Region,
+    /// How far it is from the spot.
+    moved: f64,
+    /// What the way of finding it leaves open.
+    doubt: f64,
+}
+
+/// How the markers of one track are looked at closely.
+struct Look<'a> {
+    film: &'a dyn Film,
+    model: Model,
+    /// The marker's own colour direction.
+    own: Option<Direction>,
+    backdrop: Option<&'a Backdrop>,
+    /// Half the length of a streak, px of the octave.
+    half_length: f64,
+}
+
+impl Look<'_> {
+    /// The centre of a marker of `radius` near a spot, both in px of the octave.
+    fn centre(&self, picture: usize, at: [f64; 2], radius: f64) -> Result<Option<Found>> {
+        self.film.heed()?;
+        let reach = 2.3 * radius.max(self.half_length) + 3.0;
+        let mut w = Window::cut(&self.film.read(picture)?, self.model.fine_octave(), at, reach);
+        let (x0, y0) = (w.x0 as f64, w.y0 as f64);
+        let mut place = [at[0] - x0, at[1] - y0];
+        w.look(self.model.direction, self.model.sign, self.backdrop, place, radius);
+        let mut region = None;
+        for _ in 0..2 {
+            let Some(r) = w.region(place, radius, 0.0) else { break };
+            (place, region) = ([r.x, r.y], Some(r));
+        }
+        if let Some(own) = self.own {
+            w.look(own, 1.0, self.backdrop, place, radius);
+            for _ in 0..3 {
+                w.confine(place, radius);
+                let Some(r) = w.region(place, radius, 0.0) else { break };
+                (place, region) = ([r.x, r.y], Some(r));
+            }
+        }
+        let Some(region) = region else { return Ok(None) };
+        // Where what is behind its edge is uneven, a higher level has another centre than a lower one.
+        let [low, high] =
+            [-LEVEL_STEP, LEVEL_STEP].map(|step| w.region(place, radius, step).unwrap_or(region));
+        let mut doubt = LEVEL_DOUBT * (high.x - low.x).hypot(high.y - low.y);
+        if let (Some(backdrop), Some(_)) = (self.backdrop, self.own)
+            && let Some(s) = w.silhouette(backdrop, place, radius)
+            && SILHOUETTE_RATIO.contains(&(s.area / region.area))
+        {
+            // Which of the two is the marker is not known: a shadow belongs to the silhouette, a net to the marker.
+            doubt = doubt.hypot(SILHOUETTE_DOUBT * (s.x - region.x).hypot(s.y - region.y));
+        }
+        let region = Region { x: region.x + x0, y: region.y + y0, ..region };
+        let moved = (region.x - at[0]).hypot(region.y - at[1]);
+        Ok(Some(Found { region, moved, doubt }))
+    }
+}
+
+/// Refines places of a track, at most `most` of them, evenly chosen; places without a compact region stay. The radius is
+/// learned from the first ones unless it is given.
+pub fn refine(
+    film: &dyn Film,
+    track: &mut Track,
+    model: &Model,
+    most: usize,
+    radius_px: Option<f64>,
+    backdrop: Option<&Backdrop>,
+) -> Result<Centres> {
+    let scale = (1usize << model.fine_octave()) as f64;
+    let places = chosen(track, most);
+    let spot = |&(p, i): &(usize, usize)| &track.pieces[p].spots[i];
+    let value = |f: fn(&Spot) -> f64| median(&mut places.iter().map(|p| f(spot(p))).collect::<Vec<_>>());
+    let first = radius_px.map_or_else(|| (value(|s| s.area) / PI).sqrt() / scale, |r| r / scale).max(1.2);
+    let own =
+        if first * scale >= OWN_COLOUR_FROM_PX { own_colour(film, track, first * scale)? } else { None };
+    let half_length = value(|s| s.length) / scale / 2.0;
+    let look = Look { film, model: *model, own, backdrop, half_length };
+    let on_octave = |s: &Spot| [(s.x + 0.5) / scale - 0.5, (s.y + 0.5) / scale - 0.5];
+    let found = |place: &(usize, usize), radius: f64| {
+        look.centre(track.pieces[place.0].first + place.1, on_octave(spot(place)), radius)
+    };
+    let (results, radius) = match radius_px {
+        Some(_) => (places.par_iter().map(|p| found(p, first)).collect::<Result<Vec<_>>>()?, first),
+        None => learning_radius(&places, first, found)?,
+    };
+    let usual = median(&mut results.iter().flatten().map(|f| f.region.area).collect::<Vec<_>>());
+    // What the region is off the filter's answer by, px of the octave.
+    let shifts: Vec<Option<([f64; 2], f64)>> = places
+        .iter()
+        .zip(&results)
+        .map(|(place, found)| {
+            let Found { region, moved, doubt } = (*found)?;
+            let at = on_octave(spot(place));
+            let fits = moved < radius + 0.5 && AREA_RATIO.contains(&(region.area / usual));
+            fits.then_some(([region.x - at[0], region.y - at[1]], doubt))
+        })
+        .collect();
+    let middle = [0, 1].map(|k| median(&mut shifts.iter().flatten().map(|(s, _)| s[k]).collect::<Vec<_>>()));
+    let off = |s: &[f64; 2]| (s[0] - middle[0]).hypot(s[1] - middle[1]);
+    let mut good = 0;
+    for (&(p, i), shift) in places.iter().zip(&shifts) {
+        let usual = shift.filter(|(s, _)| off(s) < OTHER_REGION_RADII * radius);
+        let s = &mut track.pieces[p].spots[i];
+        let [dx, dy] = usual.map_or(middle, |(shift, _)| shift);
+        (s.x, s.y) = (s.x + dx * scale, s.y + dy * scale);
+        let doubt = match usual {
+            // A region half way to another one may be part of it.
+            Some((shift, doubt)) if off(&shift) > OTHER_REGION_RADII / 2.0 * radius => {
+                off(&shift).hypot(doubt)
+            }
+            Some((_, doubt)) => doubt,
+            None => COARSE_DOUBT_RADII * radius,
+        };
+        s.doubt_px = doubt * scale;
+        good += usize::from(usual.is_some());
+    }
+    Ok(Centres { radius_px: radius * scale, found: good as f64 / places.len().max(1) as f64 })
+}
+
+type Place = (usize, usize);
+
+/// Centres one after the other, with a radius that is learned on the way.
+fn learning_radius(
+    places: &[Place],
+    first: f64,
+    found: impl Fn(&Place, f64) -> Result<Option<Found>>,
+) -> Result<(Vec<Option<Found>>, f64)> {
+    let (mut radius, mut results, mut areas) = (first, Vec::with_capacity(places.len()), Vec::new());
+    for (k, place) in places.iter().enumerate() {
+        let result = found(place, radius)?;
+        areas.extend(result.map(|f| f.region.area));
+        results.push(result);
+        if RADIUS_AFTER.contains(&k) && areas.len() * 2 > k {
+            let mut last = areas[areas.len().saturating_sub(5)..].to_vec();
+            let r = (median(&mut last) / PI).sqrt();
+            radius = r.min((1.6 * radius).min(1.8 * first)).max((0.6 * radius).max(0.5 * first));
+        }
+    }
+    Ok((results, radius))
+}

@@ -1,0 +1,64 @@
+//! Whether most of what stands out in a recording is its background.
+//!
+//! Owns: [`is_cluttered`]. Must not: find bodies.
+
+use crate::detect::Detection;
+use crate::error::Result;
+use crate::store::DetectionStore;
+
+/// Frames that are looked at.
+const FRAMES: usize = 25;
+/// Detections of a frame that are looked at.
+const MOST_DETECTIONS: usize = 300;
+/// A detection stands still if one is as near as this in nearly all frames, px: noise, and the camera's shake.
+const SAME_PLACE_PX: f64 = 1.5;
+/// Part of the frames in which it must be there. Markers rest too, but not in so many.
+const STANDING_PART: f64 = 0.85;
+/// A mechanism may carry as many markers that hardly move.
+const LEAST_STANDING: usize = 12;
+/// Part of the detections that must stand still.
+const CLUTTER_PART: f64 = 0.6;
+
+/// Whether most of what was detected stands still: marks of a background, among which bodies are not sought first.
+///
+/// # Errors
+/// That of the store.
+pub(super) fn is_cluttered(store: &DetectionStore) -> Result<bool> {
+    let n = store.len();
+    let frames: Vec<Vec<[f64; 2]>> = (0..n)
+        .step_by(n.div_ceil(FRAMES).max(1))
+        .map(|i| {
+            let mut found: Vec<Detection> = Vec::new();
+            store.read(i, &mut found);
+            found.iter().take(MOST_DETECTIONS).map(|d| [d.x_px, d.y_px]).collect()
+        })
+        .collect();
+    store.check()?;
+    let mut counts: Vec<[usize; 2]> =
+        (0..frames.len()).map(|i| [frames[i].len(), standing(&frames, i)]).collect();
+    counts.sort_unstable();
+    let Some(&[all, standing]) = counts.get(counts.len() / 2) else { return Ok(false) };
+    Ok(standing >= LEAST_STANDING && standing as f64 >= CLUTTER_PART * all as f64)
+}
+
+/// Detections of a frame that stand still.
+fn standing(frames: &[Vec<[f64; 2]>], i: usize) -> usize {
+    let near = |a: &[f64; 2], b: &[f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]) < SAME_PLACE_PX;
+    let there = |p: &[f64; 2]| frames.iter().filter(|f| f.iter().any(|q| near(p, q))).count();
+    frames[i].iter().filter(|p| there(p) as f64 >= STANDING_PART * frames.len() as f64).count()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn marks_of_a_background_stand_still_and_markers_do_not() {
+        let marks = |k: usize| (0..20).map(move |i| [30.0 * i as f64 + 0.1 * (k % 3) as f64, 50.0]);
+        let markers = |k: usize| (0..9).map(move |i| [10.0 * i as f64 + 7.0 * k as f64, 150.0]);
+        let both: Vec<Vec<[f64; 2]>> = (0..25).map(|k| marks(k).chain(markers(k)).collect()).collect();
+        assert!((0..25).all(|i| standing(&both, i) == 20));
+        let moving: Vec<Vec<[f64; 2]>> = (0..25).map(|k| markers(k).collect()).collect();
+        assert!((0..25).all(|i| standing(&moving, i) == 0));
+    }
+}
