@@ -122,10 +122,9 @@ fn a_thing_before_texture_is_followed_bright_or_dark_and_its_uncertainty_is_true
         let seen = f.tracks[0].spots().count();
         assert!(seen >= 175, "seed {seed}: {seen} of 180");
         let (rms, over) = errors(&f.tracks[0], round);
-        eprintln!("seed {seed}: rms {rms:.3} over {over:.2} noise {:.3}", f.tracks[0].noise_px);
         // The ground's texture pulls the half level: a few hundredths of the radius, as stated.
         assert!(rms < 0.3, "seed {seed}: {rms} px");
-        assert!(true || (0.4..1.6).contains(&over), "seed {seed}: {over} of the stated uncertainty");
+        assert!((0.5..1.2).contains(&over), "seed {seed}: {over} of the stated uncertainty");
     }
 }
 

@@ -19,17 +19,25 @@ const LEAST_STANDING: usize = 12;
 /// Part of the detections that must stand still.
 const CLUTTER_PART: f64 = 0.6;
 
-/// Whether most of what was detected stands still: marks of a background, among which bodies are not sought first.
+/// Detections of a frame from which on their sizes tell: as many markers of one mechanism are made alike.
+const MANY: usize = 15;
+/// Ratio of the upper to the lower quartile of areas from which on detections are not made alike.
+const UNLIKE: f64 = 3.0;
+
+/// Whether most of what was detected is the background's, among which bodies are not sought first: it stands still, or is many
+/// and of all sizes.
 ///
 /// # Errors
 /// That of the store.
 pub(super) fn is_cluttered(store: &DetectionStore) -> Result<bool> {
     let n = store.len();
+    let mut areas = Vec::new();
     let frames: Vec<Vec<[f64; 2]>> = (0..n)
         .step_by(n.div_ceil(FRAMES).max(1))
         .map(|i| {
             let mut found: Vec<Detection> = Vec::new();
             store.read(i, &mut found);
+            areas.extend(found.iter().map(|d| f64::from(d.area_px)));
             found.iter().take(MOST_DETECTIONS).map(|d| [d.x_px, d.y_px]).collect()
         })
         .collect();
@@ -38,7 +46,10 @@ pub(super) fn is_cluttered(store: &DetectionStore) -> Result<bool> {
         (0..frames.len()).map(|i| [frames[i].len(), standing(&frames, i)]).collect();
     counts.sort_unstable();
     let Some(&[all, standing]) = counts.get(counts.len() / 2) else { return Ok(false) };
-    Ok(standing >= LEAST_STANDING && standing as f64 >= CLUTTER_PART * all as f64)
+    let stands = standing >= LEAST_STANDING && standing as f64 >= CLUTTER_PART * all as f64;
+    areas.sort_unstable_by(f64::total_cmp);
+    let quartile = |part: usize| areas.get(areas.len() * part / 4).copied().unwrap_or(0.0);
+    Ok(stands || all >= MANY && quartile(3) > UNLIKE * quartile(1))
 }
 
 /// Detections of a frame that stand still.

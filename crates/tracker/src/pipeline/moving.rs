@@ -6,8 +6,8 @@ use std::sync::atomic::Ordering;
 
 use serde_json::{Value, json};
 
-use super::opening::{Attended, on_threads, open};
 use super::observer::{Observer, Stage};
+use super::opening::{Attended, on_threads, open};
 use super::request::fits;
 use super::settings::RunSettings;
 use super::summary::RunSummary;

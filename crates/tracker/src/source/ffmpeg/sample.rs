@@ -260,6 +260,7 @@ impl<'a> Sampler<'a> {
             format: info.format,
             depth_bits: info.depth_bits,
             plane: Some(plane),
+            colour: None,
         })
     }
 }
