@@ -38,8 +38,33 @@ def film(path: Path, frames: int, *, moving: bool = True, seed: int = 3) -> None
     rng = np.random.default_rng(seed)
     behind = ground(seed)
     y, x = np.mgrid[:H, :W]
-    command = ["ffmpeg", "-v", "error", "-y", "-f", "rawvideo", "-pix_fmt", "gray", "-s", f"{W}x{H}", "-r", "60"]
-    command += ["-i", "-", "-c:v", "libx264", "-preset", "veryfast", "-crf", "23", "-pix_fmt", "yuv420p", str(path)]
+    command = [
+        "ffmpeg",
+        "-v",
+        "error",
+        "-y",
+        "-f",
+        "rawvideo",
+        "-pix_fmt",
+        "gray",
+        "-s",
+        f"{W}x{H}",
+        "-r",
+        "60",
+    ]
+    command += [
+        "-i",
+        "-",
+        "-c:v",
+        "libx264",
+        "-preset",
+        "veryfast",
+        "-crf",
+        "23",
+        "-pix_fmt",
+        "yuv420p",
+        str(path),
+    ]
     with subprocess.Popen(command, stdin=subprocess.PIPE) as encoder:
         assert encoder.stdin is not None
         for k in range(frames):
@@ -87,7 +112,7 @@ def test_nothing_is_named_where_nothing_moves(tmp_path: Path) -> None:
 @pytest.mark.skipif(not FILMS.is_dir(), reason="the films with truth are not here")
 @pytest.mark.parametrize("name", ["pt_pivot", "pt_slide1"])
 def test_a_real_film_is_right_without_settings(name: str, tmp_path: Path) -> None:
-    """Judged by the films' own scorer: every object covered to 90 %, at most 0.5 % of the rows wrong, nothing else named."""
+    """Judged by the films' own scorer: each object covered to 90 %, at most 0.5 % of the rows wrong, no other named."""
     folder = FILMS / name
     meta = json.loads((folder / "meta.json").read_text())
     table = tmp_path / "table.parquet"

@@ -4,8 +4,8 @@
 
 use rayon::prelude::*;
 
-use super::centre::Model;
 use super::ground::{PICTURES, spread};
+use super::model::Model;
 use super::picture::Film;
 use super::response::{Direction, Planes};
 use super::tracklet::median;

@@ -1,17 +1,18 @@
 //! The centre of a marker: the middle of the region around a spot that stands out from what is behind it.
 //!
-//! Owns: [`Model`], [`Centres`], [`refine`]. Must not: link.
+//! Owns: [`Centres`], [`refine`]. Must not: link.
 
 use std::f64::consts::PI;
 
 use rayon::prelude::*;
 
 use super::backdrop::Backdrop;
+use super::model::Model;
 use super::own_colour::own_colour;
 use super::picture::Film;
 use super::response::Direction;
 use super::spot::Spot;
-use super::track::Track;
+use super::track::{Track, chosen};
 use super::tracklet::median;
 use super::window::{Region, Window};
 use crate::error::Result;
@@ -44,39 +45,6 @@ pub struct Centres {
     pub radius_px: f64,
     /// Part of the places at which a compact region was found.
     pub found: f64,
-}
-
-/// How a marker is looked at: colour direction, bright (1) or dark (-1), octave.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Model {
-    /// Colour direction.
-    pub direction: Direction,
-    /// 1 for markers that are more than their surroundings along it, -1 for less.
-    pub sign: f32,
-    /// Octave.
-    pub octave: usize,
-}
-
-impl Model {
-    /// Radius of the disc that it answers most to, px.
-    pub fn radius_px(&self) -> f64 {
-        2.0 * (1usize << self.octave) as f64
-    }
-
-    /// The octave on which centres are taken.
-    pub fn fine_octave(&self) -> usize {
-        self.octave.saturating_sub(2)
-    }
-}
-
-/// Places of a track, evenly chosen, at most `most`: (piece, spot in it).
-pub fn chosen(track: &Track, most: usize) -> Vec<(usize, usize)> {
-    let all: Vec<(usize, usize)> =
-        track.pieces.iter().enumerate().flat_map(|(p, t)| (0..t.spots.len()).map(move |i| (p, i))).collect();
-    if all.len() <= most {
-        return all;
-    }
-    (0..most).map(|k| all[(k as f64 * (all.len() - 1) as f64 / (most - 1).max(1) as f64) as usize]).collect()
 }
 
 /// A centre that was found, px of the octave.

@@ -5,8 +5,9 @@
 use rayon::prelude::*;
 
 use super::backdrop::Backdrop;
-use super::centre::{Model, refine};
+use super::centre::refine;
 use super::ground::{self, Ground, spread};
+use super::model::Model;
 use super::picture::Film;
 use super::response::{Direction, Response, octaves, response, responses};
 use super::rest::extend;

@@ -11,6 +11,7 @@ mod backdrop;
 mod centre;
 mod choose;
 mod ground;
+mod model;
 mod own_colour;
 mod picture;
 mod response;
@@ -23,8 +24,8 @@ mod tracklet;
 mod window;
 mod work;
 
-pub use centre::Model;
 pub use choose::{Followed, follow};
+pub use model::Model;
 pub use picture::{Film, Picture};
 pub use response::Direction;
 pub use spot::Spot;

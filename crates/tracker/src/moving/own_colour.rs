@@ -4,10 +4,9 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::centre::chosen;
 use super::picture::Film;
 use super::response::Direction;
-use super::track::Track;
+use super::track::{Track, chosen};
 use super::tracklet::median;
 use crate::error::Result;
 

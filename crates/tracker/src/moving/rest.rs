@@ -4,7 +4,7 @@
 
 use std::collections::HashSet;
 
-use super::centre::Model;
+use super::model::Model;
 use super::picture::Film;
 use super::response::response;
 use super::spot::{Spot, spots};

@@ -1,6 +1,6 @@
 //! Tracks: tracklets joined over gaps, with their quality and look.
 //!
-//! Owns: [`Track`], [`join`], [`join_lone`], [`tracks`]. Must not: choose which marker is wanted.
+//! Owns: [`Track`], [`join`], [`join_lone`], [`tracks`], [`chosen`]. Must not: choose which marker is wanted.
 
 use super::spot::Spot;
 use super::tracklet::{Tracklet, median};
@@ -343,4 +343,14 @@ pub fn join_lone(chains: Vec<Vec<Tracklet>>, radius_px: f64) -> Vec<Vec<Tracklet
 pub fn tracks(chains: Vec<Vec<Tracklet>>, radius_px: f64, pictures: usize) -> Vec<Track> {
     let least = (0.02 * pictures as f64).max(8.0);
     chains.into_iter().filter(|c| length(c) as f64 >= least).map(|c| Track::of(c, radius_px)).collect()
+}
+
+/// Places of a track, evenly chosen, at most `most`: (piece, spot in it).
+pub fn chosen(track: &Track, most: usize) -> Vec<(usize, usize)> {
+    let all: Vec<(usize, usize)> =
+        track.pieces.iter().enumerate().flat_map(|(p, t)| (0..t.spots.len()).map(move |i| (p, i))).collect();
+    if all.len() <= most {
+        return all;
+    }
+    (0..most).map(|k| all[(k as f64 * (all.len() - 1) as f64 / (most - 1).max(1) as f64) as usize]).collect()
 }

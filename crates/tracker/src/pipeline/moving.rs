@@ -10,7 +10,7 @@ use super::observer::{Observer, Stage};
 use super::opening::{Attended, on_threads, open};
 use super::request::fits;
 use super::settings::RunSettings;
-use super::summary::RunSummary;
+use super::summary::{MOVING, RunSummary};
 use super::times::times;
 use crate::detect::DetectSettings;
 use crate::error::{Error, Result};
@@ -25,8 +25,6 @@ use crate::store::FrameStamp;
 use crate::table::{NodeTable, Rows, RunEnding, SCHEMA_VERSION, SourceFacts, TableMeta, TableWriter, Tally};
 use crate::timing::{self, Steps};
 
-/// Key of the table's settings under which is said what was followed in place of markers.
-pub(super) const MOVING: &str = "moving";
 /// Confidence from which on what moves is named: right results of the films with truth have 0.2 to 0.8, and of the wrong ones
 /// none has more than 0.16 (docs/validation.md, "What moves").
 const LEAST_CONFIDENCE: f64 = 0.2;

@@ -4,10 +4,9 @@
 
 use std::path::PathBuf;
 
-use super::moving::MOVING;
 use super::settings::{Existing, RunSettings};
 use super::state::{State, anew, partial_path};
-use super::summary::RunSummary;
+use super::summary::{MOVING, RunSummary};
 use crate::detect::DetectSettings;
 use crate::error::{Error, Fault, Place, Result};
 use crate::frame::SourceInfo;

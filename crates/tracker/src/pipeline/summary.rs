@@ -3,6 +3,9 @@
 use crate::message::Message;
 use crate::table::{NodeSummary, NodeTable, TableMeta};
 
+/// Key of the table's settings under which is said what was followed in place of markers.
+pub(super) const MOVING: &str = "moving";
+
 /// What came of a run.
 #[derive(Debug, Clone)]
 pub struct RunSummary {
