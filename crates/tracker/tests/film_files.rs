@@ -172,12 +172,12 @@ fn what_cannot_be_written_is_refused() {
     let text = WriteOptions { truth: Some(folder.path().join("t.txt")), ..WriteOptions::default() };
     assert!(message("a.mkv", &text).contains(".parquet or .csv"));
     // Options that the form has not, and values that are none.
-    let speed = |word: &str| WriteOptions { x264_preset: Some(word.into()), ..WriteOptions::default() };
+    let preset = |word: &str| WriteOptions { x264_preset: Some(word.into()), ..WriteOptions::default() };
     let quality = WriteOptions { quality: Some(3), ..WriteOptions::default() };
     let gray = WriteOptions { gray_only: true, ..WriteOptions::default() };
     let codec = WriteOptions { codec: Some(Codec::Raw), ..WriteOptions::default() };
-    assert!(message("a.mkv", &speed("fast")).starts_with("speed: it is of H.264 films"));
-    assert!(message("a.mp4", &speed("fastest")).contains("Give one of ultrafast, superfast"));
+    assert!(message("a.mkv", &preset("fast")).starts_with("x264_preset: it is of H.264 films"));
+    assert!(message("a.mp4", &preset("fastest")).contains("Give one of ultrafast, superfast"));
     assert!(message("a.mraw", &quality).starts_with("quality: it is of H.264 and MJPEG films"));
     assert!(message("a.avi", &gray).starts_with("gray_only: it is of H.264 films"));
     assert!(message("a.tif", &codec).starts_with("codec: it is of video files"));
