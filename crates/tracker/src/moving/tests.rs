@@ -122,8 +122,8 @@ fn a_thing_before_texture_is_followed_bright_or_dark_and_its_uncertainty_is_true
         let seen = f.tracks[0].spots().count();
         assert!(seen >= 175, "seed {seed}: {seen} of 180");
         let (rms, over) = errors(&f.tracks[0], round);
-        // The ground's texture pulls the half level: a few hundredths of the radius, as stated.
-        assert!(rms < 0.3, "seed {seed}: {rms} px");
+        // Noise of 2 over a contrast of 100 along an edge of 38 px leaves 0.01 px; a half is added for what the levels learn.
+        assert!(rms < 0.02, "seed {seed}: {rms} px");
         assert!((0.5..1.2).contains(&over), "seed {seed}: {over} of the stated uncertainty");
     }
 }

@@ -22,13 +22,15 @@ use crate::observation::{Observation, Status};
 use crate::rig::{Body, Node, RIG_SCHEMA, Rig};
 use crate::source::{self, OpenOptions};
 use crate::store::FrameStamp;
-use crate::table::{NodeTable, Rows, RunEnding, SCHEMA_VERSION, SourceFacts, TableMeta, TableWriter, Tally};
+use crate::table::{
+    NodeSummary, NodeTable, Rows, RunEnding, SCHEMA_VERSION, SourceFacts, TableMeta, TableWriter, Tally,
+};
 use crate::timing::{self, Steps};
 
 /// Confidence from which on what moves is named: right results of the films with truth have 0.2 to 0.8, and of the wrong ones
 /// none has more than 0.16 (docs/validation.md, "What moves").
 const LEAST_CONFIDENCE: f64 = 0.2;
-/// Part of the rows in which markers must be seen for their rig to be believed.
+/// Part of the decoded frames in which one marker at least must be seen for the rig to be believed.
 const LEAST_SEEN: f64 = 0.5;
 /// A marker this near to the place that a given rig has for a node is that node, in radii.
 const NAMED_RADII: f64 = 1.0;
@@ -55,9 +57,11 @@ pub(super) fn applies(settings: &RunSettings) -> bool {
 pub(super) fn is_wanted(markers: &Result<RunSummary>) -> bool {
     match markers {
         Ok(summary) => {
-            let rows = summary.frames * summary.nodes.len() as u64;
-            let seen: u64 = summary.nodes.iter().map(|n| n.seen).sum();
-            summary.meta.ending != RunEnding::Interrupted && (seen as f64) < LEAST_SEEN * rows as f64
+            let seldom = |n: &NodeSummary| {
+                let rows = n.seen + n.missing + n.ambiguous;
+                rows == 0 || (n.seen as f64) < LEAST_SEEN * rows as f64
+            };
+            summary.meta.ending != RunEnding::Interrupted && summary.nodes.iter().all(seldom)
         }
         Err(error) => matches!(error, Error::Detect(_) | Error::Rig(_)),
     }
