@@ -150,7 +150,7 @@ ARRAYS: dict[str, tuple[bytes, str]] = {
     "objects": (npy(HEADER.replace("<f8", "|O")), "array of object, not of numbers"),
     "text": (npy(HEADER.replace("<f8", "<U2")), "not of numbers"),
     "three dimensions": (npy(HEADER.replace("(2, 4)", "(2, 2, 2)")), r"\(2, 2, 2\)"),
-    "an archive": (b"PK\3\4" + bytes(60), "npz archive|another program's file"),
+    "an archive": (b"PK\3\4" + bytes(60), "npz archive|a packed file"),
 }  # fmt: skip
 
 
