@@ -24,7 +24,8 @@ def ground(seed: int) -> NDArray[np.float64]:
     for _ in range(300):
         r, level = rng.uniform(1, 10), rng.uniform(-45, 45)
         out += level * np.clip(r + 0.5 - np.hypot(x - rng.uniform(0, W), y - rng.uniform(0, H)), 0, 1)
-    return np.clip(out, 40, 180)
+    bounded: NDArray[np.float64] = np.clip(out, 40, 180)
+    return bounded
 
 
 def bob(k: int) -> tuple[float, float]:
@@ -117,7 +118,7 @@ def test_a_real_film_is_right_without_settings(name: str, tmp_path: Path) -> Non
     meta = json.loads((folder / "meta.json").read_text())
     table = tmp_path / "table.parquet"
     nodes = dp.track(folder / meta["film"], output=table)
-    command = [sys.executable, FILMS / "score.py", table, folder / "truth.csv", folder / "meta.json"]
+    command: list[str | Path] = [sys.executable, FILMS / "score.py", table, folder / "truth.csv", folder / "meta.json"]
     verdict = json.loads(subprocess.run(command, capture_output=True, check=True, text=True).stdout)
     assert verdict["verdict"] == "right", verdict
     assert any("what moves" in str(w) for w in nodes.meta["warnings"])
