@@ -118,7 +118,13 @@ def test_a_real_film_is_right_without_settings(name: str, tmp_path: Path) -> Non
     meta = json.loads((folder / "meta.json").read_text())
     table = tmp_path / "table.parquet"
     nodes = dp.track(folder / meta["film"], output=table)
-    command: list[str | Path] = [sys.executable, FILMS / "score.py", table, folder / "truth.csv", folder / "meta.json"]
+    command: list[str | Path] = [
+        sys.executable,
+        FILMS / "score.py",
+        table,
+        folder / "truth.csv",
+        folder / "meta.json",
+    ]
     verdict = json.loads(subprocess.run(command, capture_output=True, check=True, text=True).stdout)
     assert verdict["verdict"] == "right", verdict
     assert any("what moves" in str(w) for w in nodes.meta["warnings"])
