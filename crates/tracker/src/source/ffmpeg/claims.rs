@@ -49,7 +49,11 @@ pub(super) fn claims(
             _ => warnings.push(format!("the tag {tag} is {text:?}, which is no rate; it is not used").into()),
         }
     }
-    let first = |keys: &[&CStr]| keys.iter().find_map(|key| demuxer.tag(key));
+    // Some cameras write blanks there.
+    let first = |keys: &[&CStr]| {
+        let mut said = keys.iter().filter_map(|key| demuxer.tag(key)).map(|text| text.trim().to_owned());
+        said.find(|text| !text.is_empty())
+    };
     let camera: Vec<String> = [first(&MAKER), first(&MODEL)].into_iter().flatten().collect();
     let camera = Some(camera.join(" ")).filter(|c| !c.is_empty());
     details.extend(camera.clone().map(|c| ("camera".to_owned(), c)));
