@@ -132,6 +132,7 @@ impl Run<'_> {
             resumed: self.resumed,
             resumable: stop && self.settings.output.is_some() && !self.files.is_empty(),
             moving: false,
+            doubtful: Vec::new(),
             nodes: tally.summary(),
             warnings: std::mem::take(&mut self.warnings),
             table: rows.map(|rows| NodeTable { meta: meta.clone(), rows }),

@@ -190,6 +190,18 @@ impl Moving {
         warnings.extend(timing::notes(&timing));
         warnings.extend(damage.gaps.dropped_words().map(Message::from));
         warnings.extend(self.notes());
+        let mut doubtful = Vec::new();
+        for (node, usual) in self.doubtful() {
+            let name = rig.nodes[node].name.clone();
+            warnings.push(
+                format!(
+                    "the centre of {name} depends on what is taken for the marker: brightness, colour and outline have centres \
+                     that differ; its standard uncertainty is {usual:.1} px in half of the frames"
+                )
+                .into(),
+            );
+            doubtful.push(name);
+        }
         let meta = TableMeta {
             schema_version: SCHEMA_VERSION,
             tool: TableMeta::this_tool(),
@@ -212,6 +224,7 @@ impl Moving {
             resumed: 0,
             resumable: false,
             moving: true,
+            doubtful,
             nodes: tally.summary(),
             warnings,
             table: collected.map(|rows| NodeTable { meta: meta.clone(), rows }),
@@ -284,7 +297,20 @@ impl Moving {
         }
     }
 
-    /// How it was found and what is not certain, in words.
+    /// Columns whose usual standard uncertainty is a large part of the radius, with that uncertainty, px.
+    fn doubtful(&self) -> Vec<(usize, f32)> {
+        let limit = TELL_SIGMA_RADII * self.followed.radius_px * self.scale;
+        let usual = |node: usize| {
+            let seen = self.rows.iter().map(|r| &r[node]).filter(|o| o.status.is_seen());
+            let mut sigma: Vec<f32> = seen.map(|o| o.sigma_px).collect();
+            sigma.sort_unstable_by(f32::total_cmp);
+            sigma.get(sigma.len() / 2).copied()
+        };
+        let columns = 0..self.rows.first().map_or(0, Vec::len);
+        columns.filter_map(|k| Some((k, usual(k).filter(|s| f64::from(*s) > limit)?))).collect()
+    }
+
+    /// How it was found, in words.
     fn notes(&self) -> Vec<Message> {
         let count = self.followed.tracks.len();
         let markers = if count == 1 { "marker" } else { "markers" };
@@ -302,26 +328,6 @@ impl Moving {
             )
             .into(),
         ];
-        let limit = TELL_SIGMA_RADII * self.followed.radius_px * self.scale;
-        for node in 0..count {
-            let mut sigma: Vec<f32> = self
-                .rows
-                .iter()
-                .map(|r| &r[node])
-                .filter(|o| o.status.is_seen())
-                .map(|o| o.sigma_px)
-                .collect();
-            sigma.sort_unstable_by(f32::total_cmp);
-            if let Some(&usual) = sigma.get(sigma.len() / 2).filter(|s| f64::from(**s) > limit) {
-                notes.push(
-                    format!(
-                        "the centre of n{node} depends on what is taken for the marker: brightness, colour and outline have \
-                         centres that differ; its standard uncertainty is {usual:.1} px in half of the frames"
-                    )
-                    .into(),
-                );
-            }
-        }
         if self.copies > 0 {
             notes.push(
                 format!(
@@ -365,6 +371,7 @@ fn rows(film: &WorkFilm, tracks: &[Track]) -> Vec<Vec<Observation>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::moving::{Direction, Model};
 
     #[test]
     fn what_moves_is_followed_only_where_nothing_was_said_of_markers() {
@@ -384,5 +391,26 @@ mod tests {
         assert!(is_wanted(&Err(Error::Rig(fault()))));
         assert!(!is_wanted(&Err(Error::Source(fault()))));
         assert!(!is_wanted(&Err(Error::Interrupted)));
+    }
+
+    #[test]
+    fn a_centre_is_doubtful_from_a_tenth_of_the_radius_on() {
+        let model = Model { direction: Direction::LUMA, sign: 1.0, octave: 1 };
+        let followed =
+            Followed { model, tracks: Vec::new(), radius_px: 5.0, confidence: 0.5, others: Vec::new() };
+        let seen = |sigma_px: f32| Observation { sigma_px, status: Status::Seen, ..Observation::MISSING };
+        // A work picture of half the size: the radius is 10 px. A node that is never seen is not doubtful.
+        let rows = vec![vec![seen(0.9), seen(1.1), Observation::MISSING]; 3];
+        let moving = Moving {
+            followed,
+            scale: 2.0,
+            copies: 0,
+            decoded: 3,
+            stamps: Vec::new(),
+            rows,
+            ending: Ending::Complete,
+            gaps: Gaps::default(),
+        };
+        assert_eq!(moving.doubtful(), [(1, 1.1)]);
     }
 }

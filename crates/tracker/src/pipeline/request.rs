@@ -116,6 +116,7 @@ pub(super) fn already_done(settings: &RunSettings, request: &Request) -> Result<
         frames: table.frames() as u64,
         resumed: table.frames() as u64,
         resumable: false,
+        doubtful: Vec::new(),
         moving: table.meta.settings.get(MOVING).is_some(),
         nodes: table.summary(),
         warnings: vec![format!("{} was complete already", text(output)).into()],

@@ -19,6 +19,8 @@ pub struct RunSummary {
     pub resumable: bool,
     /// Whether what moves was followed, because no markers stand out.
     pub moving: bool,
+    /// Names of nodes whose centres depend on what is taken for the marker; only of what moves.
+    pub doubtful: Vec<String>,
     /// What became of each node.
     pub nodes: Vec<NodeSummary>,
     /// What a user should know, a sentence each.

@@ -127,6 +127,10 @@ pub fn run(args: Args, front: &CommandLine) -> anyhow::Result<ExitCode> {
             print::say(format!("not seen again up to the end: {}", lost.join(", ")));
             1
         }
+        RunEnding::Complete if !summary.doubtful.is_empty() => {
+            print::say(format!("the centres are doubtful: {}", summary.doubtful.join(", ")));
+            1
+        }
         RunEnding::Damaged => 1,
         RunEnding::Complete => 0,
     };
