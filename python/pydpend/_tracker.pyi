@@ -141,7 +141,7 @@ class LiveTracker:
         """What was detected in the last image."""
 
 def read_table(path: str) -> Columns:
-    """frame (T,), time in s (T,), centres in px (T, N, 2), sigma in px, area in px and status (T, N), JSON."""
+    """Frame (T,), time in s (T,), centres in px (T, N, 2), sigma in px, area in px and status (T, N), JSON."""
 
 def damage_words(damage: str) -> str | None: ...
 def read_meta(path: str) -> str:

@@ -19,8 +19,7 @@ from pydpend.errors import ModelError, fault
 
 @dataclass(frozen=True)
 class Ratios:
-    """The ratios of Table 9 for one bearing: ``omega_D = D11 w_A + D12 w_B``, ``omega_C = C11 w_A - C12
-    w_B``."""
+    """The ratios of Table 9 for one bearing: ``omega_D = D11 w_A + D12 w_B``, ``omega_C = C11 w_A - C12 w_B``."""
 
     d11: Any
     d12: Any

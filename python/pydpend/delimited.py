@@ -122,8 +122,14 @@ class Cells:
                 )
 
     def _row_of_time_decimals(self, fields: dict[int, list[str]], time: int, wanted: set[int]) -> int | None:
-        """The first row in which whole seconds and the value beside them may be one time, 0,125, and the column behind
-        them, which nobody asked for, the value; ``None`` where it is not so."""
+        """The first row in which a comma may be a decimal mark of the time; ``None`` where there is none.
+
+        Whole seconds and the value beside them may be one time, 0,125, and the column behind them, which nobody asked
+        for, the value.
+
+        Whole seconds and the value beside them may be one time, 0,125, and the column behind them, which nobody asked
+        for, the value.
+        """
         value, behind = time + 1, time + 2
         if behind not in fields or behind in wanted or not _is_in_seconds(self.header[time]):
             return None
@@ -188,8 +194,12 @@ class Cells:
                 self.refuse(said, "Repair or remove the line", f"line {start}")
 
     def _only_empty(self, row: list[str]) -> bool:
-        """Whether a row has the header's fields and empty ones after them, is blank, or lacks LabVIEW's comment, which
-        it writes in the first row alone."""
+        """Whether a row has the header's fields and empty ones after them, or may be shorter.
+
+        It may if it is blank, or lacks LabVIEW's comment, which that writes in the first row alone.
+
+        It may if it is blank, or lacks LabVIEW's comment, which that writes in the first row alone.
+        """
         width = len(self.header)
         if len(row) > width:
             return not any(f.strip() for f in row[width:])

@@ -216,7 +216,7 @@ def _root(value: object, source: str, error: type[PydpendError], advice: Text, f
 
 
 def read_text(path: Path, error: type[PydpendError], advice: Text = "") -> str:
-    """The text of a file, UTF-8 or, with a byte order mark, UTF-16; line ends as ``\\n``.
+    r"""The text of a file, UTF-8 or, with a byte order mark, UTF-16; line ends as ``\n``.
 
     Raises ``error`` naming the file, and the line of what is no text.
     """

@@ -30,13 +30,24 @@ class States(Protocol):
     """Angles, rates and accelerations: what `dp.states` and a simulation both give."""
 
     @property
-    def t_s(self) -> Floats: ...
+    def t_s(self) -> Floats:
+        """Times (T,), s."""
+        ...
+
     @property
-    def phi_rad(self) -> Floats: ...
+    def phi_rad(self) -> Floats:
+        """Angles (T, L), rad."""
+        ...
+
     @property
-    def w_rad_s(self) -> Floats: ...
+    def w_rad_s(self) -> Floats:
+        """Rates (T, L), rad/s."""
+        ...
+
     @property
-    def a_rad_s2(self) -> Floats: ...
+    def a_rad_s2(self) -> Floats:
+        """Accelerations (T, L), rad/s2."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,9 +144,13 @@ def _rectified(
 
 
 def fit_profiles(profiles: Sequence[EnergyProfile], *, bounded: bool = True) -> EnergyFit:
-    """The coefficients (not negative), common to all profiles, and a free E0 each, that bring the works
-    nearest to the energies. The covariance takes the residuals' autocorrelation from their integrated
-    correlation time.
+    """The coefficients (not negative), common to all profiles, that bring the works nearest to the energies.
+
+    Each profile has a free E0. The covariance takes the residuals' autocorrelation from their integrated correlation
+    time.
+
+    Each profile has a free E0. The covariance takes the residuals' autocorrelation from their integrated correlation
+    time.
 
     Raises FitError when the profiles do not have the same laws, or do not determine them.
     """
@@ -193,8 +208,12 @@ def fit_profiles(profiles: Sequence[EnergyProfile], *, bounded: bool = True) -> 
 
 
 def fit_lbfgsb(profiles: Sequence[EnergyProfile], *, tight: bool = True) -> tuple[Floats, float]:
-    """The paper's optimiser on the same problem, scaled; with scipy's default tolerances (``tight=False``) it
-    stops early. Returns the coefficients (C,) and the sum of squares in J^2."""
+    """The paper's optimiser on the same problem, scaled: coefficients (C,) and the sum of squares in J^2.
+
+    With scipy's default tolerances (``tight=False``) it stops early.
+
+    With scipy's default tolerances (``tight=False``) it stops early.
+    """
     design, scale = _design(profiles)
     energy = np.concatenate([p.energy_j for p in profiles])
     laws = len(profiles[0].names)
@@ -224,8 +243,12 @@ def _design(profiles: Sequence[EnergyProfile]) -> tuple[Floats, Floats]:
 
 
 def correlation_time(residual: Floats) -> float:
-    """Integrated autocorrelation time in samples (1 for white residuals): the sum of correlations up to the
-    first one below 0.05, at most a tenth of the record."""
+    """Integrated autocorrelation time in samples (1 for white residuals).
+
+    The sum of correlations up to the first one below 0.05, at most a tenth of the record.
+
+    The sum of correlations up to the first one below 0.05, at most a tenth of the record.
+    """
     r = residual - residual.mean()
     n = r.size
     power = np.abs(np.fft.rfft(r, 2 * n)) ** 2

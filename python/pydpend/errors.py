@@ -151,7 +151,13 @@ def listed(words: Iterable[str], last: str = "or") -> str:
 
 
 class PydpendError(Exception):
-    """Anything that pydpend refuses or cannot do. ``message`` is what it says, with settings as data."""
+    """Anything that pydpend refuses or cannot do.
+
+    Attributes
+    ----------
+    message : pydpend.errors.Message
+        What it says, with settings as data.
+    """
 
     def __init__(self, message: Text = "") -> None:
         self.message = Message.of(message)

@@ -34,15 +34,22 @@ gives the first 65535 frames, c3d 0.6 fails)."""
 def export(nodes: Nodes, path: str | os.PathLike[str], *, px_per_m: float | None = None) -> None:
     """Writes nodes for another program, by the ending: `.c3d`, `.trc`, `.csv` (DLTdv xypts) or `.mat`.
 
-    Args:
-        nodes: the nodes.
-        path: the file; one that is there is replaced when the new one is whole.
-        px_per_m: scale of the image; C3D and TRC are then in mm. Not used for the others, which are in px.
+    Parameters
+    ----------
+    nodes : Nodes
+        The nodes.
+    path : path-like
+        The file; one that is there is replaced when the new one is whole.
+    px_per_m : float, optional
+        Scale of the image, px per m; C3D and TRC are then in mm. Not used for the others, which are in px.
 
-    Raises:
-        ArgumentError: if the ending is not known or the scale makes no sense.
-        TableError: if the form cannot hold the table (C3D and TRC need one rate, and C3D ends at frame 65534 counted
-            from 1), or the file cannot be written.
+    Raises
+    ------
+    ArgumentError
+        If the ending is not known or the scale makes no sense.
+    TableError
+        If the form cannot hold the table (C3D and TRC need one rate, and C3D ends at frame 65534 counted from 1), or
+        the file cannot be written.
     """
     target = Path(os.fsdecode(path))
     writer = WRITERS.get(target.suffix.lower())

@@ -39,9 +39,18 @@ PRESETS = ("clean", "noisy", "dim", "glints", "late", "dropout", "occluded", "fa
 class Truth:
     """What is true of a film of T frames, N markers and L links.
 
-    ``t_s (T,)``: middle of each exposure. ``xy_px (T, N, 2)``: centres in image coordinates (y down), given also where
-    nothing can be seen. ``visible (T, N)``: part of a marker's area that is seen, 0 to 1. ``phi_rad (T, L)``: angles,
-    counter-clockwise positive, 0 hanging down. ``nodes``, ``bodies``: each marker's name and link.
+    Attributes
+    ----------
+    t_s : ndarray of float, shape (T,)
+        Middle of each exposure, s.
+    xy_px : ndarray of float, shape (T, N, 2)
+        Centres in px, x right, y down; given also where nothing can be seen.
+    visible : ndarray of float, shape (T, N)
+        Part of a marker's area that is seen, 0 to 1.
+    phi_rad : ndarray of float, shape (T, L)
+        Angles, rad, counter-clockwise positive, 0 hanging down.
+    nodes, bodies : tuple of str
+        Name of each marker and of its link.
     """
 
     t_s: NDArray[np.float64]
@@ -55,12 +64,22 @@ class Truth:
 class Film:
     """A scene ready to be filmed; nothing in it changes.
 
-    ``scene``: a TOML file's path, a dictionary of the same form, or the name of a preset.
-    ``motion``: times (T,) in s and angles (T, L) in rad of the links in the scene's order, counter-clockwise positive,
-    0 hanging down, or anything with ``t_s`` and ``phi_rad`` (a simulation, link angles); its first time is frame 0.
-    ``seed``, ``frames``, ``rate_hz``: replace the scene's.
+    Parameters
+    ----------
+    scene : path-like or dict
+        A TOML file's path, a dictionary of the same form, or the name of a preset.
+    motion : tuple of ndarray, or object with ``t_s`` and ``phi_rad``, optional
+        Times (T,) in s and angles (T, L) in rad of the links in the scene's order, counter-clockwise positive, 0
+        hanging down (a simulation, link angles); the first time is frame 0.
+    seed, frames : int, optional
+        Seed of the noise and number of frames, in place of the scene's.
+    rate_hz : float, optional
+        Frames per s, in place of the scene's.
 
-    Raises :class:`pydpend.FilmError` for a scene that makes no sense, naming line or key, or a motion too short.
+    Raises
+    ------
+    FilmError
+        For a scene that makes no sense, naming line or key, or a motion too short.
     """
 
     def __init__(
@@ -98,16 +117,54 @@ class Film:
         return scene
 
     def image(self, frame: int) -> NDArray[np.uint8] | NDArray[np.uint16]:
-        """The recorded levels of a frame, (H, W); uint8 up to 8 bits, else uint16."""
+        """The recorded levels of a frame.
+
+        Parameters
+        ----------
+        frame : int
+            Index of the frame, from 0.
+
+        Returns
+        -------
+        ndarray of uint8 or uint16, shape (H, W)
+            Levels; uint8 up to 8 bits, else uint16.
+
+        Raises
+        ------
+        FilmError
+            If the film has no such frame.
+        """
         image: NDArray[np.uint8] | NDArray[np.uint16] = self._film.image(frame)
         return image
 
     def expected(self, frame: int) -> NDArray[np.float32]:
-        """The expected levels of a frame, (H, W): no noise, no rounding, no saturation."""
+        """The expected levels of a frame: no noise, no rounding, no saturation.
+
+        Parameters
+        ----------
+        frame : int
+            Index of the frame, from 0.
+
+        Returns
+        -------
+        ndarray of float32, shape (H, W)
+            Levels.
+
+        Raises
+        ------
+        FilmError
+            If the film has no such frame.
+        """
         return self._film.expected(frame)
 
     def truth(self) -> Truth:
-        """What is true of every frame."""
+        """What is true of every frame.
+
+        Returns
+        -------
+        Truth
+            Places, visibility and angles.
+        """
         time, xy, visible, phi = self._film.truth()
         markers = self.scene.get("marker", [])
         return Truth(
@@ -120,7 +177,18 @@ class Film:
         )
 
     def rig_toml(self, frame: int = 0) -> str:
-        """The rig file as a perfect ``tracker setup`` would write it from ``frame``."""
+        """The rig file as a perfect ``tracker setup`` would write it.
+
+        Parameters
+        ----------
+        frame : int
+            Index of the reference picture, from 0.
+
+        Returns
+        -------
+        str
+            TOML that `Rig.read` reads.
+        """
         return self._film.rig_toml(frame)
 
     def write(
@@ -136,16 +204,34 @@ class Film:
         safe_csv: bool = False,
         force: bool = False,
     ) -> None:
-        """Writes the film and, if wanted, its truth (.parquet or .csv, a row per frame and marker).
+        """Writes the film and, if wanted, its truth. Each file takes its name when it is whole.
 
-        The ending of ``output`` decides the form: .mp4 .mov .mkv .avi, .mraw (with its .cih), .tif (pages), .y4m, or
-        numbered images as in ``frames/%05d.png``. ``quality``: H.264's rate factor 0 to 51 or MJPEG's 1 to 31.
-        ``x264_preset``: of H.264, ultrafast to placebo. ``bits``: of a .mraw, 8, 10, 12 or 16. ``safe_csv``: as in
-        `Nodes.write`, for the truth. ``force``: replace files that are there already; each takes its name when it is
-        whole.
+        Parameters
+        ----------
+        output : path-like
+            The film; its ending decides the form: .mp4 .mov .mkv .avi, .mraw (with its .cih), .tif (pages), .y4m, or
+            numbered images as in ``frames/%05d.png``.
+        truth : path-like, optional
+            The truth, .parquet or .csv, a row per frame and marker.
+        codec : {"h264", "ffv1", "mjpeg", "raw"}, optional
+            How pictures are coded; by the form if not given.
+        quality : int, optional
+            Rate factor of H.264, 0 to 51, or of MJPEG, 1 to 31; small is good.
+        x264_preset : str, optional
+            Preset of H.264, ultrafast to placebo.
+        gray_only : bool
+            Whether the film has no colour planes.
+        bits : int, optional
+            Bits per sample of a .mraw: 8, 10, 12 or 16.
+        safe_csv : bool
+            Whether names in the truth are marked for spreadsheets, see `Nodes.write`.
+        force : bool
+            Whether to replace files that are there already.
 
-        Raises :class:`pydpend.FilmError` if the form cannot hold the film, a file is there already or is the scene's,
-        or the film cannot be written.
+        Raises
+        ------
+        FilmError
+            If the form cannot hold the film, a file is there already or is the scene's, or the film cannot be written.
         """
         self._film.write(
             os.fsdecode(output),
@@ -178,7 +264,31 @@ def film(
     safe_csv: bool = False,
     force: bool = False,
 ) -> Film:
-    """Films a scene into a file; see :class:`Film` and :meth:`Film.write`. Returns the film, which knows its truth."""
+    """A scene filmed into a file.
+
+    Parameters
+    ----------
+    scene : path-like or dict
+        A TOML file's path, a dictionary of the same form, or the name of a preset.
+    output : path-like
+        The film; its ending decides the form, as in `Film.write`.
+    truth : path-like, optional
+        The truth, .parquet or .csv, a row per frame and marker.
+    motion, seed, frames, rate_hz : optional
+        As in `Film`.
+    codec, quality, x264_preset, gray_only, bits, safe_csv, force : optional
+        As in `Film.write`.
+
+    Returns
+    -------
+    Film
+        The film, which knows its truth.
+
+    Raises
+    ------
+    FilmError
+        As `Film` and `Film.write`.
+    """
     made = Film(scene, motion=motion, seed=seed, frames=frames, rate_hz=rate_hz)
     made.write(
         output,

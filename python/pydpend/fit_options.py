@@ -55,39 +55,63 @@ class FitKeywords(TypedDict, total=False):
 
 @dataclass(frozen=True, kw_only=True)
 class FitOptions:
-    """How the damping is fitted. Every field is a flag of the same name in ``pydpend fit`` and ``pydpend analyse``.
+    """How the damping is fitted.
 
-    Raises FitOptionError for a value that is not known, or an option of the other method.
+    Every parameter is a flag of the same name in ``pydpend fit`` and ``pydpend analyse``, described by the same words.
+
+    Parameters
+    ----------
+    method : str
+        ``trajectory``: the equations of motion are fitted to the angles; ``energy``: the paper's energy
+        profile.
+    laws : str or sequence of str
+        ``full``, ``paper`` or a list of coefficients with commas (``mu_v1,tau_c1``).
+    ratios : str or bool, optional
+        ``free``: the inertial ratios are fitted too (trajectory only, and its default); ``fixed``: the
+        model's are believed.
+    free : str or sequence of str
+        Further parameters to fit, with commas: added_inertia, tilt, offset1, offset2 (trajectory only).
+    clock : bool
+        Fit the scale of the camera's clock too (trajectory only).
+    angle_maps : bool
+        Learn the repeatable angle-dependent bias of the tracking with the fit (trajectory only).
+    pinned : bool
+        The elbow is pinned: a single pendulum. A recording of one link needs a one-link model instead.
+    ten_coefficients : bool
+        Also the paper's ten (Table 6), with a warning; needs the energy method and the paper's laws.
+    intervals : str
+        ``covariance``: standard errors; ``profile``: 95 % intervals by profile likelihood too (takes much
+        longer).
+    comparison : bool, optional
+        Leave each term out in turn, to say which the data ask for (trajectory only; the programs do it if not
+        told).
+    prediction : bool, optional
+        Predict each recording from the others, or the last part of a single one from the rest (the latter
+        trajectory only). The programs do it if not told, where it can be.
+    start_s : float, optional
+        Start of the free decay, s; found if not given.
+    stop_s : float, optional
+        End of the free decay, s; found if not given.
+
+    Raises
+    ------
+    FitOptionError
+        For a value that is not known, or an option of the other method.
     """
 
     method: str = option("trajectory", choices=METHODS)
-    """``trajectory``: the equations of motion are fitted to the angles; ``energy``: the paper's energy profile."""
     laws: str | Sequence[str] = option("full")
-    """``full``, ``paper`` or a list of coefficients with commas (``mu_v1,tau_c1``)."""
     ratios: str | bool | None = option(None, choices=RATIOS, of="trajectory")
-    """``free``: the inertial ratios are fitted too (trajectory only, and its default); ``fixed``: the model's are
-    believed."""
     free: str | Sequence[str] = option("", of="trajectory")
-    """Further parameters to fit, with commas: added_inertia, tilt, offset1, offset2 (trajectory only)."""
     clock: bool = option(False, of="trajectory")
-    """Fit the scale of the camera's clock too (trajectory only)."""
     angle_maps: bool = option(False, of="trajectory")
-    """Learn the repeatable angle-dependent bias of the tracking with the fit (trajectory only)."""
     pinned: bool = option(False)
-    """The elbow is pinned: a single pendulum. A recording of one link needs a one-link model instead."""
     ten_coefficients: bool = option(False, of="energy")
-    """Also the paper's ten (Table 6), with a warning; needs the energy method and the paper's laws."""
     intervals: str = option("covariance", choices=INTERVALS, of="trajectory")
-    """``covariance``: standard errors; ``profile``: 95 % intervals by profile likelihood too (takes much longer)."""
     comparison: bool | None = option(None, of="trajectory")
-    """Leave each term out in turn, to say which the data ask for (trajectory only; the programs do it if not told)."""
     prediction: bool | None = option(None)
-    """Predict each recording from the others, or the last part of a single one from the rest (the latter trajectory
-    only). The programs do it if not told, where it can be."""
     start_s: float | None = option(None)
-    """Start of the free decay, s; found if not given."""
     stop_s: float | None = option(None)
-    """End of the free decay, s; found if not given."""
 
     def __post_init__(self) -> None:
         for name in ("laws", "free"):
@@ -120,7 +144,25 @@ class FitOptions:
 
     @classmethod
     def of(cls, options: FitOptions | None, **keywords: Any) -> FitOptions:
-        """The options with the keywords that are not None in place of theirs."""
+        """Options with keywords in place of theirs.
+
+        Parameters
+        ----------
+        options : FitOptions or None
+            The options; the defaults if None.
+        **keywords : optional
+            Fields; those that are None change nothing.
+
+        Returns
+        -------
+        FitOptions
+            The options, without what a class that extends them has more.
+
+        Raises
+        ------
+        FitOptionError
+            For a value that is not known, or an option of the other method.
+        """
         for old, new in OLD_NAMES.items():
             if old in keywords:
                 raise FitOptionError(fault(old, f"the option is called {new} now", "Rename it"))
@@ -148,21 +190,46 @@ class FitOptions:
         return tuple(name.strip() for name in _with_commas(self.free).split(",") if name.strip())
 
     def coefficients(self, *, single: bool) -> tuple[str, ...]:
-        """The coefficients to fit; those of the upper joint where the recordings are of a ``single`` pendulum.
+        """The coefficients to fit.
 
-        Raises FitOptionError for what was named and a single pendulum has not.
+        Parameters
+        ----------
+        single : bool
+            Whether the recordings are of a single pendulum: those of the upper joint then.
+
+        Returns
+        -------
+        tuple of str
+            Names of coefficients of `Damping`.
+
+        Raises
+        ------
+        FitOptionError
+            For what was named and a single pendulum has not.
         """
         names = coefficients(self.laws)
         return self._of_one_link(names) if single else names
 
     def bare(self) -> Self:
-        """The same fit without what is found beside its coefficients: intervals, comparison, prediction, the ten."""
+        """The same fit without what is found beside its coefficients: intervals, comparison, prediction, the ten.
+
+        Returns
+        -------
+        FitOptions
+            The options.
+        """
         return replace(
             self, intervals=INTERVALS[0], comparison=False, prediction=False, ten_coefficients=False
         )
 
     def as_programs_do(self) -> Self:
-        """With the comparison and the prediction that nobody spoke of, where the method has them."""
+        """The options with the comparison and the prediction that nobody spoke of, where the method has them.
+
+        Returns
+        -------
+        FitOptions
+            The options.
+        """
         return replace(
             self,
             comparison=self.is_trajectory if self.comparison is None else self.comparison,
@@ -170,11 +237,23 @@ class FitOptions:
         )
 
     def key(self) -> dict[str, Any]:
-        """All that the result of a fit depends on besides its recordings and its model."""
+        """All that the result of a fit depends on besides its recordings and its model.
+
+        Returns
+        -------
+        dict
+            Each field's value by its name.
+        """
         return asdict(self.fit)
 
     def check_own_prediction(self) -> None:
-        """Raises FitOptionError where a part of the recordings that are fitted cannot be predicted from the rest."""
+        """Checks that a part of the recordings that are fitted can be predicted from the rest, if that is asked for.
+
+        Raises
+        ------
+        FitOptionError
+            If the method leaves no part out.
+        """
         if self.prediction:
             self._check_method("prediction", METHODS[0])
 

@@ -14,10 +14,14 @@ LEAST = 1e-14
 
 
 def principal_axes(information: Floats) -> tuple[Floats, Floats]:
-    """Principal values (G,) of a symmetric information matrix scaled to a unit diagonal, and what each is of, as
-    columns (G, G) in the unknowns' own units.
+    """Principal values (G,) of a symmetric information matrix scaled to a unit diagonal.
 
-    Raises:
+    Also what each is of, as columns (G, G) in the unknowns' own units.
+
+    Also what each is of, as columns (G, G) in the unknowns' own units.
+
+    Raises
+    ------
         FitError: if the matrix has entries that are not finite.
     """
     scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
@@ -32,7 +36,8 @@ def principal_axes(information: Floats) -> tuple[Floats, Floats]:
 def invert(information: Floats) -> Floats:
     """Inverse of a symmetric information matrix (G, G), scaled first; directions it lacks get a huge variance.
 
-    Raises:
+    Raises
+    ------
         FitError: if the matrix has entries that are not finite.
     """
     values, axes = principal_axes(information)
@@ -43,7 +48,8 @@ def invert(information: Floats) -> Floats:
 def check_errors(names: list[str], covariance: Floats) -> None:
     """Whether each of the unknowns ``names`` has a standard error that means something: a finite one above 0.
 
-    Raises:
+    Raises
+    ------
         FitError: naming the first that has none.
     """
     for name, variance in zip(names, np.diag(covariance), strict=True):

@@ -68,8 +68,10 @@ def stamp_in(t_s: Floats) -> tuple[int, str] | None:
 
 
 def seconds_of_text(fields: Sequence[str]) -> tuple[Floats, str]:
-    """Seconds of ISO 8601 dates with times (T,), counted from the first, or of times of day and durations; NaN where a
-    field is empty. And the first stamp, "" for durations. With an offset from UTC in every field or in none.
+    """Seconds of dates, times of day or durations written as text (T,), and the first date, "" where there is none.
+
+    Dates with times are ISO 8601, with an offset from UTC in every field or in none, and are counted from the first.
+    NaN where a field is empty.
 
     Raises NotInstants with the row of the first field that is neither.
     """
@@ -118,7 +120,9 @@ def _clock_s(field: str, row: int) -> float:
 
 def seconds_of_arrow(column: pa.ChunkedArray) -> tuple[Floats, str] | None:
     """Seconds of an Arrow column of dates, times of day or durations (T,), NaN where it is null, and the first stamp.
-    ``None`` for a column of anything else."""
+
+    ``None`` for a column of anything else.
+    """
     kind = column.type
     if pa.types.is_date(kind):
         column = column.cast(pa.timestamp("ms"))

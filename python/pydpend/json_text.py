@@ -12,8 +12,20 @@ class JsonResult(ABC):
 
     @abstractmethod
     def to_dict(self) -> dict[str, Any]:
-        """Plain numbers, texts, lists and tables; None for what is not defined."""
+        """The result as plain values.
+
+        Returns
+        -------
+        dict
+            Plain numbers, texts, lists and tables; None for what is not defined.
+        """
 
     def to_json(self) -> str:
-        """`to_dict` as JSON."""
+        """The result as JSON.
+
+        Returns
+        -------
+        str
+            `to_dict` as text.
+        """
         return json.dumps(self.to_dict(), indent=1, allow_nan=False) + "\n"

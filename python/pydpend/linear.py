@@ -16,21 +16,40 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Modes:
-    """The two modes of small oscillation about hanging, slow one first."""
+    """The two modes of small oscillation about hanging, slow one first.
+
+    Attributes
+    ----------
+    frequency_hz : ndarray of float, shape (2,)
+        Damped frequency, Hz; 0 for a mode damped beyond oscillating.
+    shape : ndarray of float, shape (2, 2)
+        Amplitude of (phi1, phi2) of each mode, a row each, the larger one being 1.
+    damping_ratio : ndarray of float, shape (2,)
+        Of the viscous terms alone: the others are of second order or dry, and no linear term.
+    """
 
     frequency_hz: Array
-    """Damped frequency, (2,); 0 for a mode damped beyond oscillating."""
     shape: Array
-    """Amplitude of (phi1, phi2) of each mode, (2 modes, 2), the larger one being 1."""
     damping_ratio: Array
-    """Of the viscous terms alone, (2,): the others are of second order or dry, and no linear term."""
 
 
 def modes(model: Model, damping: Damping | None = None) -> Modes:
     """Modes of ``M a + C w + K phi = 0``: mass matrix at rest, viscous moments, weight moments.
 
-    1.108 and 2.267 Hz for ``derived("A")``: the decisive test on the last seconds of any recording (Table 7 would
-    give 1.17 and 5.68 Hz).
+    1.108 and 2.267 Hz for ``derived("A")``: the decisive test on the last seconds of any recording (Table 7 would give
+    1.17 and 5.68 Hz). docs/physics.md section 10.
+
+    Parameters
+    ----------
+    model : Model
+        The pendulum.
+    damping : Damping, optional
+        Its coefficients, of which the viscous ones count; none if not given.
+
+    Returns
+    -------
+    pydpend.linear.Modes
+        Frequencies (Hz), shapes and damping ratios.
     """
     d = damping or Damping()
     mass = model.mass_matrix([0.0, 0.0])
@@ -53,14 +72,21 @@ def modes(model: Model, damping: Damping | None = None) -> Modes:
 
 @dataclass(frozen=True, eq=False)
 class Section:
-    """Passages of a link through an angle."""
+    """K passages of a link through an angle.
+
+    Attributes
+    ----------
+    t_s : ndarray of float, shape (K,)
+        Time, s.
+    phi_rad : ndarray of float, shape (K, 2)
+        Angles, rad, not reduced to one turn.
+    w_rad_s : ndarray of float, shape (K, 2)
+        Rates, rad/s.
+    """
 
     t_s: Array
-    """(K,)"""
     phi_rad: Array
-    """(K, 2), not reduced to one turn."""
     w_rad_s: Array
-    """(K, 2)"""
 
 
 def poincare(
@@ -74,8 +100,37 @@ def poincare(
     direction: int = 1,
     tolerance: float = 1e-11,
 ) -> Section:
-    """States at which ``link`` (1 or 2) passes ``angle_rad`` (mod 2 pi) with its rate of the sign ``direction``
-    (0: either), during ``duration_s`` from ``state``. Raises SimulationError as `simulate` does."""
+    """States at which a link passes an angle: a Poincaré section (docs/physics.md section 11).
+
+    Parameters
+    ----------
+    model : Model
+        The pendulum.
+    damping : Damping
+        Its coefficients.
+    state : array-like, shape (4,)
+        Angles phi1, phi2 (rad) and rates w1, w2 (rad/s) at time 0.
+    duration_s : float
+        How long the motion is followed, s.
+    link : {1, 2}
+        The link.
+    angle_rad : float
+        The angle (mod 2 pi), rad, counter-clockwise positive, zero hanging.
+    direction : {-1, 0, 1}
+        Sign of the link's rate as it passes; 0 is either.
+    tolerance : float
+        Local error allowed per step, as in `simulate`.
+
+    Returns
+    -------
+    pydpend.linear.Section
+        Times and states of the passages.
+
+    Raises
+    ------
+    SimulationError
+        As `simulate`, and for a link, direction or duration that cannot be.
+    """
     if link not in (1, 2) or direction not in (-1, 0, 1):
         raise SimulationError(
             fault("poincare", f"link {link}, direction {direction}", "Links are 1 and 2, directions -1, 0, 1")
@@ -99,13 +154,21 @@ def poincare(
 
 @dataclass(frozen=True, eq=False)
 class Exponent:
-    """The largest Lyapunov exponent."""
+    """The largest Lyapunov exponent.
+
+    Attributes
+    ----------
+    per_s : float
+        The exponent, 1/s.
+    sigma_per_s : float
+        Standard error, 1/s, from batches of intervals long against their correlation.
+    growth_per_s : ndarray of float, shape (K,)
+        Rate of growth in each interval, 1/s.
+    """
 
     per_s: float
     sigma_per_s: float
-    """Standard error, from batches of intervals long against their correlation."""
     growth_per_s: Array
-    """Rate of growth in each interval."""
 
 
 def lyapunov(
@@ -118,10 +181,34 @@ def lyapunov(
     interval_s: float = 0.5,
     tolerance: float = 1e-10,
 ) -> Exponent:
-    """Largest Lyapunov exponent of the motion from ``state``: mean growth of an exactly carried tangent vector.
+    """Largest Lyapunov exponent of a motion: mean growth of an exactly carried tangent vector.
 
-    Without dry friction (its jumps have no tangent). The error is that of the mean over 20 batches. Raises
-    SimulationError for dry friction, a bad state, or fewer than 40 intervals.
+    docs/physics.md section 11.
+
+    Parameters
+    ----------
+    model : Model
+        The pendulum.
+    damping : Damping
+        Its coefficients, without dry friction (its jumps have no tangent).
+    state : array-like, shape (4,)
+        Angles phi1, phi2 (rad) and rates w1, w2 (rad/s) at time 0.
+    duration_s, skip_s : float
+        How long growth is counted, and for how long before that it is not, s.
+    interval_s : float
+        Length of the intervals, s.
+    tolerance : float
+        Local error allowed per step, as in `simulate`.
+
+    Returns
+    -------
+    pydpend.linear.Exponent
+        The exponent; its error is that of the mean over 20 batches.
+
+    Raises
+    ------
+    SimulationError
+        For dry friction, a bad state, or fewer than 40 intervals.
     """
     counted = int(duration_s / interval_s)
     if counted < 40:

@@ -32,29 +32,53 @@ class Angles(Protocol):
     """What is needed of `pydpend.kinematics.LinkAngles`."""
 
     @property
-    def t_s(self) -> Array: ...
+    def t_s(self) -> Array:
+        """Times (T,), s."""
+        ...
+
     @property
-    def phi_rad(self) -> Array: ...
+    def phi_rad(self) -> Array:
+        """Angles (T, L), rad."""
+        ...
+
     @property
-    def sigma_rad(self) -> Array: ...
+    def sigma_rad(self) -> Array:
+        """Standard uncertainties (T, L), rad."""
+        ...
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LinkStates(TableResult):
-    """States of the links. Counter-clockwise positive, zero hanging; SI."""
+    """Angles, rates and accelerations of L links at T times. Counter-clockwise positive, zero hanging; SI.
+
+    Attributes
+    ----------
+    t_s : ndarray of float, shape (T,)
+        Time, s.
+    phi_rad : ndarray of float, shape (T, L)
+        Angles, rad.
+    w_rad_s : ndarray of float, shape (T, L)
+        Rates, rad/s.
+    a_rad_s2 : ndarray of float, shape (T, L)
+        Accelerations, rad/s2.
+    covariance : ndarray of float, shape (T, L, 3, 3)
+        Of (phi, w, a) of each link, SI; the links' errors are independent.
+    sigma_factor : ndarray of float, shape (L,)
+        By what the given sigmas were multiplied to agree with the angles' own scatter.
+    method : str
+        ``smoother``, or ``savitzky-golay`` with its window and degree.
+    status : str
+        ``done`` or ``failed``.
+    message : str
+        Why it failed, in words.
+    """
 
     t_s: Array
-    """(T,)"""
     phi_rad: Array
-    """(T, L)"""
     w_rad_s: Array
-    """(T, L)"""
     a_rad_s2: Array
-    """(T, L)"""
     covariance: Array
-    """Of (phi, w, a) of each link, (T, L, 3, 3); the links' errors are independent."""
     sigma_factor: Array
-    """By what the given sigmas were multiplied to agree with the angles' own scatter, (L,)."""
     method: str
     status: str = "done"
     message: str = ""
@@ -71,7 +95,14 @@ class LinkStates(TableResult):
         return html_table(repr(self)[1:-1], list(columns), rows)
 
     def to_columns(self) -> dict[str, Array]:
-        """``time_s``, and of each link angle, rate and acceleration with their standard errors, SI."""
+        """The states as columns of a table.
+
+        Returns
+        -------
+        dict of str to ndarray, each of shape (T,)
+            ``time_s``, and of each link angle, rate and acceleration with their standard errors (``phi1_rad``,
+            ``sigma_phi1_rad``, ...), SI.
+        """
         names = ("phi#_rad", "w#_rad_s", "a#_rad_s2")
         values = (self.phi_rad, self.w_rad_s, self.a_rad_s2)
         sigmas = np.sqrt(np.diagonal(self.covariance, axis1=2, axis2=3))
@@ -87,16 +118,34 @@ def states(
     white_jerk: bool = False,
     seed: int = 0,
 ) -> LinkStates:
-    """Smoothed states at every time of ``angles``, also where a link was not seen.
+    """Smoothed states at every time, also where a link was not seen, by a Kalman smoother (docs/physics.md section 9).
 
-    Each link's jerk is a random walk (``white_jerk``: white noise), whose intensity in each stretch of
-    ``stretch_s`` is the most likely one (inf: one for all); per-sample sigmas are used, and with
-    ``scale_sigma`` multiplied by the factor that the angles themselves call for. Where no sigma is given,
-    all are taken equal and found. The covariances are calibrated by passing noise (of ``seed``) through the
-    smoother; between and beyond the samples of a long gap they are those of the process.
+    The covariances are calibrated by passing noise through the smoother; between and beyond the samples of a long gap
+    they are those of the process.
 
-    Raises AnglesError for times that do not increase, a link with fewer than 50 angles, a sigma that is not
-    positive.
+    Parameters
+    ----------
+    angles : LinkAngles
+        Angles, rad, at T times; anything with ``t_s``, ``phi_rad`` and ``sigma_rad``.
+    stretch_s : float
+        Length of the stretches in each of which the process's intensity is the most likely one, s; inf is one for all.
+    scale_sigma : bool
+        Whether the sigmas are multiplied by the factor that the angles themselves call for. Where no sigma is given,
+        all are taken equal and found.
+    white_jerk : bool
+        Whether each link's jerk is white noise; a random walk if not.
+    seed : int
+        Of the noise that calibrates the covariances.
+
+    Returns
+    -------
+    LinkStates
+        Angles, rates and accelerations with covariances.
+
+    Raises
+    ------
+    AnglesError
+        For times that do not increase, a link with fewer than 50 angles, a sigma that is negative.
     """
     t, phi, sigma = _checked(angles)
     links = phi.shape[1]
@@ -129,12 +178,27 @@ def states(
 
 
 def savitzky_golay(angles: Angles, *, window: int = 31, degree: int = 4) -> LinkStates:
-    """States by a polynomial of ``degree`` through the ``window`` samples around each: the simple
-    alternative.
+    """States by a polynomial through the samples around each: the simple alternative to `states`.
 
-    For times in equal steps. NaN where the window reaches over an end or over an angle not seen. The
-    covariance is that of the noise alone: what the polynomial flattens is not in it. Raises AnglesError for
-    unequal steps or a window that is even, too short for its degree, or longer than the record.
+    Parameters
+    ----------
+    angles : LinkAngles
+        Angles, rad, at T times in equal steps; anything with ``t_s``, ``phi_rad`` and ``sigma_rad``.
+    window : int
+        Number of samples, odd.
+    degree : int
+        Degree of the polynomial, at least 2.
+
+    Returns
+    -------
+    LinkStates
+        NaN where the window reaches over an end or over an angle not seen. The covariance is that of the noise alone:
+        what the polynomial flattens is not in it.
+
+    Raises
+    ------
+    AnglesError
+        For unequal steps or a window that is even, too short for its degree, or longer than the record.
     """
     t, phi, sigma = _checked(angles)
     step = float(np.median(np.diff(t)))

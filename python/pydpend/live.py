@@ -69,22 +69,37 @@ def detect(
     depth_bits: int | None = None,
     pixel_aspect: PixelAspect | None = None,
 ) -> NDArray[np.void]:
-    """Detects the markers of one image.
+    """The markers of one image.
 
-    Args:
-        image: (H, W), uint8 or uint16, of any strides.
-        threshold: in the image's units; None is learned from the image.
-        polarity, centroid: as in `track`.
-        min_area_px, max_area_px: limits of a marker's area; None is learned.
-        depth_bits: significant bits of a sample, for example 12 in a uint16; None is all.
-        pixel_aspect: width to height of a pixel, (16, 15) or "16:15": discs are as much narrower; None is square.
+    Parameters
+    ----------
+    image : ndarray of uint8 or uint16, shape (H, W)
+        The image, of any strides.
+    threshold : float, optional
+        Level in the image's units; learned from the image if not given.
+    polarity : {"auto", "bright", "dark"}
+        Whether markers are brighter or darker than what is around them.
+    centroid : {"weighted", "contour"}
+        Centre by intensity, or by OpenCV's contours as in the paper (Section 4).
+    min_area_px, max_area_px : float, optional
+        Limits of a marker's area, px; learned if not given.
+    depth_bits : int, optional
+        Significant bits of a sample, for example 12 in a uint16; all if not given.
+    pixel_aspect : tuple of int or str, optional
+        Width to height of a pixel, ``(16, 15)`` or ``"16:15"``: discs are as much narrower; square if not given.
 
-    Returns:
-        One entry per detection, of dtype `DETECTION`, ordered by y, then x.
+    Returns
+    -------
+    ndarray, shape (D,)
+        One entry per detection, of dtype ``pydpend.live.DETECTION``, ordered by y, then x: centre in px (x right,
+        y down) with its standard uncertainty, area, peak, elongation and flags.
 
-    Raises:
-        ArgumentError: if the image has the wrong type or shape.
-        DetectError: if no threshold can be learned.
+    Raises
+    ------
+    ArgumentError
+        If the image has the wrong type or shape, or an argument makes no sense.
+    DetectError
+        If no threshold can be learned.
     """
     area = (min_area_px, max_area_px)
     return _detections(
@@ -96,12 +111,18 @@ def detect(
 class NodeRow:
     """N nodes in one image; what is not seen is NaN.
 
-    Attributes:
-        frame: number of the image.
-        xy_px: centres in px, (N, 2); x right, y down.
-        sigma_px: standard uncertainty of each coordinate in square px, (N,), as `Nodes.sigma_px`.
-        area_px: blob area in px, (N,).
-        status: as `Nodes.status`, (N,).
+    Attributes
+    ----------
+    frame : int
+        Number of the image.
+    xy_px : ndarray of float, shape (N, 2)
+        Centres in px; x right, y down.
+    sigma_px : ndarray of float32, shape (N,)
+        Standard uncertainty of each coordinate in square px, as `Nodes.sigma_px`.
+    area_px : ndarray of float32, shape (N,)
+        Area of each blob, px.
+    status : ndarray of uint8, shape (N,)
+        What became of each node, as `Nodes.status`.
     """
 
     frame: int
@@ -112,18 +133,30 @@ class NodeRow:
 
 
 class Tracker:
-    """Follows the markers of a known rig image by image, for a camera's live loop.
+    """The markers of a known rig followed image by image, for a camera's live loop.
 
-    It does not look ahead: what a whole recording would settle later stays ambiguous.
+    The tracker does not look ahead: what a whole recording would settle later stays ambiguous.
 
-    Args:
-        rig: nodes, bodies and joints, or a file of them.
-        threshold, polarity, centroid: as in `track`.
-        depth_bits: significant bits of a sample; None is all.
+    Parameters
+    ----------
+    rig : Rig or path-like
+        Nodes, bodies and joints, or a file of them.
+    threshold, polarity, centroid : optional
+        As in `track`.
+    depth_bits : int, optional
+        Significant bits of a sample; all if not given.
 
-    Raises:
-        RigError: if the rig is wrong.
-        ArgumentError: if an argument makes no sense.
+    Attributes
+    ----------
+    rig : Rig
+        The rig that is followed.
+
+    Raises
+    ------
+    RigError
+        If the rig is wrong.
+    ArgumentError
+        If an argument makes no sense.
     """
 
     def __init__(
@@ -142,25 +175,40 @@ class Tracker:
     def learn(self, images: Iterable[NDArray[Any]]) -> None:
         """Learns thresholds and noise from some images of the scene; else the first image tracked is all there is.
 
-        Args:
-            images: each (H, W), uint8 or uint16.
+        Parameters
+        ----------
+        images : iterable of ndarray of uint8 or uint16, each of shape (H, W)
+            Images of the scene.
 
-        Raises:
-            ArgumentError: if an image has the wrong type, shape or size, or there is none.
-            DetectError: if no threshold can be learned.
+        Raises
+        ------
+        ArgumentError
+            If an image has the wrong type, shape or size, or there is none.
+        DetectError
+            If no threshold can be learned.
         """
         self._live.learn(list(images))
 
     def step(self, image: NDArray[Any], frame: int | None = None) -> NodeRow:
         """The nodes in the next image.
 
-        Args:
-            image: (H, W), uint8 or uint16, of any strides, of the rig's size.
-            frame: its number, larger than that of the one before it; None is the next. Leave numbers out where the
-                camera lost images.
+        Parameters
+        ----------
+        image : ndarray of uint8 or uint16, shape (H, W)
+            The image, of any strides and of the rig's size.
+        frame : int, optional
+            Its number, larger than that of the one before it; the next if not given. Leave numbers out where the camera
+            lost images.
 
-        Raises:
-            ArgumentError: if the image has the wrong type, shape or size, or `frame` does not grow.
+        Returns
+        -------
+        NodeRow
+            The N nodes of the rig.
+
+        Raises
+        ------
+        ArgumentError
+            If the image has the wrong type, shape or size, or `frame` does not grow.
         """
         number = self._next if frame is None else int(frame)
         if number < 0:

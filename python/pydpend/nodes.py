@@ -31,7 +31,15 @@ STATUS_WORDS = ("missing", "seen", "reacquired", "ambiguous", "undecoded")
 
 @dataclass(frozen=True)
 class Node:
-    """One marker: its name, its body's name, its centre in the reference picture (px)."""
+    """One marker of a rig.
+
+    Attributes
+    ----------
+    name, body : str
+        The marker's name and its body's.
+    x_px, y_px : float
+        Centre in the reference picture, px; x right, y down.
+    """
 
     name: str
     body: str
@@ -41,7 +49,17 @@ class Node:
 
 @dataclass(frozen=True)
 class Joint:
-    """A point that two bodies share, or with one body the fixed pivot; its place in the reference picture (px)."""
+    """A point that two bodies share, or with one body the fixed pivot.
+
+    Attributes
+    ----------
+    name : str
+        The joint's name.
+    bodies : tuple of str
+        Names of its one or two bodies.
+    x_px, y_px : float
+        Place in the reference picture, px; x right, y down.
+    """
 
     name: str
     bodies: tuple[str, ...]
@@ -51,11 +69,28 @@ class Joint:
 
 @dataclass(frozen=True)
 class Rig:
-    """Nodes, bodies and joints, and the frame in which they stand so.
+    """Nodes, bodies and joints, and the picture in which they stand so.
 
-    `nodes` are by body, along it; `bodies` from the pivot outwards; `joints` with the pivot first.
-    `region` and `lens` are as in the rig file, or None. Places are in recorded pixels; `pixel_aspect` is the width and
-    height of one of these (16, 15 for pixels 1.0667 times as wide as high), and bodies are rigid in square pixels.
+    Places are in recorded pixels, x right, y down; bodies are rigid in square pixels.
+
+    Attributes
+    ----------
+    image_px : tuple of int
+        Width and height of the recording, px.
+    nodes : tuple of Node
+        The markers by body, along it; the order of all arrays over nodes.
+    bodies : tuple of str
+        Names of the links from the pivot outwards.
+    joints : tuple of Joint
+        The joints with the pivot first.
+    reference_frame : int or None
+        Index of the reference picture in the recording.
+    region : dict or None
+        Part of the picture that is looked at, as in the rig file.
+    lens : dict or None
+        Distortion of the lens, as in the rig file.
+    pixel_aspect : tuple of int
+        Width and height of a pixel (16, 15 for pixels 1.0667 times as wide as high).
     """
 
     image_px: tuple[int, int]
@@ -69,25 +104,60 @@ class Rig:
 
     @staticmethod
     def read(path: AnyPath) -> Rig:
-        """Reads a rig file (TOML), as `tracker setup` writes it.
+        """A rig from its file (TOML), as `tracker setup` writes it.
 
-        Raises:
-            RigError: naming the line or key at fault.
+        Parameters
+        ----------
+        path : path-like
+            The rig file.
+
+        Returns
+        -------
+        Rig
+            The rig.
+
+        Raises
+        ------
+        RigError
+            Naming the line or key at fault.
         """
         return Rig.from_json(_tracker.read_rig(os.fsdecode(path)))
 
     @staticmethod
     def from_json(text: str) -> Rig:
-        """From the JSON of a table's metadata."""
+        """A rig from the JSON of a table's metadata.
+
+        Parameters
+        ----------
+        text : str
+            What `to_json` gave.
+
+        Returns
+        -------
+        Rig
+            The rig.
+        """
         return _rig(json.loads(text))
 
     def to_dict(self) -> dict[str, Any]:
-        """`to_json` as plain values."""
+        """The rig as plain values.
+
+        Returns
+        -------
+        dict
+            The keys of a rig file.
+        """
         value: dict[str, Any] = json.loads(self.to_json())
         return value
 
     def to_json(self) -> str:
-        """As the JSON of a table's metadata."""
+        """The rig as the JSON of a table's metadata.
+
+        Returns
+        -------
+        str
+            `to_dict` as text.
+        """
         value: dict[str, Any] = {"schema": 1, "image_px": list(self.image_px)}
         width, height = self.pixel_aspect
         if width != height:
@@ -103,18 +173,32 @@ class Rig:
         return json.dumps(value)
 
     def to_toml(self) -> str:
-        """As the text of a rig file.
+        """The rig as the text of a rig file.
 
-        Raises:
-            RigError: if the rig is wrong in itself.
+        Returns
+        -------
+        str
+            TOML that `Rig.read` reads.
+
+        Raises
+        ------
+        RigError
+            If the rig is wrong in itself.
         """
         return _tracker.rig_toml(self.to_json())
 
     def write(self, path: AnyPath) -> None:
         """Writes a rig file.
 
-        Raises:
-            RigError: if the rig is wrong in itself or the file cannot be written.
+        Parameters
+        ----------
+        path : path-like
+            The file; one that is there is replaced.
+
+        Raises
+        ------
+        RigError
+            If the rig is wrong in itself or the file cannot be written.
         """
         _tracker.write_rig(os.fsdecode(path), self.to_json())
 
@@ -126,8 +210,20 @@ class Rig:
     def indices(self, body: str) -> NDArray[np.intp]:
         """Indices of a body's nodes, in the order of the arrays.
 
-        Raises:
-            ArgumentError: if there is no such body.
+        Parameters
+        ----------
+        body : str
+            Name of the body.
+
+        Returns
+        -------
+        ndarray of int, shape (K,)
+            Places of its K nodes in `nodes`.
+
+        Raises
+        ------
+        ArgumentError
+            If there is no such body.
         """
         if body not in self.bodies:
             raise ArgumentError(
@@ -136,7 +232,13 @@ class Rig:
         return np.array([i for i, n in enumerate(self.nodes) if n.body == body], dtype=np.intp)
 
     def places_px(self) -> NDArray[np.float64]:
-        """Centres in the reference picture, (N, 2), px."""
+        """Centres of the nodes in the reference picture.
+
+        Returns
+        -------
+        ndarray of float, shape (N, 2)
+            Places in px; x right, y down.
+        """
         return np.array([[n.x_px, n.y_px] for n in self.nodes])
 
 
@@ -161,17 +263,26 @@ def _rig(value: dict[str, Any]) -> Rig:
 class Nodes:
     """T frames of N nodes. What is not seen is NaN.
 
-    Attributes:
-        frame: index in the recording, from 0, (T,).
-        t_s: time in s, from the recording's time base, increasing, (T,).
-        xy_px: centres in recorded pixels, (T, N, 2); x right, y down.
-        sigma_px: standard uncertainty of each coordinate in square pixels as high as the recorded ones, the greater of
-            the two, (T, N); in recorded pixels that of x is as much smaller as these are wider than high.
-        area_px: blob area in px, (T, N).
-        status: `MISSING`, `SEEN`, `REACQUIRED`, `AMBIGUOUS` or `UNDECODED`, (T, N).
-        rig: the rig; its nodes are in the order of the arrays.
-        meta: recording (`source`), `settings`, program (`tool`), `ending` of the run and, if frames
-            are lost, `damage`, as in the table.
+    Attributes
+    ----------
+    frame : ndarray of int64, shape (T,)
+        Index in the recording, from 0.
+    t_s : ndarray of float, shape (T,)
+        Time in s, from the recording's time base, increasing.
+    xy_px : ndarray of float, shape (T, N, 2)
+        Centres in recorded pixels; x right, y down, the middle of the first pixel at (0, 0).
+    sigma_px : ndarray of float32, shape (T, N)
+        Standard uncertainty of each coordinate in square pixels as high as the recorded ones, the greater of the two;
+        in recorded pixels that of x is as much smaller as these are wider than high.
+    area_px : ndarray of float32, shape (T, N)
+        Area of each blob, px.
+    status : ndarray of uint8, shape (T, N)
+        ``MISSING``, ``SEEN``, ``REACQUIRED``, ``AMBIGUOUS`` or ``UNDECODED`` (0 to 4, in `pydpend.nodes`).
+    rig : Rig
+        The rig; its nodes are in the order of the arrays.
+    meta : dict
+        Recording (``source``), ``settings``, program (``tool``), ``ending`` of the run and, if frames are lost,
+        ``damage``, as in the table.
     """
 
     frame: NDArray[np.int64]
@@ -218,8 +329,10 @@ class Nodes:
     def damage(self) -> str | None:
         """What of the recording is lost, in a sentence; None if nothing is.
 
-        Raises:
-            TableError: if ``meta["damage"]`` is not that of a table.
+        Raises
+        ------
+        TableError
+            If ``meta["damage"]`` is not that of a table.
         """
         damage = self.meta.get("damage")
         return None if damage is None else _tracker.damage_words(json.dumps(damage))
@@ -227,28 +340,43 @@ class Nodes:
     def check(self) -> None:
         """Checks the table's invariants: shapes, increasing frames and times, places exactly where seen.
 
-        Raises:
-            TableError: naming the first row at fault.
-            ArgumentError: if an array has the wrong type or shape.
+        Raises
+        ------
+        TableError
+            Naming the first row at fault.
+        ArgumentError
+            If an array has the wrong type or shape.
         """
         _tracker.check_table(self._columns(), self._meta_json())
 
     def write(self, path: AnyPath, *, safe_csv: bool = False) -> None:
         """Writes the table, Parquet or CSV (with its `.json`) by the ending, replacing what is there.
 
-        Args:
-            path: the file.
-            safe_csv: in a CSV put a ``'`` before names that a spreadsheet would take for a formula (they begin with
-                ``=``, ``+``, ``-``, ``@``, a tab or a carriage return). `read_nodes` takes it off again.
+        Parameters
+        ----------
+        path : path-like
+            The file.
+        safe_csv : bool
+            Whether names in a CSV that a spreadsheet would take for a formula (they begin with ``=``, ``+``, ``-``,
+            ``@``, a tab or a carriage return) get a ``'`` before them. `read_nodes` takes it off again.
 
-        Raises:
-            TableError: if the table is not valid or the file cannot be written.
-            ArgumentError: if an array has the wrong type or shape.
+        Raises
+        ------
+        TableError
+            If the table is not valid or the file cannot be written.
+        ArgumentError
+            If an array has the wrong type or shape.
         """
         _tracker.write_table(os.fsdecode(path), self._columns(), self._meta_json(), safe_csv)
 
     def to_dataframe(self) -> pd.DataFrame:
-        """The table as pandas has it: one row per frame and node, names as categories."""
+        """The table as pandas has it; pandas must be installed.
+
+        Returns
+        -------
+        pandas.DataFrame
+            One row per frame and node, in the columns of the file (docs/conventions.md); names are categories.
+        """
         import pyarrow as pa
 
         frame: pd.DataFrame = pa.table(self).to_pandas()
@@ -309,13 +437,23 @@ def nodes_of(columns: Columns) -> Nodes:
 
 
 def read_nodes(path: AnyPath) -> Nodes:
-    """Reads a node table, Parquet or CSV by the ending, and checks every value.
+    """Nodes from a table, Parquet or CSV by the ending; every value is checked.
 
-    Args:
-        path: a table written by `tracker track` or `Nodes.write`.
+    Parameters
+    ----------
+    path : path-like
+        A table written by `tracker track` or `Nodes.write`.
 
-    Raises:
-        TableError: naming the row, line or column at fault, or a schema version that is not known.
-        RigError: if the rig in it is wrong.
+    Returns
+    -------
+    Nodes
+        The nodes.
+
+    Raises
+    ------
+    TableError
+        Naming the row, line or column at fault, or a schema version that is not known.
+    RigError
+        If the rig in it is wrong.
     """
     return nodes_of(_tracker.read_table(os.fsdecode(path)))

@@ -28,7 +28,8 @@ def number(word: str) -> float:
 def numbers(text: str, setting: str) -> list[float]:
     """The numbers of a list with commas, the value of the option ``setting``.
 
-    Raises:
+    Raises
+    ------
         OptionError: if a part is no number, or the commas may be decimal marks.
     """
     cut = _CUT_DECIMALS.search(text)

@@ -1,6 +1,7 @@
 """Options as fields of a frozen class: what each means, which words it may be, and the kind of its value.
 
-The command line makes its flags from these, the TOML form its keys. The string under a field is what it means.
+The command line makes its flags from these, the TOML form its keys. What the class's docstring says of a field is what
+it means.
 """
 
 from __future__ import annotations
@@ -8,6 +9,7 @@ from __future__ import annotations
 import ast
 import dataclasses
 import inspect
+import re
 from dataclasses import Field
 from functools import cache
 from typing import Any, Literal
@@ -48,21 +50,20 @@ def flag_of(name: str) -> str:
     return "--" + name.removesuffix("_s").removesuffix("_deg").replace("_", "-")
 
 
+_ENTRY = re.compile(r"^(\w+) : .*\n((?:    .*(?:\n|$))+)", re.MULTILINE)
+"""A parameter in a numpydoc docstring: its name, and the lines that describe it."""
+
+
 @cache
 def meanings(options: type) -> dict[str, str]:
-    """What the string under each field of a class says, those of the classes that it extends too."""
+    """What the docstring of a class says of each of its parameters, those of the classes that it extends too."""
     out: dict[str, str] = {}
     for part in reversed(options.__mro__):
         if not dataclasses.is_dataclass(part):
             continue
+        # From the source, because Python may run without docstrings (-OO).
         body = ast.parse(inspect.cleandoc(inspect.getsource(part))).body[0]
         assert isinstance(body, ast.ClassDef)
-        for this, following in zip(body.body, body.body[1:], strict=False):
-            if (
-                isinstance(this, ast.AnnAssign)
-                and isinstance(this.target, ast.Name)
-                and isinstance(following, ast.Expr)
-                and isinstance(following.value, ast.Constant)
-            ):
-                out[this.target.id] = str(following.value.value)
+        text = ast.get_docstring(body) or ""
+        out |= {name: inspect.cleandoc(said).strip() for name, said in _ENTRY.findall(text)}
     return out

@@ -66,7 +66,8 @@ def check_kept(target: Path) -> None:
 def check_new(paths: Iterable[AnyPath | None], *, replace: bool) -> None:
     """Whether the files ``paths`` may be written: asked before the work that gives their content begins.
 
-    Raises:
+    Raises
+    ------
         ArgumentError: if one is read (see `keeping`), two are the same, or, unless ``replace``, one is there already.
     """
     files = [path_of(path) for path in paths if path is not None]
@@ -82,7 +83,8 @@ def whole(path: AnyPath) -> Iterator[Path]:
     Nothing else has its name, so no link is followed and no file is replaced before that. A pipe or a device is given
     as it is.
 
-    Raises:
+    Raises
+    ------
         ArgumentError: if ``path`` is a file that is read, see `keeping`.
         OSError: if it cannot be made.
     """
@@ -131,7 +133,8 @@ def results_folder(path: AnyPath) -> Path:
 def write_text(path: AnyPath, text: str) -> None:
     """Writes a text file, UTF-8; what UTF-8 cannot hold, as of a name that is not UTF-8, is written out.
 
-    Raises:
+    Raises
+    ------
         ArgumentError: if ``path`` is a file that is read.
         OSError: if it cannot be written.
     """

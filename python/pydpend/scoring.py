@@ -16,12 +16,30 @@ from pydpend.nodes import Nodes, read_nodes
 class Score:
     """A node table against the truth. A place agrees with a marker when it is within the limit of it.
 
-    ``coverage``: of all rows in which a marker is at least half visible, the part in which its node agrees.
-    ``wrong``: rows whose place agrees with another marker and not with the node's own. ``switches``: changes of the
-    marker that a node agrees with. ``false_positives``: rows at the place of no visible marker. ``rms_px``: error of
-    fully visible markers along x and y. ``error_over_sigma``: its ratio to the stated uncertainty, None if none is
-    stated. ``angle_rms_deg``: by body. ``matches``: which marker each node stands for, None for none. ``details``:
-    everything, as ``tracker score --json`` prints it.
+    Attributes
+    ----------
+    frames : int
+        Frames of the truth.
+    frames_missing : int
+        Frames of the truth that the table does not have.
+    coverage : float
+        Of all rows in which a marker is at least half visible, the part in which its node agrees, 0 to 1.
+    wrong : int
+        Rows whose place agrees with another marker and not with the node's own.
+    switches : int
+        Changes of the marker that a node agrees with.
+    false_positives : int
+        Rows at the place of no visible marker.
+    rms_px : tuple of float
+        Root mean square error of fully visible markers along x and y, px.
+    error_over_sigma : float or None
+        Ratio of that error to the stated uncertainty; None if none is stated.
+    angle_rms_deg : dict of str to float
+        Root mean square error of each body's direction, deg.
+    matches : dict of str to str or None
+        Which marker each node stands for; None for none.
+    details : dict
+        Everything, as ``tracker score --json`` prints it.
     """
 
     frames: int
@@ -37,22 +55,54 @@ class Score:
     details: dict[str, Any]
 
     def to_dict(self) -> dict[str, Any]:
-        """`to_json` as plain values."""
+        """The score as plain values.
+
+        Returns
+        -------
+        dict
+            `details`: numbers, texts, lists and tables; None for what is not known.
+        """
         value: dict[str, Any] = json.loads(self.to_json())
         return value
 
     def to_json(self) -> str:
-        """All of it."""
+        """The score as JSON.
+
+        Returns
+        -------
+        str
+            `to_dict` as text.
+        """
         return json.dumps(self.details, indent=2)
 
 
 def score(nodes: Nodes | StrPath, truth: Film | StrPath, limit_px: float = 2.0) -> Score:
-    """Compares a node table with the truth: a table that :func:`pydpend.film` wrote, or the film itself.
+    """The score of a node table against the truth: a table that :func:`pydpend.film` wrote, or the film itself.
 
     Names need not agree: each node stands for the marker at whose place it is most often.
 
-    Raises :class:`pydpend.ArgumentError` if the two have no frame in common, :class:`pydpend.FilmError` for a truth
-    that cannot be read.
+    Parameters
+    ----------
+    nodes : Nodes or path-like
+        The nodes, or a table of them.
+    truth : Film or path-like
+        The film, or the truth that was written beside it.
+    limit_px : float
+        Farthest that a place may be from a marker to agree with it, px.
+
+    Returns
+    -------
+    Score
+        Coverage, mistakes and errors.
+
+    Raises
+    ------
+    ArgumentError
+        If the two have no frame in common.
+    FilmError
+        For a truth that cannot be read.
+    TableError
+        For a node table that cannot be read.
     """
     table = nodes if isinstance(nodes, Nodes) else read_nodes(nodes)
     found: dict[str, Any] = json.loads(

@@ -43,44 +43,69 @@ drop without damping then keep their energy to a few 1e-11, with damping and sti
 
 @dataclass(frozen=True)
 class Event:
-    """A joint that begins to stick, to slip, or to slip the other way."""
+    """A joint that begins to stick, to slip, or to slip the other way.
+
+    Attributes
+    ----------
+    t_s : float
+        Time, s.
+    joint : int
+        Joint 1 or 2.
+    before, after : str
+        ``stuck``, ``slip +`` or ``slip -`` (the sign of ``w1``, or of ``w2 - w1``).
+    """
 
     t_s: float
     joint: int
-    """1 or 2."""
     before: str
-    """``stuck``, ``slip +`` or ``slip -`` (the sign of ``w1``, or of ``w2 - w1``)."""
     after: str
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Simulation(TableResult):
-    """A motion and its energies. Angles counter-clockwise positive, zero hanging."""
+    """A motion at T times and its energies. Angles counter-clockwise positive, zero hanging.
+
+    Attributes
+    ----------
+    t_s : ndarray of float, shape (T,)
+        Time, s.
+    phi_rad : ndarray of float, shape (T, 2)
+        Angles, rad, not reduced to one turn.
+    w_rad_s : ndarray of float, shape (T, 2)
+        Rates, rad/s.
+    a_rad_s2 : ndarray of float, shape (T, 2)
+        Accelerations, rad/s2.
+    normal_n : ndarray of float, shape (T, 2)
+        Magnitude of the force in each joint, N (Eq. 34 corrected).
+    dry_n_m : ndarray of float, shape (T, 2)
+        Dry torque in each joint, N m: of sliding, or what holds a stuck joint. It acts on link 1 as
+        ``-dry1 + dry2``, on link 2 as ``-dry2``.
+    energy_j : ndarray of float, shape (T,)
+        Total energy (Eq. 22), J.
+    works_j : ndarray of float, shape (T, 11)
+        Energy taken out since the start by each of ``pydpend.simulation.LAWS``, J.
+    events : tuple of pydpend.simulation.Event
+        Joints that begin to stick or to slip, in the order of time.
+    status : str
+        ``done``, or ``at rest`` when both joints stuck for good before the last time.
+    message : str
+        When that was, in words.
+    balance : float
+        Largest ``|E + W - E0|`` over the samples, relative to ``|E0|`` (to the energy's range where E0 is 0).
+    """
 
     t_s: Array
-    """(T,)"""
     phi_rad: Array
-    """(T, 2)"""
     w_rad_s: Array
-    """(T, 2)"""
     a_rad_s2: Array
-    """(T, 2)"""
     normal_n: Array
-    """Magnitude of the force in each joint, (T, 2), Eq. 34 corrected."""
     dry_n_m: Array
-    """Dry torque in each joint, (T, 2): of sliding, or what holds a stuck joint. It acts on link 1 as
-    ``-dry1 + dry2``, on link 2 as ``-dry2``."""
     energy_j: Array
-    """(T,)"""
     works_j: Array
-    """Energy taken out since the start by each of `LAWS`, (T, 11)."""
     events: tuple[Event, ...] = field(repr=False)
     status: str
-    """``done``, or ``at rest`` when both joints stuck for good before the last time."""
     message: str
     balance: float
-    """Largest ``|E + W - E0|`` over the samples, relative to ``|E0|`` (to the energy's range where E0 is
-    0)."""
 
     def __repr__(self) -> str:
         """A line for people."""
@@ -96,7 +121,14 @@ class Simulation(TableResult):
         return html_table(repr(self)[1:-1], list(columns), rows)
 
     def to_columns(self) -> dict[str, Array]:
-        """``time_s``, angles, rates, accelerations, joint forces and dry torques of both, energy and works, SI."""
+        """The motion as columns of a table.
+
+        Returns
+        -------
+        dict of str to ndarray, each of shape (T,)
+            ``time_s``, then angles, rates, accelerations, joint forces and dry torques of both links (``phi1_rad``,
+            ...), energy and works (``mu_v1_j``, ...), SI.
+        """
         both = {
             "phi#_rad": self.phi_rad,
             "w#_rad_s": self.w_rad_s,
@@ -118,14 +150,38 @@ def simulate(
     smooth_width_rad_s: float | None = None,
     tolerance: float = TOLERANCE,
 ) -> Simulation:
-    """The motion from ``state`` (phi1, phi2, w1, w2; rad, rad/s) at ``t_s[0]``, sampled at each of ``t_s``.
+    """The motion from a state, sampled at given times.
 
-    ``pinned`` holds joint 2 as it is (Section 3.1's second pin; w1 and w2 must be equal): a single
-    pendulum. Dry friction is exact, with stick and slip; ``smooth_width_rad_s`` takes instead ``tanh(rate /
-    width)`` for its sign, under which joints creep and never stick (docs/physics.md Eq. 6.9 gives its
-    error).
+    The equations of motion of Eqs. 26-29 with the laws of `Damping` (docs/physics.md section 8). Dry friction is exact,
+    with stick and slip.
 
-    Raises SimulationError for a state that is not finite or times that do not increase.
+    Parameters
+    ----------
+    model : Model
+        The pendulum.
+    damping : Damping
+        Coefficients of its laws.
+    state : array-like, shape (4,)
+        Angles phi1, phi2 (rad) and rates w1, w2 (rad/s) at ``t_s[0]``; counter-clockwise positive, zero hanging.
+    t_s : array-like, shape (T,)
+        Times, s, increasing.
+    pinned : bool
+        Whether joint 2 is held as it is (Section 3.1's second pin; w1 and w2 must be equal): a single pendulum.
+    smooth_width_rad_s : float, optional
+        Take ``tanh(rate / width)`` for the sign of dry friction, width in rad/s, under which joints creep and never
+        stick (docs/physics.md Eq. 6.9 gives its error).
+    tolerance : float
+        Local error allowed per step, in rad, relative rate, and share of the energy.
+
+    Returns
+    -------
+    Simulation
+        The motion with forces, energies and works at the T times.
+
+    Raises
+    ------
+    SimulationError
+        For a state that is not finite, times that do not increase, or a tolerance that is not reached.
     """
     t = np.atleast_1d(np.asarray(t_s, dtype=np.float64))
     run = _call(
@@ -159,18 +215,27 @@ def simulate(
 
 @dataclass(frozen=True, eq=False)
 class Ensemble:
-    """Many motions sampled at the same times."""
+    """K motions sampled at the same T times.
+
+    Attributes
+    ----------
+    t_s : ndarray of float, shape (T,)
+        Time, s.
+    phi_rad : ndarray of float, shape (K, T, 2)
+        Angles, rad.
+    w_rad_s : ndarray of float, shape (K, T, 2)
+        Rates, rad/s.
+    energy_j : ndarray of float, shape (K, T)
+        Total energy, J.
+    at_rest : ndarray of bool, shape (K,)
+        Whether each came to rest for good.
+    """
 
     t_s: Array
-    """(T,)"""
     phi_rad: Array
-    """(K, T, 2)"""
     w_rad_s: Array
-    """(K, T, 2)"""
     energy_j: Array
-    """(K, T)"""
     at_rest: npt.NDArray[np.bool_]
-    """Whether each came to rest for good, (K,)."""
 
 
 def simulate_many(
@@ -183,10 +248,30 @@ def simulate_many(
     smooth_width_rad_s: float | None = None,
     tolerance: float = TOLERANCE,
 ) -> Ensemble:
-    """`simulate` from each row of ``states`` (K, 4), on all cores; the result does not depend on their
-    number.
+    """The motions from many states, on all cores; the result does not depend on their number.
 
-    One model and one damping for all, or one each. Raises SimulationError naming the run.
+    Parameters
+    ----------
+    model : Model or sequence of Model
+        The pendulum: one for all, or one for each state.
+    damping : Damping or sequence of Damping
+        Coefficients: one for all, or one for each state.
+    states : array-like, shape (K, 4)
+        Angles phi1, phi2 (rad) and rates w1, w2 (rad/s) at ``t_s[0]`` of each motion.
+    t_s : array-like, shape (T,)
+        Times, s, increasing.
+    pinned, smooth_width_rad_s, tolerance : optional
+        As in `simulate`.
+
+    Returns
+    -------
+    pydpend.simulation.Ensemble
+        Angles, rates and energies.
+
+    Raises
+    ------
+    SimulationError
+        Naming the run, as `simulate`.
     """
     x = np.ascontiguousarray(states, dtype=np.float64)
     if x.ndim != 2 or x.shape[1] != 4 or not np.all(np.isfinite(x)):

@@ -20,16 +20,34 @@ class TableResult(ABC):
 
     @abstractmethod
     def to_columns(self) -> Mapping[str, NDArray[Any]]:
-        """The table's columns by name, with their units at the end of the names."""
+        """The table's columns.
+
+        Returns
+        -------
+        dict of str to ndarray
+            By name, with their units at the end of the names.
+        """
 
     def to_dataframe(self) -> pd.DataFrame:
-        """The table as a pandas frame (pandas must be installed); NaN where there is no number."""
+        """The table as pandas has it; pandas must be installed.
+
+        Returns
+        -------
+        pandas.DataFrame
+            The columns of `to_columns`; NaN where there is no number.
+        """
         import pandas as pd
 
         return pd.DataFrame(dict(self.to_columns()))
 
     def to_arrow(self) -> pa.Table:
-        """The table as Arrow has it; null where there is no number."""
+        """The table as Arrow has it.
+
+        Returns
+        -------
+        pyarrow.Table
+            The columns of `to_columns`; null where there is no number.
+        """
         import pyarrow as pa
 
         return pa.table({name: pa.array(v, from_pandas=True) for name, v in self.to_columns().items()})

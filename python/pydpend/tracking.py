@@ -127,41 +127,68 @@ def track(
     allow_protocol: bool = False,
     pixel_aspect: PixelAspect | None = None,
 ) -> Nodes:
-    """Follows the markers of a recording.
+    """Nodes of a recording: its markers followed from frame to frame.
 
-    Args:
-        path: the recording.
-        rig: nodes, bodies and joints, or a file of them; found in the recording if None.
-        fps: frames a second of recorded time, instead of what the recording claims.
-        frames: first frame and one past the last.
-        threads: None is one a core. The result is the same for any number.
-        progress: a callback ``(stage, done, total)``; None is a bar on a terminal or in a notebook, False nothing.
-            An exception from it stops the run.
-        output: a table to write too, Parquet or CSV by the ending.
-        force: replace `output` if it is there already.
-        resume: go on where an earlier run for `output` stopped.
-        safe_csv: as in `Nodes.write`.
-        threshold: in the recording's units; None is learned from it.
-        polarity: whether markers are brighter or darker than what is around them.
-        centroid: by intensity, or by OpenCV's contours as in the paper.
-        decoder: what reads compressed film.
-        interlaced: how film is read whose pictures hold two fields, filmed one after the other: not at all, or each
-            picture as one (for cameras that filmed whole pictures and only say that they are interlaced).
-        allow_protocol: open network addresses and devices too.
-        pixel_aspect: width to height of a pixel, (16, 15) or "16:15", instead of what the recording says.
+    Parameters
+    ----------
+    path : path-like
+        The recording: a film of any container, a folder of numbered images, or a camera's raw file.
+    rig : Rig or path-like, optional
+        Nodes, bodies and joints, or a file of them; found in the recording if not given.
+    fps : float, optional
+        Frames a second of recorded time, Hz, instead of what the recording claims.
+    frames : tuple of int or range, optional
+        First frame and one past the last, counted from 0; None for the latter is the end.
+    threads : int, optional
+        At least 1; one a core if not given. The result is the same for any number.
+    progress : callable or bool, optional
+        Called with (stage, frames done, frames in all or None). None is a bar on a terminal or in a notebook, False
+        nothing. An exception from it stops the run.
+    output : path-like, optional
+        A table to write too, Parquet or CSV by the ending.
+    force : bool
+        Whether to replace `output` if it is there already.
+    resume : bool
+        Whether to go on where an earlier run for `output` stopped.
+    safe_csv : bool
+        Whether names in a CSV are marked for spreadsheets, see `Nodes.write`.
+    threshold : float, optional
+        Level that parts markers from what is around them, in the recording's units; learned from it if not given.
+    polarity : {"auto", "bright", "dark"}
+        Whether markers are brighter or darker than what is around them.
+    centroid : {"weighted", "contour"}
+        Centre by intensity, or by OpenCV's contours as in the paper (Section 4).
+    decoder : {"auto", "ffmpeg", "opencv"}
+        What reads compressed film.
+    interlaced : {"refuse", "as-frames"}
+        How film is read whose pictures hold two fields, filmed one after the other: not at all, or each picture as
+        one (for cameras that filmed whole pictures and only say that they are interlaced).
+    allow_protocol : bool
+        Whether network addresses and devices are opened too.
+    pixel_aspect : tuple of int or str, optional
+        Width to height of a pixel, ``(16, 15)`` or ``"16:15"``, instead of what the recording says.
 
-    Returns:
-        The nodes. If the recording was damaged, `Nodes.complete` is False and `Nodes.meta` says how it ended; what
-        the run warned of is in ``meta["warnings"]``.
+    Returns
+    -------
+    Nodes
+        The nodes of T frames. If the recording was damaged, `Nodes.complete` is False and `Nodes.meta` says how it
+        ended; what the run warned of is in ``meta["warnings"]``.
 
-    Raises:
-        SourceError: if the recording cannot be opened or read.
-        DetectError: if there are no markers, or the threshold is out of range.
-        RigError: if the rig is wrong, does not fit the recording, or none can be found.
-        TableError: if `output` is there already or cannot be written.
-        ArgumentError: if an argument makes no sense.
-        KeyboardInterrupt: on Ctrl-C, within two seconds. What was done until then is the exception's `nodes`, and with
-            `output` it is kept there, to go on with `resume=True`.
+    Raises
+    ------
+    SourceError
+        If the recording cannot be opened or read.
+    DetectError
+        If there are no markers, or the threshold is out of range.
+    RigError
+        If the rig is wrong, does not fit the recording, or none can be found.
+    TableError
+        If `output` is there already or cannot be written.
+    ArgumentError
+        If an argument makes no sense.
+    KeyboardInterrupt
+        On Ctrl-C, within two seconds. What was done until then is the exception's ``nodes``, and with `output` it is
+        kept there, to go on with ``resume=True``.
     """
     existing = "resume" if resume else "replace" if force else "refuse"
     callback, close = _callback(progress)
@@ -189,12 +216,16 @@ def track(
 
 
 class Setup(NamedTuple):
-    """What `setup` found.
+    """The rig that `setup` found, and how far it can be believed.
 
-    Attributes:
-        rig: nodes, bodies, joints and the reference picture.
-        warnings: what to know of the rig and the recording, a sentence each.
-        picture: the reference picture with the rig and all other detections drawn, (H, W, 3) uint8, red, green, blue.
+    Attributes
+    ----------
+    rig : Rig
+        Nodes, bodies, joints and the reference picture; places in px, x right, y down.
+    warnings : list of str
+        What to know of the rig and the recording, a sentence each.
+    picture : ndarray of uint8, shape (H, W, 3)
+        The reference picture with the rig and all other detections drawn; red, green, blue.
     """
 
     rig: Rig
@@ -219,20 +250,36 @@ def setup(
     allow_protocol: bool = False,
     pixel_aspect: PixelAspect | None = None,
 ) -> Setup:
-    """Finds markers, bodies and joints of a recording.
+    """The markers, bodies and joints of a recording, found by how they move.
 
-    Args:
-        path: the recording; it is read through.
-        output: a rig file to write, to be looked at and edited.
-        picture: an image file to write, for example .png: the reference picture with all that was found.
-        force: replace `output` and `picture` if they are there already.
-        fps, frames, threads, progress, threshold, polarity, decoder, interlaced,
-            allow_protocol, pixel_aspect: as in `track`.
+    Parameters
+    ----------
+    path : path-like
+        The recording; it is read through.
+    output : path-like, optional
+        A rig file to write, to be looked at and edited.
+    picture : path-like, optional
+        An image file to write, for example .png: the reference picture with all that was found.
+    force : bool
+        Whether to replace `output` and `picture` if they are there already.
+    fps, frames, threads, progress, threshold, polarity, decoder, interlaced, allow_protocol, pixel_aspect : optional
+        As in `track`.
 
-    Raises:
-        SourceError, DetectError, RigError, ArgumentError: as `track`.
-        RigError, FilmError: also if `output` or `picture` is there already, is the recording, or cannot be written.
-        KeyboardInterrupt: on Ctrl-C, within two seconds; nothing is written then.
+    Returns
+    -------
+    Setup
+        Rig, warnings and picture.
+
+    Raises
+    ------
+    SourceError, DetectError, ArgumentError
+        As `track`.
+    RigError
+        If no rig can be found, or `output` is there already, is the recording, or cannot be written.
+    FilmError
+        If `picture` is there already, is the recording, or cannot be written.
+    KeyboardInterrupt
+        On Ctrl-C, within two seconds; nothing is written then.
     """
     callback, close = _callback(progress)
     try:
@@ -253,13 +300,18 @@ def setup(
 
 @dataclass(frozen=True, eq=False)
 class OverlayFilm:
-    """A film of K pictures with nodes drawn.
+    """A film of K pictures with nodes drawn into their recording.
 
-    Attributes:
-        path: the file, H.264.
-        frame: each picture's frame in the recording, (K,).
-        t_s: each picture's time in the recording in s, (K,).
-        play_fps: pictures a second at which it plays: picture k is at ``k / play_fps`` s of the film.
+    Attributes
+    ----------
+    path : str
+        The file, H.264.
+    frame : ndarray of int64, shape (K,)
+        Each picture's frame in the recording, from 0.
+    t_s : ndarray of float, shape (K,)
+        Each picture's time in the recording, s.
+    play_fps : int
+        Pictures a second at which it plays: picture k is at ``k / play_fps`` s of the film.
     """
 
     path: str
@@ -283,28 +335,46 @@ def overlay(
     interlaced: Interlaced = "refuse",
     allow_protocol: bool = False,
 ) -> OverlayFilm:
-    """Draws nodes, names, bodies, trails and gaps into their recording.
+    """A film of a recording with its nodes, names, bodies, trails and gaps drawn in.
 
-    Args:
-        recording: the recording that the nodes come from.
-        nodes: its nodes, or a table of them. Frames that they do not have are left out.
-        output: the film, H.264, for example .mp4.
-        every: draw each such frame only, from the first of the nodes; trails go through the frames between.
-        width: of the film in px, even; the height is in proportion. None is the recording's.
-        play_fps: pictures a second at which it plays.
-        quality: x264's rate factor, 0 (best, largest) to 51.
-        force: replace `output` if it is there already.
-        progress, decoder, interlaced, allow_protocol: as in `track`.
+    Parameters
+    ----------
+    recording : path-like
+        The recording that the nodes come from.
+    nodes : Nodes or path-like
+        Its nodes, or a table of them. Frames that they do not have are left out.
+    output : path-like
+        The film, H.264, for example .mp4.
+    every : int
+        Each such frame only is drawn, from the first of the nodes; trails go through the frames between.
+    width : int, optional
+        Width of the film in px, even; the height is in proportion. The recording's if not given.
+    play_fps : int
+        Pictures a second at which it plays.
+    quality : int
+        Rate factor of x264, 0 (best, largest) to 51.
+    force : bool
+        Whether to replace `output` if it is there already.
+    progress, decoder, interlaced, allow_protocol : optional
+        As in `track`.
 
-    Returns:
+    Returns
+    -------
+    OverlayFilm
         The film's file and which frames and times its pictures are of.
 
-    Raises:
-        SourceError: if the recording cannot be read.
-        TableError: if the nodes are not valid or not of this recording.
-        FilmError: if `output` is there already or cannot be written.
-        ArgumentError: if an argument makes no sense.
-        KeyboardInterrupt: on Ctrl-C, within two seconds; what was drawn is a whole film.
+    Raises
+    ------
+    SourceError
+        If the recording cannot be read.
+    TableError
+        If the nodes are not valid or not of this recording.
+    FilmError
+        If `output` is there already or cannot be written.
+    ArgumentError
+        If an argument makes no sense.
+    KeyboardInterrupt
+        On Ctrl-C, within two seconds; what was drawn is a whole film.
     """
     table = [] if isinstance(nodes, Nodes) else [os.fsdecode(nodes)]
     if not isinstance(nodes, Nodes):
@@ -340,16 +410,30 @@ def info(
 ) -> dict[str, Any]:
     """What is known of a recording before it is read through.
 
-    Returns:
-        `name`, `container`, `codec`, `width`, `height` (px), `pixel_aspect` (width to height of a pixel, "16:15"),
-        `pixel_aspect_origin` ("recording", or "user" where it was given), `depth_bits`, `declared_frames`, `rate_hz`,
-        `rate_origin`, `time_base` (numerator and denominator of s per tick), `size_bytes`, `sha256_first_mib`,
-        `converted_from`, `warnings` and `details`; `frames` that are there by their packets, without decoding any, and
-        what its times are (`time`: `kind`, `rate_hz`, `sigma_s`, `gaps`, `notes`, ...); None where unknown. Of a long
-        recording only the first frames are looked at for these two.
+    Parameters
+    ----------
+    path : path-like
+        The recording.
+    fps, decoder, allow_protocol, pixel_aspect : optional
+        As in `track`.
 
-    Raises:
-        SourceError: if it cannot be opened, or its time stamps stand still.
+    Returns
+    -------
+    dict
+        ``name``, ``container``, ``codec``, ``width``, ``height`` (px), ``pixel_aspect`` (width to height of a pixel,
+        "16:15"), ``pixel_aspect_origin`` ("recording", or "user" where it was given), ``depth_bits``,
+        ``declared_frames``, ``rate_hz``, ``rate_origin``, ``time_base`` (numerator and denominator of s per tick),
+        ``size_bytes``, ``sha256_first_mib``, ``converted_from``, ``warnings`` and ``details``; ``frames`` that are
+        there by their packets, without decoding any, and what its times are (``time``: ``kind``, ``rate_hz``,
+        ``sigma_s``, ``gaps``, ``notes``, ...); None where unknown. Of a long recording only the first frames are
+        looked at for these two.
+
+    Raises
+    ------
+    SourceError
+        If it cannot be opened, or its time stamps stand still.
+    ArgumentError
+        If an argument makes no sense.
     """
     opened = (fps, decoder, "as-frames", allow_protocol, 0, aspect_text(pixel_aspect))
     known: dict[str, Any] = json.loads(_tracker.info(os.fsdecode(path), opened))

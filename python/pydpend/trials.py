@@ -1,5 +1,4 @@
-"""Several recordings of one pendulum: each fitted alone, all together, and whether they agree (Table 6,
-Fig. 20)."""
+"""Several recordings of one pendulum: each fitted alone, all together, and whether they agree (Table 6, Fig. 20)."""
 
 from __future__ import annotations
 

@@ -46,8 +46,10 @@ class Digests:
     """Absolute path: size in bytes, time of change in ns and its fingerprint, SHA-256."""
 
     def of(self, path: Path) -> str:
-        """SHA-256 of a file, or of the names and digests of the files in a folder. Of a film that is two files, of
-        both."""
+        """SHA-256 of a file, or of the names and digests of the files in a folder.
+
+        Of a film that is two files, of both.
+        """
         if path.is_dir():
             inside = sorted(p for p in path.rglob("*") if p.is_file())
             return digest({p.relative_to(path).as_posix(): self.of(p) for p in inside})

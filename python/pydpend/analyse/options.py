@@ -21,55 +21,88 @@ ESTIMATORS = ("rigid", "linkage", "pairwise")
 
 @dataclass(frozen=True, kw_only=True)
 class Options(FitOptions):
-    """What to analyse and how. The defaults need no thought; every field, a fit's too, is a flag of the
-    same name."""
+    """What to analyse and how; the defaults need no thought.
+
+    Every parameter, a fit's (`FitOptions`) too, is a flag of the same name.
+
+    Parameters
+    ----------
+    inputs : tuple of str
+        Films, node tables or angles tables; several are trials of one pendulum.
+    rig : str, optional
+        Rig file for films; found in the film if not given.
+    fps : float, optional
+        Frames per second of recorded time, where a film does not know.
+    pixel_aspect : str, optional
+        Width to height of a film's pixels, e.g. ``16:15``, instead of what the film says.
+    encoder : str, optional
+        Encoder file of the first recording: time_s and voltage_v (or an angle) as CSV, TDMS or NumPy.
+    column : str, optional
+        Column or TDMS channel of the encoder file that holds the signal, where its name does not say.
+    time_column : str, optional
+        Column or channel of the encoder file that holds the time, where its name does not say.
+    rate_hz : float, optional
+        Samples per second of the encoder file, where it has no time.
+    unit : str, optional
+        Unit of the encoder's column, ``v``, ``rad`` or ``deg``, where its name does not say.
+    calibration : str, optional
+        Folder of hold recordings, or an encoder.json made by ``pydpend calibrate``.
+    model : str
+        ``derived``, ``published`` or a pendulum.toml.
+    zero : str
+        Where the links hang: ``rest`` (found in the recording), ``vertical`` (the picture's, uncertain by the
+        camera's roll: 1 deg, or ``vertical=0.5``), ``reference_frame``, degrees of each link in the rig's
+        reference picture (``180,180``), or a film or node table of the same rig hanging still.
+    bodies : str, optional
+        Names of the links in node tables from the pivot outwards, with a comma; the rig's order if not given.
+    mirrored : bool
+        The film is mirror-inverted or taken from behind.
+    link_length_m : float, optional
+        Pivot to elbow in m, for the scale.
+    estimator : str
+        How angles come from nodes: ``rigid``, ``linkage`` or ``pairwise``.
+    columns : str, optional
+        Which columns of angles tables are which, e.g. ``time_s=t_s,phi1_rad=theta1_rad,phi2_rad=theta2_rad``.
+    hanging_deg : float
+        Angle in degrees that angles tables have when the links hang straight down.
+    clockwise : bool
+        Angles tables count clockwise positive.
+    unwrap : bool
+        Angles tables keep their angles within one turn; rows are then taken to be less than half a turn
+        apart.
+    overlay : bool
+        Draw what was found into the film, for the page. It takes about as long as tracking.
+    threads : int, optional
+        Threads for tracking; all cores if not given. Changes no result.
+
+    Raises
+    ------
+    OptionError
+        For a value that is not known or makes no sense.
+    """
 
     inputs: tuple[str, ...] = ()
-    """Films, node tables or angles tables; several are trials of one pendulum."""
     rig: str | None = None
-    """Rig file for films; found in the film if not given."""
     fps: float | None = None
-    """Frames per second of recorded time, where a film does not know."""
     pixel_aspect: str | None = None
-    """Width to height of a film's pixels, e.g. ``16:15``, instead of what the film says."""
     encoder: str | None = None
-    """Encoder file of the first recording: time_s and voltage_v (or an angle) as CSV, TDMS or NumPy."""
     column: str | None = None
-    """Column or TDMS channel of the encoder file that holds the signal, where its name does not say."""
     time_column: str | None = None
-    """Column or channel of the encoder file that holds the time, where its name does not say."""
     rate_hz: float | None = None
-    """Samples per second of the encoder file, where it has no time."""
     unit: str | None = option(None, choices=("v", "rad", "deg"))
-    """Unit of the encoder's column, ``v``, ``rad`` or ``deg``, where its name does not say."""
     calibration: str | None = None
-    """Folder of hold recordings, or an encoder.json made by ``pydpend calibrate``."""
     model: str = "derived"
-    """``derived``, ``published`` or a pendulum.toml."""
     zero: str = "rest"
-    """Where the links hang: ``rest`` (found in the recording), ``vertical`` (the picture's, uncertain by the camera's
-    roll: 1 deg, or ``vertical=0.5``), ``reference_frame``, degrees of each link in the rig's reference picture
-    (``180,180``), or a film or node table of the same rig hanging still."""
     bodies: str | None = None
-    """Names of the links in node tables from the pivot outwards, with a comma; the rig's order if not given."""
     mirrored: bool = False
-    """The film is mirror-inverted or taken from behind."""
     link_length_m: float | None = None
-    """Pivot to elbow in m, for the scale."""
     estimator: str = option("rigid", choices=ESTIMATORS)
-    """How angles come from nodes: ``rigid``, ``linkage`` or ``pairwise``."""
     columns: str | None = None
-    """Which columns of angles tables are which, e.g. ``time_s=t_s,phi1_rad=theta1_rad,phi2_rad=theta2_rad``."""
     hanging_deg: float = 0.0
-    """Angle in degrees that angles tables have when the links hang straight down."""
     clockwise: bool = False
-    """Angles tables count clockwise positive."""
     unwrap: bool = False
-    """Angles tables keep their angles within one turn; rows are then taken to be less than half a turn apart."""
     overlay: bool = True
-    """Draw what was found into the film, for the page. It takes about as long as tracking."""
     threads: int | None = None
-    """Threads for tracking; all cores if not given. Changes no result."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -105,8 +138,10 @@ class Options(FitOptions):
                 )
 
     def joint_fit(self, several: bool) -> FitOptions:
-        """The options of the fit to all recordings. Where there are ``several``, each is predicted from the others in a
-        stage of its own."""
+        """The options of the fit to all recordings.
+
+        Where there are ``several``, each is predicted from the others in a stage of its own.
+        """
         chosen = self.fit.as_programs_do()
         return replace(chosen, prediction=False) if several else chosen
 
@@ -122,8 +157,10 @@ WANTED: Mapping[str, tuple[Kind, ...]] = {
 
 
 def check_files(options: Options) -> None:
-    """Whether the files that options name are there and what they are to be. Raises OptionError, naming the option,
-    before anything is done."""
+    """Whether the files that options name are there and what they are to be.
+
+    Raises OptionError, naming the option, before anything is done.
+    """
     for field, kinds in WANTED.items():
         name = getattr(options, field)
         if name is None or (field == "zero" and parse_zero(name) is not None):

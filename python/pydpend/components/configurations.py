@@ -72,8 +72,7 @@ class Configuration:
 
 
 def configuration(name: str, *, trackers: bool = False) -> Configuration:
-    """Configuration "A" or "B". ``trackers`` adds A's trackers and tape (items 10 to 13) at assumed
-    places."""
+    """Configuration "A" or "B". ``trackers`` adds A's trackers and tape (items 10 to 13) at assumed places."""
     if name == "A":
         quantities = table_8()
         if not trackers:

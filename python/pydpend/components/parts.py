@@ -41,9 +41,11 @@ REDUCED = ("psi", "lam", "zeta", "a3", "sigma_g", "kappa_g", "m1", "m2")
 
 @dataclass(frozen=True)
 class Rigid:
-    """Fixed on a link: ``along`` names the centre's distance from the link's joint (pivot or elbow) along the
-    link, signed; ``distance`` the true (for many parts the root-mean-square) distance where it is another.
-    None is zero: at the joint itself."""
+    """Fixed on a link, at a distance of its centre from the link's joint.
+
+    ``along`` names the distance from the joint (pivot or elbow) along the link, signed; ``distance`` the true (for
+    many parts the root-mean-square) distance where it is another. None is zero: at the joint itself.
+    """
 
     body: int
     along: str | None = None
@@ -103,8 +105,10 @@ class Part:
         ball_sum: Any = 0,
         length: str = "l_u",
     ) -> Any:
-        """Kinetic energy of all ``count`` of them. ``cos`` is the cosine to use, ``ball_sum`` the balls'
-        Lambda (0 for equally spaced balls)."""
+        """Kinetic energy of all ``count`` of them.
+
+        ``cos`` is the cosine to use, ``ball_sum`` the balls' Lambda (0 for equally spaced balls).
+        """
         m, inertia = self._mass(q), self._inertia(q)
         lu = q[length]
         if isinstance(self.place, Rigid):
@@ -133,7 +137,7 @@ class Part:
         return g * (share.sigma_g * (1 - cos(phi1)) + share.kappa_g * (1 - cos(phi2)))
 
     def reduced(self, q: Values, length: str = "l_u") -> Reduced:
-        """This part's share of the reduced constants (errata section 0; Table 9 and 10 corrected)."""
+        """The part's share of the reduced constants (errata section 0; Table 9 and 10 corrected)."""
         m, inertia = self._mass(q), self._inertia(q)
         lu = q[length]
         n = self.count

@@ -1,5 +1,4 @@
-"""Table 8 as data (units g, mm; configuration A), the assumed places it lacks, and the symbols of Section
-8.1."""
+"""Table 8 as data (units g, mm; configuration A), the assumed places it lacks, and the symbols of Section 8.1."""
 
 from __future__ import annotations
 

@@ -52,8 +52,13 @@ def compare_terms(
     ratios: bool = True,
     progress: Progress | None = None,
 ) -> tuple[Term, ...]:
-    """The terms ``names`` judged on recordings ready for a fit: all but the last recording are fitted and the last
-    one predicted, or of a single one the last part. ``ratios``: whether the inertial ratios are free.
+    """The terms ``names`` judged on recordings ready for a fit.
+
+    All but the last recording are fitted and the last one predicted, or of a single one the last part. ``ratios``:
+    whether the inertial ratios are free.
+
+    All but the last recording are fitted and the last one predicted, or of a single one the last part. ``ratios``:
+    whether the inertial ratios are free.
 
     Raises FitError as a fit does, and when nothing can be left out.
     """

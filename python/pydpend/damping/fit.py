@@ -42,25 +42,40 @@ def fit_damping(
     progress: Progress | None = None,
     **keywords: Unpack[FitKeywords],
 ) -> DampingFit:
-    """Damping coefficients of a double pendulum from its free motion.
+    """Damping coefficients of a double pendulum from its free motion (Section 7.1; docs/damping.md).
 
-    ``angles``: one recording or several (fitted jointly). ``method``: ``"trajectory"`` (default) fits the equations
-    of motion to the angles (docs/damping.md); ``"energy"`` is the paper's energy profile. ``laws``:
-    ``"full"`` (default), ``"paper"`` or names of coefficients. Angles of one link are a single pendulum's, and need a
-    one-link ``model``.
+    Parameters
+    ----------
+    angles : LinkAngles or sequence of LinkAngles
+        One recording, or several that are fitted jointly. Angles of one link are a single pendulum's, and need a
+        one-link `model`.
+    model : Model
+        The pendulum's constants.
+    method : {"trajectory", "energy"}, optional
+        ``"trajectory"`` (default) fits the equations of motion to the angles; ``"energy"`` is the paper's energy
+        profile (Eqs. 35, 37, 38 corrected).
+    laws : str or sequence of str, optional
+        ``"full"`` (default), ``"paper"`` or names of coefficients.
+    options : FitOptions, optional
+        All that a fit can be told; keywords go before it.
+    progress : callable, optional
+        Called with (step, most steps, chi-square).
+    **keywords : optional
+        Fields of `FitOptions`: ``ratios``, ``free``, ``clock``, ``angle_maps``, ``pinned``, ``ten_coefficients``,
+        ``intervals``, ``comparison``, ``prediction``, ``start_s``, ``stop_s``.
 
-    All else is a field of `FitOptions`, given in ``options`` or as a keyword, which goes before: ``ratios``: whether
-    lambda, sigma, kappa and a3 over psi are free too, as they are by default (trajectory only; the energy method uses
-    the model's). ``free``: further parameters (``added_inertia``, ``tilt``, ``offset1``, ``offset2``); ``clock``: the
-    camera clock's scale. ``pinned``: the elbow is pinned, and the pendulum a single one. ``ten_coefficients``: also the
-    paper's ten, which the data do not determine (energy with the paper's laws only). ``angle_maps``: learn repeatable
-    angle bias. ``prediction``: also fit without each part in turn and predict it. ``comparison``: also leave each term
-    out in turn, and say which the data ask for (`compare_terms`; trajectory only). ``intervals``: ``"profile"`` gives
-    each coefficient's 95 % interval by profile likelihood too (`DampingFit.intervals`; trajectory only), beside the
-    covariance's standard errors. The free decay is found unless ``start_s`` and ``stop_s`` state it.
+    Returns
+    -------
+    DampingFit
+        Coefficients, SI, with standard errors that carry the model's own errors, and everything to judge them by.
 
-    Raises FitOptionError for an option that is wrong or of the other method, FitError for recordings without a free
-    decay, models the recordings refute, and angles that do not determine the coefficients.
+    Raises
+    ------
+    FitOptionError
+        For an option that is not known, is wrong or is of the other method.
+    FitError
+        For recordings without a free decay, models the recordings refute, and angles that do not determine the
+        coefficients.
     """
     chosen = FitOptions.of(options, method=method, laws=laws, **keywords)
     chosen.check_own_prediction()

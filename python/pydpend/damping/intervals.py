@@ -97,8 +97,11 @@ class _Profile:
         return self.known[value]
 
     def _pressed(self, found: Solution, sigma: Floats) -> list[str]:
-        """Coefficients at zero that would go below it. Where one comes to its bound on the way, steps get ever shorter
-        and the refit does not see its end; with it held there, it does."""
+        """Coefficients at zero that would go below it.
+
+        Where one comes to its bound on the way, steps get ever shorter and the refit does not see its end; with it
+        held there, it does.
+        """
         spread = dict(zip(self.best.names, sigma.tolist(), strict=True))
         push = dict(zip(found.names, found.gradient.tolist(), strict=True))
         return [
@@ -108,8 +111,10 @@ class _Profile:
         ]
 
     def end(self, direction: int, sigma: float) -> float | None:
-        """Distance from the estimate to an end; None where the bound zero is reached before. Raises FitError where
-        there is none within `MOST` refits."""
+        """Distance from the estimate to an end; None where the bound zero is reached before.
+
+        Raises FitError where there is none within `MOST` refits.
+        """
         estimate = self.best.parameters.get(self.name, 0.0)
         limit = estimate if direction < 0 else float("inf")
         if limit <= 0.0:
@@ -207,8 +212,14 @@ def _solved(
 
 
 def _next(tried: Sequence[tuple[float, float]], inside: float, outside: float) -> float:
-    """Where the rise should be `LEVEL`: on the parabola through the estimate and the last two distances tried (it has
-    a slope at a bound), or if only one is known on that without slope; always between ``inside`` and ``outside``."""
+    """Where the rise should be `LEVEL`; always between ``inside`` and ``outside``.
+
+    On the parabola through the estimate and the last two distances tried (it has a slope at a bound), or if only one
+    is known on that without slope.
+
+    On the parabola through the estimate and the last two distances tried (it has a slope at a bound), or if only one
+    is known on that without slope.
+    """
     if not tried:
         return (inside + outside) / 2
     last, rise = tried[-1]

@@ -26,8 +26,7 @@ PRIOR_RAD = np.radians(0.1)
 
 @dataclass(frozen=True, eq=False)
 class Maps:
-    """Bias of each measured angle, rad, at the knots, (2, 3, KNOTS): link, argument (phi1, phi2, phi2 -
-    phi1)."""
+    """Bias of each measured angle, rad, at the knots, (2, 3, KNOTS): link, argument (phi1, phi2, phi2 - phi1)."""
 
     knots_rad: Floats
 

@@ -51,8 +51,10 @@ def high_pass(phi_rad: Floats) -> float:
 
 
 def noise(t_s: Floats, phi_rad: Floats, sigma_rad: Floats, span: tuple[float, float]) -> Noise:
-    """What to weight a recording's angles (T, 2) by: the stated sigmas where they agree with the measured
-    noise of the moving part, else the measured noise, one number per link.
+    """Weights of a recording's angles (T, 2), as standard deviations, rad.
+
+    The stated sigmas where they agree with the measured noise of the moving part, else the measured noise, one number
+    per link.
 
     A pair scatter (the paper's Eq. 32) is two to three times the noise and near zero in some samples:
     weighting by it would let those samples rule the fit.

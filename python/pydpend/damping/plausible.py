@@ -55,8 +55,11 @@ class Wobble:
 
 
 def wobble(track: Track, span: tuple[float, float], model: Model) -> Wobble:
-    """The energy's ups and downs, with the angles' zeros that make them smallest where the given ones make them too
-    large.
+    """The energy's ups and downs.
+
+    With the angles' zeros that make them smallest where the given ones make them too large.
+
+    With the angles' zeros that make them smallest where the given ones make them too large.
 
     Local cubics over 24 ms give the rates; means over 0.2 s take the noise off.
     """
@@ -104,8 +107,14 @@ def wobble(track: Track, span: tuple[float, float], model: Model) -> Wobble:
 
 
 def typical_hz(track: Track, span: tuple[float, float]) -> float:
-    """RMS acceleration over RMS rate of the upper link, as a frequency, Hz: between the modes when the links swing,
-    and of their size when they tumble. From local parabolas over 48 ms; NaN when too little is seen."""
+    """RMS acceleration over RMS rate of the upper link, as a frequency, Hz.
+
+    Between the modes when the links swing, and of their size when they tumble. From local parabolas over 48 ms; NaN
+    when too little is seen.
+
+    Between the modes when the links swing, and of their size when they tumble. From local parabolas over 48 ms; NaN
+    when too little is seen.
+    """
     t, phi, _ = track
     keep = (t >= span[0]) & (t <= span[1]) & np.isfinite(phi[:, 0])
     if keep.sum() < 50:
@@ -125,8 +134,7 @@ def typical_hz(track: Track, span: tuple[float, float]) -> float:
 
 
 def check_model(track: Track, span: tuple[float, float], model: Model, name: str, chi2: float | None) -> None:
-    """Refuses constants under which the measured motion gains energy, or whose frequencies are of another
-    scale.
+    """Refuses constants under which the measured motion gains energy, or whose frequencies are of another scale.
 
     Raises FitError in plain words.
     """
@@ -173,8 +181,10 @@ LOST = 1000.0
 
 
 def check_followed(names: Sequence[str], chi2: float) -> None:
-    """Raises FitError where even pieces of a motion with states of their own do not follow the angles of the recordings
-    ``names``: their chi-square is beyond `LOST`."""
+    """Checks that pieces of a motion with states of their own follow the angles of the recordings ``names``.
+
+    Raises FitError where they do not: their chi-square is beyond `LOST`.
+    """
     if chi2 > LOST:
         raise FitError(
             fault(
@@ -191,8 +201,11 @@ TAIL_S = 8.0
 
 
 def tail_modes_hz(track: Track, span: tuple[float, float], model: Model) -> tuple[float, ...]:
-    """Frequencies of the last small oscillations as measured, Hz: damped sines common to the links, fitted to the last
-    8 s from the model's frequencies. Empty when less of the motion was seen.
+    """Frequencies of the last small oscillations as measured, Hz; empty when less of the motion was seen.
+
+    Damped sines common to the links, fitted to the last 8 s from the model's frequencies.
+
+    Damped sines common to the links, fitted to the last 8 s from the model's frequencies.
 
     They lie below the small-swing limit by the amplitude that is left (1.3e-3 of it at 8 deg).
     """

@@ -44,14 +44,21 @@ def slashed(values: Sequence[float]) -> str:
 
 @dataclass(frozen=True)
 class Window:
-    """Prediction errors over all windows of one length, degrees, per link."""
+    """Prediction errors over all windows of one length.
+
+    Attributes
+    ----------
+    rms_deg : tuple of float
+        Root mean square over all samples, per link, deg.
+    median_deg : tuple of float
+        Median of the windows' root mean squares, per link, deg.
+    n : int
+        Number of windows.
+    """
 
     rms_deg: tuple[float, ...]
-    """Over all samples."""
     median_deg: tuple[float, ...]
-    """Median of the windows' RMS."""
     n: int
-    """Number of windows."""
 
     def to_dict(self) -> dict[str, Any]:
         """As in ``predict.json``."""
@@ -63,22 +70,45 @@ class Window:
 
 @dataclass(frozen=True, eq=False)
 class Prediction(JsonResult):
-    """How well a fit predicts one recording."""
+    """How well a fit predicts one recording that it has not seen.
+
+    In a window only the initial state is fitted; a forecast fits the state to the past half second alone and looks
+    ahead.
+
+    Attributes
+    ----------
+    name : str
+        Name of the recording.
+    in_window : dict of str to pydpend.damping.Window
+        Errors in windows, by their length in s.
+    forecast : dict of str to pydpend.damping.Window
+        Errors of forecasts, by how far ahead in s.
+    calm : dict of str to pydpend.damping.Window
+        The forecasts after the lower link has stopped tumbling.
+    zeros_rad : tuple of float
+        Zeros of the recording's two angles that were found, rad.
+    rows : dict of str to ndarray of float, each of shape (n, 3)
+        By window length in s: start time (s) and the two root mean squares (deg) of each window.
+    message : str
+        Free decay and errors in words.
+    """
 
     name: str
     in_window: dict[str, Window]
-    """By window length in s."""
     forecast: dict[str, Window]
-    """From the past half second only, by how far ahead."""
     calm: dict[str, Window]
-    """The forecast after the lower link has stopped tumbling."""
     zeros_rad: tuple[float, float]
     rows: dict[str, Floats]
-    """Per window length: start time and the two RMS of each window, (n, 3), s and deg."""
     message: str
 
     def to_dict(self) -> dict[str, Any]:
-        """``predict.json``."""
+        """The prediction as plain values: ``predict.json``.
+
+        Returns
+        -------
+        dict
+            Numbers, texts, lists and tables.
+        """
 
         def group(windows: Mapping[str, Window]) -> dict[str, Any]:
             return {k: w.to_dict() for k, w in windows.items()}
@@ -102,8 +132,7 @@ def predict(
     *,
     forecasts: bool = True,
 ) -> Prediction:
-    """Predicts a recording with given parameters of the motion. Raises FitError when no window fits into
-    it."""
+    """Predicts a recording with given parameters of the motion. Raises FitError when no window fits into it."""
     track = recording.track if maps is None else corrected([recording.track], maps)[0]
     base = shooting.cut([track], [recording.span], PIECE_S)
     if len(base) == 0:
@@ -219,8 +248,10 @@ def _errors(
     count: int,
     since: Floats | None = None,
 ) -> _Errors:
-    """Squared errors of each window; ``label`` says which window a segment belongs to; ``since`` leaves out
-    samples before that time of each segment."""
+    """Squared errors of each window.
+
+    ``label`` says which window a segment belongs to; ``since`` leaves out samples before that time of each segment.
+    """
     path = shooting.trace([track], segments, parameters)
     r = np.degrees(shooting.residuals([track], path, zeros))
     window = label[path.segment]
@@ -317,8 +348,7 @@ def split(recordings: Sequence[Recording]) -> tuple[list[Recording], Recording]:
 def held_out(
     recordings: Sequence[Recording], run: Callable[[Sequence[Recording]], DampingFit]
 ) -> tuple[dict[str, dict[str, Any]], str]:
-    """Prediction of what a fit has not seen: each recording from the others, or the last part of the only
-    one.
+    """Prediction of what a fit has not seen: each recording from the others, or the last part of the only one.
 
     Returns RMS by window for ``fit.json`` and a sentence. Too short a recording gives none, and the
     sentence why.

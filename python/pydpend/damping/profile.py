@@ -119,8 +119,12 @@ def fit_energy(
     names: Sequence[str],
     progress: Progress | None = None,
 ) -> tuple[EnergyFit, list[EnergyProfile], list[EnergyProfile], Smoothed]:
-    """Coefficients common to all recordings, the profiles they were fitted to, those at every sample, and the smoothed
-    motion."""
+    """Coefficients common to all recordings, from their energy profiles.
+
+    Also the profiles they were fitted to, those at every sample, and the smoothed motion.
+
+    Also the profiles they were fitted to, those at every sample, and the smoothed motion.
+    """
     constants = parameters(model)
     segments = shooting.cut(tracks, spans, shooting.PIECE_S)
     zeros = np.zeros((len(tracks), 2))

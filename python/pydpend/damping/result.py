@@ -24,7 +24,15 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Estimate:
-    """A number with its standard uncertainty and unit."""
+    """A number with its standard uncertainty and unit.
+
+    Attributes
+    ----------
+    value, sigma : float
+        The number and its standard uncertainty, in `unit`.
+    unit : str
+        Unit; ``"1"`` for a ratio or a share.
+    """
 
     value: float
     sigma: float
@@ -49,27 +57,43 @@ def estimates(
 
 @dataclass(frozen=True, eq=False)
 class EnergyCurve:
-    """Energy of one recording's motion and what the laws take out of it (Fig. 19). All (T,) in s and J."""
+    """Energy of one recording's motion at T times and what the laws take out of it (Fig. 19).
+
+    Attributes
+    ----------
+    t_s : ndarray of float, shape (T,)
+        Time, s.
+    energy_j : ndarray of float, shape (T,)
+        Energy (Eq. 22), J.
+    model_j : ndarray of float, shape (T,)
+        Initial energy minus the works of all laws, J.
+    works_j : ndarray of float, shape (T, C)
+        Energy taken out by each coefficient since the start, J, in the order of the fit's coefficients.
+    """
 
     t_s: Floats
     energy_j: Floats
     model_j: Floats
-    """Initial energy minus the works of all laws."""
     works_j: Floats
-    """Energy taken out by each coefficient since the start, (T, C), in the order of the fit's
-    coefficients."""
 
 
 @dataclass(frozen=True, eq=False)
 class Residuals:
-    """What is left of one recording's angles when the fitted motion, its zeros and angle maps are taken off."""
+    """What is left of one recording's angles when the fitted motion, its zeros and angle maps are taken off.
+
+    Attributes
+    ----------
+    t_s : ndarray of float, shape (T,)
+        Time of the samples that were fitted, s.
+    residual_rad : ndarray of float, shape (T, L)
+        Measured minus fitted, rad; NaN where not seen.
+    sigma_rad : ndarray of float, shape (T, L)
+        Standard deviation that each was weighted by, rad.
+    """
 
     t_s: Floats
-    """(T,), the samples that were fitted."""
     residual_rad: Floats
-    """(T, links), measured minus fitted; NaN where not seen."""
     sigma_rad: Floats
-    """(T, links), the standard deviation each was weighted by."""
 
 
 SHORT_S = 20.0
@@ -78,16 +102,24 @@ SHORT_S = 20.0
 
 @dataclass(frozen=True)
 class Identifiability:
-    """What the data determine and what they do not."""
+    """What the data determine and what they do not.
+
+    Attributes
+    ----------
+    condition : float
+        Condition number of the correlation-scaled information matrix of coefficients and ratios.
+    correlations : dict of str to float
+        ``"a/b"``: correlation, for pairs beyond 0.9.
+    duration_s : float
+        Length of the motion that was fitted, s.
+    remarks : tuple of str
+        What the numbers say of single coefficients and of all, in words.
+    """
 
     condition: float
-    """Condition number of the correlation-scaled information matrix of coefficients and ratios."""
     correlations: dict[str, float]
-    """``"a/b"``: correlation, for pairs beyond 0.9."""
     duration_s: float
-    """Length of the motion that was fitted."""
     remarks: tuple[str, ...]
-    """What the numbers say of single coefficients and of all, in words."""
 
     @property
     def too_short(self) -> bool:
@@ -112,17 +144,31 @@ class Identifiability:
 
 @dataclass(frozen=True)
 class Term:
-    """What the data say of one term."""
+    """What the data say of one term.
+
+    Attributes
+    ----------
+    name : str
+        Its coefficient.
+    gain : float
+        Twice the gain in log-likelihood that it brings beside all others, over the residuals' chi-square.
+    prediction : float
+        How much worse the rest is predicted without it: change of the mean square, relative.
+    prediction_z : float
+        The same over its standard error, from the windows.
+    partner : str
+        The term it is most correlated with.
+    correlation : float
+        Their correlation.
+    verdict : pydpend.fit_status.Verdict
+        What follows from these numbers.
+    """
 
     name: str
     gain: float
-    """Twice the gain in log-likelihood that it brings beside all others, over the residuals' chi-square."""
     prediction: float
-    """How much worse the rest is predicted without it: change of the mean square, relative."""
     prediction_z: float
-    """The same over its standard error, from the windows."""
     partner: str
-    """The term it is most correlated with."""
     correlation: float
     verdict: Verdict
 
@@ -161,19 +207,28 @@ class Term:
 
 @dataclass(frozen=True)
 class Interval:
-    """A coefficient's 95 % interval by profile likelihood (`damping.intervals`)."""
+    """A coefficient's 95 % interval by profile likelihood (`damping.intervals`).
+
+    Attributes
+    ----------
+    low, high : float
+        Its ends, in `unit`: low is 0 where the data do not exclude that; NaN for an end that was not found.
+    unit : str
+        Unit of the coefficient.
+    values : tuple of float
+        Values at which everything else was fitted again, rising; the estimate is one.
+    rises : tuple of float
+        How much twice the negative log-likelihood is above the estimate's, in units in which a standard error is 1.
+    note : str
+        What should be known of an end; empty if nothing.
+    """
 
     low: float
-    """Lower end, 0 where the data do not exclude that; NaN where it was not found."""
     high: float
-    """Upper end; NaN where it was not found."""
     unit: str
     values: tuple[float, ...]
-    """Values at which everything else was fitted again, rising; the estimate is one."""
     rises: tuple[float, ...]
-    """How much twice the negative log-likelihood is above the estimate's, in units in which a standard error is 1."""
     note: str
-    """What should be known of an end; empty if nothing."""
 
     def to_dict(self) -> dict[str, Any]:
         """As in ``fit.json``; null for an end that was not found."""
@@ -195,19 +250,28 @@ class Interval:
 
 @dataclass(frozen=True)
 class TenCoefficients:
-    """The paper's ten, Table 6, and how little they mean."""
+    """The paper's ten (Table 6), and how little they mean.
+
+    Attributes
+    ----------
+    values : dict of str to Estimate
+        ``mu_v1`` ... ``mu_q2`` and ``mu_c1_1`` (first of joint 1) ... ``mu_c3_2``; the standard errors are those of ten
+        free ones.
+    rmu : dict of str to Estimate
+        ``rmu1``, ``rmu2``, m: what the three of each joint dissipate together, as r mu.
+    weights : dict of str to list of float
+        With which the three mu_c of a joint add up to it.
+    rank : int
+        Of the ten, how many combinations the energies determine.
+    condition : float
+        Condition number of the ten works, scaled.
+    """
 
     values: dict[str, Estimate]
-    """``mu_v1`` ... ``mu_q2`` and ``mu_c1_1`` (first of joint 1) ... ``mu_c3_2``; the standard errors are those of ten
-    free ones."""
     rmu: dict[str, Estimate]
-    """``rmu1``, ``rmu2``: what the three of each joint dissipate together, as r mu."""
     weights: dict[str, list[float]]
-    """With which the three mu_c of a joint add up to it."""
     rank: int
-    """Of the ten, how many combinations the energies determine."""
     condition: float
-    """Condition number of the ten works, scaled."""
 
     def to_dict(self) -> dict[str, Any]:
         """As in ``fit.json``."""
@@ -251,57 +315,93 @@ class TenCoefficients:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DampingFit(JsonResult, TableResult):
-    """Damping coefficients with everything needed to judge them."""
+    """Damping coefficients with everything needed to judge them (Section 7.1; docs/damping.md).
+
+    Attributes
+    ----------
+    method : str
+        ``trajectory`` or ``energy``.
+    status : pydpend.fit_status.FitStatus
+        How the fit ended.
+    message : str
+        How it ended and how well the model describes the angles, in words.
+    chi2 : float
+        Mean squared standardised residual with only the noise's own slack at the joints: 1 for a model that is right.
+        NaN where it is not defined (energy fit).
+    n : int
+        Number of measured values used.
+    coefficients : dict of str to pydpend.damping.Estimate
+        Coefficients of `Damping` with standard uncertainties and units, SI.
+    ratios : dict of str to pydpend.damping.Estimate
+        lambda, sigma, kappa and a3 over psi.
+    shares : dict of str to dict of str to pydpend.damping.Estimate
+        ``law`` and ``joint``: fraction of the dissipated energy, each with its uncertainty.
+    identifiability : pydpend.damping.Identifiability
+        What the data determine.
+    parameters : dict of str to float
+        All parameters of the equations of motion at the solution, SI (psi as stated by the model).
+    names : tuple of str
+        Names of the P rows of `covariance`: coefficients and ratios.
+    covariance : ndarray of float, shape (P, P)
+        Their covariance, SI.
+    inputs : tuple of dict
+        Each recording: name, the span used, samples, noise, angle zeros.
+    energy : tuple of pydpend.damping.EnergyCurve
+        Energies of each recording; ``energy.csv`` in the fit's folder.
+    residuals : tuple of pydpend.damping.Residuals
+        Residuals of each recording; ``residuals.csv`` in the fit's folder.
+    within_noise : bool or None
+        Whether the model describes the angles to within their noise; where it does not, the standard errors carry its
+        errors. None where the fit does not tell (energy).
+    prediction : dict of str to dict
+        Window in s: root mean square per link, deg, of data the fit did not see.
+    terms : tuple of pydpend.damping.Term
+        What the data say of each term, if the terms were compared.
+    intervals : dict of str to pydpend.damping.Interval
+        95 % intervals of the coefficients by profile likelihood, if asked for.
+    chi2_slack : float
+        The same mean square as `chi2` with the slack of `slack`.
+    slack : dict of str to float
+        Jump allowed at the joints per state component, and relative to what noise alone would need.
+    iterations : int
+        Number of steps.
+    modes_hz : tuple of float
+        Small oscillations of the fitted pendulum about hanging, Hz; those measured at the end of each recording are in
+        `inputs`.
+    maps : dict or None
+        Angle-bias maps, if asked for.
+    ten : pydpend.damping.result.TenCoefficients or None
+        The paper's ten coefficients, if asked for.
+    notes : tuple of str
+        What was left out or should be known.
+    """
 
     method: str
-    """``trajectory`` or ``energy``."""
     status: FitStatus
     message: str
-    """How it ended and how well the model describes the angles, in words."""
     chi2: float
-    """Mean squared standardised residual with only the noise's own slack at the joints: 1 for a model that is
-    right. NaN where it is not defined (energy fit)."""
     n: int
-    """Number of measured values used."""
     coefficients: dict[str, Estimate]
     ratios: dict[str, Estimate]
-    """lambda, sigma, kappa and a3 over psi."""
     shares: dict[str, dict[str, Estimate]]
-    """``law`` and ``joint``: fraction of the dissipated energy, each with its uncertainty."""
     identifiability: Identifiability
     parameters: dict[str, float]
-    """All parameters of the equations of motion at the solution, SI (psi as stated by the model)."""
     names: tuple[str, ...]
-    """Names of the rows of `covariance`: coefficients and ratios."""
     covariance: Floats
     inputs: tuple[dict[str, Any], ...]
-    """Each recording: name, the span used, samples, noise, angle zeros."""
     energy: tuple[EnergyCurve, ...] = field(default=(), repr=False)
     residuals: tuple[Residuals, ...] = field(default=(), repr=False)
-    """Of each recording; ``residuals.csv`` in the fit's folder."""
     within_noise: bool | None = None
-    """Whether the model describes the angles to within their noise; where it does not, the standard errors carry its
-    errors. None where the fit does not tell (energy)."""
     prediction: dict[str, dict[str, Any]] = field(default_factory=dict)
-    """Window in s: RMS per link in degrees of data the fit did not see."""
     terms: tuple[Term, ...] = ()
-    """What the data say of each term, if the terms were compared."""
     intervals: dict[str, Interval] = field(default_factory=dict)
-    """95 % intervals of the coefficients by profile likelihood, if asked for."""
     chi2_slack: float = math.nan
-    """The same mean square with the slack of `slack`."""
     slack: dict[str, float] = field(default_factory=dict)
-    """Jump allowed at the joints per state component, and relative to what noise alone would need."""
     iterations: int = 0
     modes_hz: tuple[float, ...] = ()
-    """Small oscillations of the fitted pendulum about hanging, Hz; those measured at the end of each recording are in
-    `inputs`."""
     maps: dict[str, Any] | None = None
-    """Angle-bias maps, if asked for."""
     ten: TenCoefficients | None = None
-    """The paper's ten coefficients, if asked for."""
     notes: tuple[str, ...] = ()
-    """What was left out or should be known."""
 
     def __repr__(self) -> str:
         """A line for people."""
@@ -314,7 +414,13 @@ class DampingFit(JsonResult, TableResult):
         return html_table(repr(self)[1:-1], ("coefficient", "value", "standard error", "unit"), rows)
 
     def to_columns(self) -> dict[str, NDArray[Any]]:
-        """The coefficients, then the ratios over psi: ``name``, ``value``, ``sigma``, ``unit``."""
+        """The coefficients, then the ratios over psi, as columns of a table.
+
+        Returns
+        -------
+        dict of str to ndarray
+            ``name``, ``value``, ``sigma`` and ``unit``, a row per coefficient or ratio.
+        """
         found = [*self.coefficients.items(), *((f"{n}/psi", e) for n, e in self.ratios.items())]
         return {
             "name": np.array([name for name, _ in found], dtype=object),
@@ -324,7 +430,13 @@ class DampingFit(JsonResult, TableResult):
         }
 
     def to_dict(self) -> dict[str, Any]:
-        """``fit.json``: plain numbers and text, null for what is not defined."""
+        """The fit as plain values: ``fit.json``.
+
+        Returns
+        -------
+        dict
+            Numbers, texts, lists and tables; None for what is not defined. Energies and residuals are not in it.
+        """
         out = {
             "method": self.method,
             "status": str(self.status),
@@ -366,16 +478,46 @@ class DampingFit(JsonResult, TableResult):
 
     @classmethod
     def from_json(cls, text: str, source: str = "fit.json") -> DampingFit:
-        """A fit from the text of its ``fit.json``; ``source`` names it in messages. Energies and residuals are in
-        tables of their own, and empty here.
+        """A fit from the text of its ``fit.json``. Energies and residuals are in tables of their own, and empty here.
 
-        Raises FitError naming the key for a text that is none.
+        Parameters
+        ----------
+        text : str
+            What `to_json` gave.
+        source : str
+            Name of the text, for messages.
+
+        Returns
+        -------
+        DampingFit
+            The fit.
+
+        Raises
+        ------
+        FitError
+            Naming the key, for a text that is none.
         """
         return cls.of_table(parse_json(text, source, FitError, "Give the fit.json that " + FIT + " wrote"))
 
     @classmethod
     def of_table(cls, given: Table) -> DampingFit:
-        """`from_json` of a document that is read."""
+        """A fit from its document, as `from_json`.
+
+        Parameters
+        ----------
+        given : pydpend.documents.Table
+            What was read of a ``fit.json``.
+
+        Returns
+        -------
+        DampingFit
+            The fit.
+
+        Raises
+        ------
+        FitError
+            Naming the key, for a document that is none.
+        """
         status, method = given.text("status"), given.text("method")
         if status not in list(FitStatus):
             given.refuse("status", f"{status!r} is not known")

@@ -19,8 +19,7 @@ TERMS = tuple(name for name, _ in _tracker.term_names())
 
 
 def unit_works(tracks: Sequence[Track], path: Trace, names: Sequence[str]) -> Floats:
-    """Work of each of ``names`` along the motion per unit of its coefficient, summed over recordings, (C,),
-    J."""
+    """Work of each of ``names`` along the motion per unit of its coefficient, summed over recordings, (C,), J."""
     total = np.zeros(len(names))
     for r in range(len(tracks)):
         t, works, _ = cumulative(tracks, path, names, r)
@@ -32,8 +31,7 @@ def unit_works(tracks: Sequence[Track], path: Trace, names: Sequence[str]) -> Fl
 def cumulative(
     tracks: Sequence[Track], path: Trace, names: Sequence[str], recording: int
 ) -> tuple[Floats, Floats, Floats]:
-    """Times (M,), works since the start per unit of each coefficient (M, C), and states (M, 4) of one
-    recording."""
+    """Times (M,), works since the start per unit of each coefficient (M, C), and states (M, 4) of one recording."""
     here = path.recording == recording
     t = tracks[recording][0][path.sample[here]]
     powers = path.unit_power[here][:, [TERMS.index(name) for name in names]]
@@ -54,9 +52,14 @@ def cumulative(
 def shares(
     names: Sequence[str], values: Mapping[str, float], cov: Floats, works: Floats
 ) -> dict[str, dict[str, Estimate]]:
-    """Fractions of the dissipated energy by ``law`` (viscous, drag, dry; the paper's 9/22/69 %) and by
-    ``joint`` (upper, lower; 81/19 %), and by ``coefficient``, with uncertainties from the coefficients'
-    covariance (C, C)."""
+    """Fractions of the dissipated energy, with uncertainties from the coefficients' covariance (C, C).
+
+    By ``law`` (viscous, drag, dry; the paper's 9/22/69 %), by ``joint`` (upper, lower; 81/19 %) and by
+    ``coefficient``.
+
+    By ``law`` (viscous, drag, dry; the paper's 9/22/69 %), by ``joint`` (upper, lower; 81/19 %) and by
+    ``coefficient``.
+    """
     c = np.array([values[name] for name in names])
     total = float(c @ works)
     groups = {

@@ -63,9 +63,12 @@ class Segments:
         return replace(out, rows=rows)
 
     def merged(self, size: int, transfer: Floats | None = None) -> Segments:
-        """Every ``size`` consecutive segments of a chain as one, from the first one's state; what is left over at
-        a chain's end is one too. With ``transfer`` (K, 4, 4), the derivatives of each segment's end with respect to
-        its start in units that make them comparable, one ends where a start would grow beyond `GROWTH`."""
+        """Every ``size`` consecutive segments of a chain as one, from the first one's state.
+
+        What is left over at a chain's end is one too. With ``transfer`` (K, 4, 4), the derivatives of each segment's
+        end with respect to its start in units that make them comparable, one ends where a start would grow beyond
+        `GROWTH`.
+        """
         rows: list[list[int]] = []
         times: list[list[float]] = []
         first: list[int] = []
@@ -156,7 +159,12 @@ def _longest_gap(t_s: Floats, phi_rad: Floats, edges_s: Floats) -> float:
 def cut(
     tracks: Sequence[Track], spans: Sequence[tuple[float, float]], length_s: float, chained: bool = True
 ) -> Segments:
-    """Segments of about ``length_s`` over each recording's span, with states from local cubics."""
+    """Segments of about ``length_s`` whose states are near the solution.
+
+    Also the parameters found on the way: the fit of pieces, loosely tied.
+
+    Also the parameters found on the way: the fit of pieces, loosely tied.
+    """
     rows, times, states = _tracker.shooting_segments(tracks, spans, length_s, chained)
     good: NDArray[np.bool_] = np.asarray(np.isfinite(states).all(axis=1))
     good &= np.abs(states[:, 2:]).max(axis=1, initial=0.0) < FASTEST_RAD_S
@@ -262,8 +270,10 @@ def settled(
     bounded: Sequence[str] = (),
     progress: Progress | None = None,
 ) -> Solution:
-    """Segments of about ``length_s`` whose states are near the solution, with the parameters found on the way: the
-    fit of pieces, loosely tied."""
+    """Segments of about ``length_s`` whose states are near the solution: the fit of pieces, loosely tied.
+
+    With the parameters found on the way.
+    """
     size = max(1, round(length_s / PIECE_S))
     pieces = cut(tracks, spans, length_s / size)
     loose = solve(

@@ -68,8 +68,12 @@ def one_body(angles: LinkAngles, elbow_rad: float = 0.0) -> tuple[LinkAngles, fl
 
 
 def pinned(model: Model, elbow_rad: float) -> tuple[Model, float]:
-    """The double pendulum with its elbow pinned at phi2 - phi1 as one link, and the angle of the upper link at which
-    that hangs at rest, rad."""
+    """The double pendulum with its elbow pinned at phi2 - phi1, as one link.
+
+    Also the angle of the upper link at which that hangs at rest, rad.
+
+    Also the angle of the upper link at which that hangs at rest, rad.
+    """
     c, s = np.cos(elbow_rad), np.sin(elbow_rad)
     along, across = model.sigma_j + model.kappa_j * c, model.kappa_j * s
     body = replace(

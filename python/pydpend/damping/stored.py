@@ -91,8 +91,7 @@ class StoredFit:
 
 
 def load_fit(path: AnyPath) -> StoredFit:
-    """Reads ``fit.json`` from a folder of ``pydpend fit`` (or the file itself). Raises FitError when it is
-    none."""
+    """Reads ``fit.json`` from a folder of ``pydpend fit`` (or the file itself). Raises FitError when it is none."""
     path = path_of(path)
     expect(path, ("fit",), FitError)
     if path.is_dir():

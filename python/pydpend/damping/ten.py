@@ -44,8 +44,12 @@ def constants(model: Model) -> Floats:
 
 
 def split(path: Trace, values: dict[str, float], model: Model) -> Floats:
-    """Powers of the three parts of each joint's load friction for r mu of one, (M, 2, 3), W/m; they add up to
-    ``abs(rate) N``."""
+    """Powers of the three parts of each joint's load friction for r mu of one, (M, 2, 3), W/m.
+
+    They add up to ``abs(rate) N``.
+
+    They add up to ``abs(rate) N``.
+    """
     phi, w = path.state[:, :2], path.state[:, 2:]
     rates = {"upper": w[:, 0], "lower": w[:, 1] - w[:, 0]}
     moments = np.zeros((len(w), 2))

@@ -43,8 +43,9 @@ def fit_trajectory(
     max_iterations: int = 60,
     progress: Progress | None = None,
 ) -> DampingFit:
-    """Fits the coefficients ``names``, and what ``options`` frees besides, to one or several recordings with them in
-    common.
+    """Fits coefficients to one or several recordings that have them in common.
+
+    ``names``: the coefficients; what ``options`` frees besides is fitted too.
 
     Where segments of ``segment_s`` do not converge, shorter ones are taken, down to `shooting.PIECE_S`. Raises FitError
     for constants the recordings refute, and where nothing is determined.

@@ -45,14 +45,36 @@ LEAST_DOF = 3
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """``V = offset_v + slope_v_per_rad * phi``.
+    """The line between an encoder's volts and its angle, ``V = offset_v + slope_v_per_rad * phi`` (Fig. 10).
 
-    ``covariance`` (2, 2): of (offset, slope), with ``dof`` degrees of freedom. ``residual_v`` (n,): hold
-    minus line. ``linearity``: largest residual over the calibrated span. ``noise_v``: standard deviation of
-    a reading, pooled over the holds. ``noisy_holds``: those whose standard deviation is above ``spec_v`` by more than
-    chance explains.
-    ``range_v``: the output's rails; ``wraps``: whether it jumps from one to the other (a single-turn
-    encoder) or stays there.
+    Attributes
+    ----------
+    offset_v : float
+        Voltage at angle zero (the link hangs), V.
+    slope_v_per_rad : float
+        Voltage per angle, V per rad; below zero for an encoder that counts clockwise.
+    covariance : ndarray of float, shape (2, 2)
+        Of (offset, slope), in V and rad.
+    dof : int
+        Its degrees of freedom.
+    holds : tuple of pydpend.encoder.Hold
+        The n holds that the line goes through.
+    residual_v : ndarray of float, shape (n,)
+        Hold minus line, V.
+    linearity : float
+        Largest residual over the calibrated span.
+    noise_v : float
+        Standard deviation of a reading, pooled over the holds, V.
+    spec_v : float
+        The maker's uncertainty of a reading, V.
+    noisy_holds : tuple of str
+        Holds whose standard deviation is above `spec_v` by more than chance explains.
+    range_v : tuple of float
+        Rails of the output, V.
+    wraps : bool
+        Whether the output jumps from one rail to the other (a single-turn encoder) or stays there.
+    notes : tuple of str
+        What should be known of the line.
     """
 
     offset_v: float
@@ -91,11 +113,33 @@ class Calibration:
         )
 
     def angle_rad(self, volts: Floats) -> Floats:
-        """Angle of a reading, rad; no wrap is undone."""
+        """Angle of a reading; no wrap is undone.
+
+        Parameters
+        ----------
+        volts : ndarray of float
+            Readings of any shape, V.
+
+        Returns
+        -------
+        ndarray of float
+            Angles of the same shape, rad, zero hanging down.
+        """
         return np.asarray((np.asarray(volts) - self.offset_v) / self.slope_v_per_rad)
 
     def systematic_rad(self, volts: Floats) -> Floats:
-        """Standard uncertainty of that angle from the line alone, rad: common to all readings, not noise."""
+        """Standard uncertainty of an angle from the line alone: common to all readings, not noise.
+
+        Parameters
+        ----------
+        volts : ndarray of float
+            Readings of any shape, V.
+
+        Returns
+        -------
+        ndarray of float
+            Standard uncertainties of the same shape, rad.
+        """
         phi = self.angle_rad(volts)
         c = self.covariance
         variance = c[0, 0] + 2 * phi * c[0, 1] + phi**2 * c[1, 1]
@@ -107,12 +151,24 @@ class Calibration:
         return self.noise_v / abs(self.slope_v_per_rad)
 
     def to_dict(self) -> dict[str, Any]:
-        """`to_json` as plain values."""
+        """The calibration as plain values.
+
+        Returns
+        -------
+        dict
+            All of it, as ``pydpend calibrate`` writes it.
+        """
         value: dict[str, Any] = json.loads(self.to_json())
         return value
 
     def to_json(self) -> str:
-        """All of it, as ``pydpend calibrate`` writes it."""
+        """The calibration as JSON.
+
+        Returns
+        -------
+        str
+            `to_dict` as text.
+        """
         low, high = self.interval_95
         value: dict[str, Any] = {
             "schema": 1,
@@ -141,7 +197,18 @@ class Calibration:
         return json.dumps(value, indent=2) + "\n"
 
     def write(self, path: AnyPath) -> None:
-        """Writes the JSON. Raises :class:`EncoderError` if the file cannot be written."""
+        """Writes the JSON; a file that is there is replaced.
+
+        Parameters
+        ----------
+        path : path-like
+            The file.
+
+        Raises
+        ------
+        EncoderError
+            If the file cannot be written.
+        """
         try:
             write_text(path, self.to_json())
         except OSError as problem:
@@ -151,9 +218,22 @@ class Calibration:
 
 
 def read_calibration(path: AnyPath) -> Calibration:
-    """Reads what :meth:`Calibration.write` wrote.
+    """A calibration as :meth:`Calibration.write` wrote it.
 
-    Raises :class:`EncoderError` naming the file, and the key that is missing or not what it must be.
+    Parameters
+    ----------
+    path : path-like
+        The file.
+
+    Returns
+    -------
+    Calibration
+        The line.
+
+    Raises
+    ------
+    EncoderError
+        Naming the file, and the key that is missing or not what it must be.
     """
     expect(path_of(path), ("calibration",), EncoderError)
     value = read_json(path_of(path), EncoderError, "Make one with " + CALIBRATE)
@@ -204,10 +284,29 @@ def calibrate(
     wraps: bool = False,
     spec_v: float = SPEC_V,
 ) -> Calibration:
-    """Weighted straight line through the holds.
+    """Weighted straight line through holds at known angles (Section 5.1, Fig. 10).
 
-    Raises :class:`EncoderError` for fewer than two holds, holds all at one angle, a voltage that does not
-    change with the angle, and holds outside the range or at its rails.
+    Parameters
+    ----------
+    holds : sequence of pydpend.encoder.Hold
+        At least two, at two angles; `read_holds` reads them.
+    range_v : tuple of float
+        Rails of the output, V.
+    wraps : bool
+        Whether the output jumps from one rail to the other (a single-turn encoder).
+    spec_v : float
+        The maker's uncertainty of a reading, V.
+
+    Returns
+    -------
+    Calibration
+        The line with its uncertainties.
+
+    Raises
+    ------
+    EncoderError
+        For fewer than two holds, holds all at one angle or far off a line, a voltage that does not change with the
+        angle, and holds outside the range or at its rails.
     """
     if len(holds) < 2:
         raise EncoderError(
@@ -345,9 +444,7 @@ def _too_noisy(hold: Hold, spec_v: float) -> bool:
 
 
 def _unwrapped_holds(phi: Floats, volts: Floats, sigma: Floats, span: float) -> Floats:
-    """Voltages of a single-turn encoder put on one line: whole spans are added, for either sense of
-    turning.
-    """
+    """Voltages of a single-turn encoder put on one line: whole spans are added, for either sense of turning."""
     best, least = volts, np.inf
     for sense in (1.0, -1.0):
         line = volts[0] + sense * span / (2 * np.pi) * (phi - phi[0])

@@ -1,6 +1,4 @@
-"""Video against encoder: gain, offset, delay, residuals, and whose noise explains them (Section 6, Fig.
-15).
-"""
+"""Video against encoder: gain, offset, delay, residuals, and whose noise explains them (Section 6, Fig. 15)."""
 
 from __future__ import annotations
 
@@ -33,16 +31,54 @@ video's angle is a thousand times more."""
 
 @dataclass(frozen=True, eq=False)
 class Comparison(TableResult):
-    """The encoder's readings on the video's clock, and how far the video is from them.
+    """The encoder's n readings on the video's clock, and how far the video is from them (Section 6, Fig. 15).
 
-    ``t_s`` (n,): video time. ``video_rad``, ``encoder_rad`` (n,): angles; the encoder's with its whole
-    turns taken off, its gain and zero as they are. ``residual_rad`` (n,): the video's angle less what the
-    regression makes of the encoder's. ``gain``, ``offset_rad``: of that regression, video = offset + gain *
-    encoder; ``delay_s``: what of the clocks' offset is left to estimate (0 where it was estimated, the
-    found delay where the recorder gave the clocks as one). Each with its standard uncertainty, from
-    residuals whose neighbours hang together for ``correlation_samples``. ``mean_interval_rad``: 95 %
-    interval of the mean residual. ``share_encoder``, ``share_video``: parts of the residual's variance that
-    the stated noises explain; ``share_unexplained`` the rest (below 0 if the stated noises are too large).
+    Each standard uncertainty is from residuals whose neighbours hang together for `correlation_samples`.
+
+    Attributes
+    ----------
+    name, encoder_name : str
+        Names of the video's and the encoder's recordings.
+    link : int
+        The video's link, from 0.
+    sync : Synchronisation
+        The clocks.
+    t_s : ndarray of float, shape (n,)
+        Video time, s.
+    video_rad, encoder_rad : ndarray of float, shape (n,)
+        Angles, rad; the encoder's with its whole turns taken off, its gain and zero as they are.
+    video_sigma_rad : ndarray of float, shape (n,)
+        Stated standard uncertainty of the video's angles, rad.
+    encoder_sigma_rad : float
+        Stated standard uncertainty of a reading, rad; NaN where none is.
+    residual_rad : ndarray of float, shape (n,)
+        The video's angle less what the regression makes of the encoder's, rad.
+    gain, gain_sigma : float
+        Slope of the regression ``video = offset + gain * encoder`` and its standard uncertainty.
+    offset_rad, offset_sigma_rad : float
+        Its offset, rad.
+    delay_s, delay_sigma_s : float
+        What of the clocks' offset is left to estimate, s: 0 where it was estimated, the found delay where the
+        recorder gave the clocks as one.
+    rms_rad, largest_rad : float
+        Root mean square and largest residual, rad.
+    mean_rad : float
+        Mean residual, rad.
+    mean_interval_rad : tuple of float
+        Its 95 % interval, rad.
+    correlation_samples : float
+        Number of readings that hang together.
+    block_rms_rad, block_expected_rad : float
+        Root mean square of the residual's means over 1 s, and what white noise would leave of itself, rad.
+    share_encoder, share_video, share_unexplained : float
+        Parts of the residual's variance that the stated noises explain, and the rest (below 0 if the stated noises
+        are too large).
+    video_noise_rad, encoder_noise_rad : float
+        White noise of each series by its own scatter (residual of a local cubic), rad.
+    notes : tuple of str
+        What should be known of the comparison.
+    left_out : int
+        How many of the video's angles and the encoder's readings were left out, by the regression too.
     """
 
     name: str
@@ -78,11 +114,23 @@ class Comparison(TableResult):
     """How many of the video's angles and the encoder's readings were left out, by the regression too."""
 
     def to_json(self) -> str:
-        """`to_dict` as JSON."""
+        """The comparison as JSON.
+
+        Returns
+        -------
+        str
+            `to_dict` as text.
+        """
         return json.dumps(self.to_dict(), indent=2) + "\n"
 
     def to_dict(self) -> dict[str, Any]:
-        """All numbers, angles in degrees too where people read them; None for what is not known."""
+        """The comparison as plain values, without its series.
+
+        Returns
+        -------
+        dict
+            All numbers, angles in degrees too where people read them; None for what is not known.
+        """
         s = self.sync
         value: dict[str, Any] = {
             "video": self.name,
@@ -135,7 +183,13 @@ class Comparison(TableResult):
         return plain
 
     def to_columns(self) -> dict[str, Floats]:
-        """The residual series as columns of a table."""
+        """The residual series as columns of a table.
+
+        Returns
+        -------
+        dict of str to ndarray, each of shape (n,)
+            ``time_s``, ``video_rad``, ``encoder_rad`` and ``residual_rad``.
+        """
         return {
             "time_s": self.t_s,
             "video_rad": self.video_rad,
@@ -160,12 +214,31 @@ def compare(
     *,
     clocks: str = "estimate",
 ) -> Comparison:
-    """Compares a link's video angle with an encoder's (:func:`pydpend.encoder.encoder_angles`).
+    """Comparison of a link's video angle with an encoder's (:func:`pydpend.encoder_angles`).
 
-    The noise of the encoder, most often the larger by far, is on its own side of the regression, so the
-    gain is not pulled towards zero by it. ``clocks`` as in :func:`pydpend.encoder.synchronise`.
+    The noise of the encoder, most often the larger by far, is on its own side of the regression, so the gain is not
+    pulled towards zero by it.
 
-    Raises :class:`~pydpend.errors.EncoderError` if the recordings share no motion.
+    Parameters
+    ----------
+    video : LinkAngles
+        Angles of the links, rad.
+    encoder : LinkAngles
+        The encoder's angles, one link, rad.
+    link : int
+        Which link of the video the encoder is on, from 0.
+    clocks : {"estimate", "given"}
+        As in `synchronise`.
+
+    Returns
+    -------
+    Comparison
+        Clocks, gain, offset and residuals, each with its uncertainty.
+
+    Raises
+    ------
+    EncoderError
+        If the recordings share no motion, or are the same.
     """
     sync = synchronise(video, encoder, link, clocks=clocks)
     course = Course.of(video, link)

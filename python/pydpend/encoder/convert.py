@@ -21,17 +21,28 @@ MOST_LEFT_OUT = 0.5
 
 
 def encoder_angles(signal: EncoderSignal, calibration: Calibration | None = None) -> LinkAngles:
-    """The encoder's angle over time, one link, rad, unwrapped; ``sigma_rad`` is the noise of a reading.
+    """The encoder's angle over time: one link, rad, unwrapped.
 
-    Readings at or beyond the rails have no angle (NaN) and are counted in ``meta``; so are those taken
-    while a single-turn encoder jumps from one rail to the other. ``meta["systematic_rad"]`` is the largest
-    uncertainty that the calibration line adds, common to all readings.
+    Parameters
+    ----------
+    signal : EncoderSignal
+        Readings, V or rad.
+    calibration : Calibration, optional
+        The line between volts and angle; needed for volts, refused for rad.
 
-    A signal already in rad needs no calibration; its noise is taken from itself (residual of a local cubic), and its
-    turns are counted if it jumps from one end of a turn to the other.
+    Returns
+    -------
+    LinkAngles
+        Angles (T, 1), rad, zero where the calibration's is. ``sigma_rad`` is the noise of a reading; of a signal in
+        rad it is taken from itself (residual of a local cubic). Readings at or beyond the rails have no angle (NaN)
+        and are counted in ``meta``; so are those taken while a single-turn encoder jumps from one rail to the other.
+        ``meta["systematic_rad"]`` is the largest uncertainty that the line adds, common to all readings.
 
-    Raises :class:`~pydpend.errors.EncoderError`: volts without a calibration, more than half of the
-    readings unusable, or a gap in which an encoder of a single turn may have lost one.
+    Raises
+    ------
+    EncoderError
+        For volts without a calibration, more than half of the readings unusable, or a gap in which an encoder of a
+        single turn may have lost one.
     """
     if signal.unit == "rad":
         if calibration is not None:

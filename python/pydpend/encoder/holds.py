@@ -22,9 +22,20 @@ ENDINGS = (".csv", ".tdms", ".npy", ".parquet", ".txt")
 
 @dataclass(frozen=True)
 class Hold:
-    """One hold: ``mean_v`` and ``std_v`` of ``n`` readings at ``angle_rad``.
+    """Readings of an encoder that is held at one known angle.
 
-    ``sigma_v`` is the standard error of the mean; readings that hang together count as fewer.
+    Attributes
+    ----------
+    angle_rad : float
+        The angle, rad; it counts as exact.
+    mean_v, std_v : float
+        Mean and standard deviation of the readings, V.
+    n : int
+        Number of readings.
+    sigma_v : float
+        Standard error of the mean, V; readings that hang together count as fewer.
+    name : str
+        Name of the hold, for messages.
     """
 
     angle_rad: float
@@ -85,11 +96,25 @@ def read_holds(
 ) -> list[Hold]:
     """Holds from one recording each, from all recordings in a folder, or from one table.
 
-    The angles are ``angles_deg`` in the order of ``paths``, or else in the files' names (see
-    :func:`angles_from_names`). One table has ``angle_deg`` (or ``angle_rad``) beside ``voltage_v``: all
-    readings, or one row per hold with ``std_v`` and ``n``.
+    Parameters
+    ----------
+    paths : sequence of path-like
+        Recordings, folders of them, or one table with ``angle_deg`` (or ``angle_rad``) beside ``voltage_v``: all
+        readings, or one row per hold with ``std_v`` and ``n``.
+    angles_deg : sequence of float, optional
+        Angles, deg, in the order of the files; if not given they are in the files' names (``hold_-360deg.csv``).
+    column, time_column, rate_hz, unit : optional
+        As in `read_encoder`.
 
-    Raises :class:`EncoderError` if angles are missing or their number is not the files'.
+    Returns
+    -------
+    list of pydpend.encoder.Hold
+        What `calibrate` takes.
+
+    Raises
+    ------
+    EncoderError
+        If angles are missing or their number is not the files', or a file cannot be read.
     """
     files: list[Path] = []
     for path in map(Path, paths):

@@ -39,8 +39,10 @@ def in_seconds(t: Floats, source: str, column: str, stated: str) -> Floats:
 def in_base(
     value: Floats, source: str, column: str, stated: str, given: Unit | None
 ) -> tuple[Floats, Literal["v", "rad"]]:
-    """Values (T,) of a column in V or rad, and which. ``stated`` as in :func:`in_seconds`; ``given``: the unit that the
-    caller gives, which stands where the column's name ends in no unit of voltage or angle.
+    """Values (T,) of a column in V or rad, and which.
+
+    ``stated`` as in :func:`in_seconds`; ``given``: the unit that the caller gives, which stands where the column's
+    name ends in no unit of voltage or angle.
 
     Raises EncoderError for another unit, and where two contradict.
     """

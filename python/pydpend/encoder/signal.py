@@ -26,11 +26,27 @@ KNOWN_COLUMNS = ("voltage_v", "phi1_rad", "phi1_deg")
 
 @dataclass(frozen=True, eq=False)
 class EncoderSignal:
-    """``t_s`` (T,): s on the encoder's clock, increasing. ``value`` (T,): V, or rad if ``unit`` is ``"rad"``.
-    Times of ``datetime64`` become seconds from the first.
+    """What an encoder recorded: T readings over time.
 
-    Samples without a value are not in it: ``left_out`` of them; ``notes`` says which, and of gaps and uneven
-    steps.
+    Parameters
+    ----------
+    t_s : ndarray of float or datetime64, shape (T,)
+        Time on the encoder's clock, s, increasing. Dates become seconds from the first.
+    value : ndarray of float, shape (T,)
+        Readings, V, or rad if `unit` is ``"rad"``. Samples without a value are not in it.
+    unit : {"v", "rad"}
+        Unit of the readings.
+    name : str
+        Name of the recording, for messages and legends.
+    notes : tuple of str
+        What was left out, gaps and uneven steps.
+    left_out : int
+        Number of samples that were left out.
+
+    Raises
+    ------
+    EncoderError
+        For shapes that do not go together, times that do not increase, and values that are no numbers.
     """
 
     t_s: Floats
@@ -72,21 +88,39 @@ def read_encoder(
     rate_hz: float | None = None,
     unit: Unit | None = None,
 ) -> EncoderSignal:
-    """Reads an encoder's recording; the kind of file is found from its content.
+    """An encoder's recording; the kind of file is found from its content.
 
-    CSV and Parquet: ``time_column`` (``time_s``) and ``column`` (``voltage_v``, ``phi1_rad`` or
-    ``phi1_deg``) by name; notes above the header do no harm. TDMS: ``column`` is a channel, ``channel`` or
-    ``group/channel``; the time is ``time_column``'s channel or else the waveform's own increment. NumPy:
-    (T,), or (T, 2) or (2, T) with the time first. ``rate_hz`` gives the time where the file has none.
-    Times given as dates become seconds from the first, which ``notes`` then names.
     Units are those of the row under the header or at the end of a column's name (``time_ms``, ``U [mV]``,
     ``phi1 (deg)``): s, ms, us, ns, min, h; V, mV; rad, mrad, deg, turns. Times without one are s; values without one
-    are ``unit``'s, else V.
+    are `unit`'s, else V. Times given as dates become seconds from the first.
 
-    A sample without a value is left out and noted, as are gaps and uneven steps. Raises
-    :class:`~pydpend.errors.EncoderError` naming file, line and column for text that is no number, times that
-    are missing, repeated or falling, times that are stamps written as numbers, units that are not known or contradict
-    each other, and columns that are not there.
+    Parameters
+    ----------
+    path : path-like
+        CSV and Parquet: columns by name; notes above the header do no harm. NI TDMS: a channel; the time is
+        `time_column`'s channel or else the waveform's own increment. NumPy's .npy: (T,), or (T, 2) or (2, T) with the
+        time first.
+    column : str, optional
+        Column of the readings (``voltage_v``, ``phi1_rad`` or ``phi1_deg`` if not given); in TDMS ``channel`` or
+        ``group/channel``.
+    time_column : str, optional
+        Column of the times (``time_s`` if not given).
+    rate_hz : float, optional
+        Samples per s, where the file has no times.
+    unit : {"v", "rad", "deg"}, optional
+        Unit of values whose column states none.
+
+    Returns
+    -------
+    EncoderSignal
+        Readings in V or rad. A sample without a value is left out and noted, as are gaps and uneven steps.
+
+    Raises
+    ------
+    EncoderError
+        Naming file, line and column: for text that is no number, times that are missing, repeated or falling, times
+        that are stamps written as numbers, units that are not known or contradict each other, and columns that are
+        not there.
     """
     path = path_of(path)
     expect(path, ("encoder", "angles"), EncoderError)

@@ -42,14 +42,38 @@ ALIKE = 1.05
 
 @dataclass(frozen=True, eq=False)
 class Synchronisation:
-    """``video time = t + offset_s + drift (t - reference_s)`` for an encoder time ``t``.
+    """The encoder's clock on the video's, with gain and zero of its angles.
 
-    ``gain``: encoder angle per video angle (negative if the encoder counts the other way). ``zero_rad``:
-    encoder angle where the video's is zero, within (-pi, pi], and ``turns`` the whole turns between them.
-    ``covariance`` (4, 4): of (zero, gain, offset, drift), from the residuals and their autocorrelation.
-    ``sigma_rad``: standard deviation of the residual. ``given``: the clocks were said to be one; offset and
-    drift are then 0 and not fitted. ``rival_offset_s``: another offset that explains the readings as well, over a
-    shorter time; ``None`` if there is none.
+    ``video time = t + offset_s + drift (t - reference_s)`` for an encoder time ``t``.
+
+    Attributes
+    ----------
+    offset_s : float
+        Difference of the clocks at `reference_s`, s.
+    drift : float
+        How much faster the video's clock runs, relative.
+    gain : float
+        Encoder angle per video angle; negative if the encoder counts the other way.
+    zero_rad : float
+        Encoder angle where the video's is zero, rad, within (-pi, pi].
+    turns : int
+        Whole turns between the two zeros.
+    reference_s : float
+        Encoder time at which `offset_s` holds, s.
+    covariance : ndarray of float, shape (4, 4)
+        Of (zero, gain, offset, drift), in rad and s, from the residuals and their autocorrelation.
+    sigma_rad : float
+        Standard deviation of the residual, rad.
+    n : int
+        Number of readings used.
+    left_out : int
+        Number of readings left out as outliers.
+    correlation_samples : float
+        Number of readings that hang together.
+    given : bool
+        Whether the clocks were said to be one; offset and drift are then 0 and not fitted.
+    rival_offset_s : float or None
+        Another offset that explains the readings as well, over a shorter time, s; None if there is none.
     """
 
     offset_s: float
@@ -87,7 +111,18 @@ class Synchronisation:
         return float(np.sqrt(self.covariance[0, 0]))
 
     def video_time(self, t_s: Floats) -> Floats:
-        """The video's time at encoder times."""
+        """The video's time at encoder times.
+
+        Parameters
+        ----------
+        t_s : ndarray of float
+            Times on the encoder's clock, s, of any shape.
+
+        Returns
+        -------
+        ndarray of float
+            Times on the video's clock, s.
+        """
         return t_s + self.offset_s + self.drift * (t_s - self.reference_s)
 
 
@@ -150,13 +185,29 @@ def synchronise(
     *,
     clocks: str = "estimate",
 ) -> Synchronisation:
-    """Finds how the encoder's clock stands to the video's, with gain and zero.
+    """How the encoder's clock stands to the video's, with gain and zero, by maximum likelihood.
 
-    ``clocks="estimate"``: any difference of starts; the recordings must overlap for at least a second of
-    motion. ``clocks="given"``: the recorder synchronised them (as Photron's DAQ control does); only gain
-    and zero are fitted.
+    Parameters
+    ----------
+    video : LinkAngles
+        Angles of the links, rad.
+    encoder : LinkAngles
+        The encoder's angles, one link, rad.
+    link : int
+        Which link of the video the encoder is on, from 0.
+    clocks : {"estimate", "given"}
+        ``"estimate"``: any difference of starts; the recordings must overlap for at least a second of motion.
+        ``"given"``: the recorder synchronised them (as Photron's DAQ control does); only gain and zero are fitted.
 
-    Raises :class:`~pydpend.errors.EncoderError` if they do not overlap or nothing moves.
+    Returns
+    -------
+    Synchronisation
+        Offset, drift, gain and zero with their covariance.
+
+    Raises
+    ------
+    EncoderError
+        If they do not overlap or nothing moves.
     """
     course = Course.of(video, link)
     seen = encoder.seen[:, 0]

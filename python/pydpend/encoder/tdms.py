@@ -24,8 +24,9 @@ T = TypeVar("T")
 def read_tdms(
     path: Path, channel: str | None, time_channel: str | None, rate_hz: float | None
 ) -> tuple[Floats, Floats, tuple[str, str], list[str]]:
-    """Times in s, values, the channel's name and its unit, "" if it states none, and notes. A channel of time stamps
-    gives seconds from its first.
+    """Times in s, values, the channel's name and its unit, "" if it states none, and notes.
+
+    A channel of time stamps gives seconds from its first.
 
     Raises :class:`EncoderError` if they cannot be had.
     """

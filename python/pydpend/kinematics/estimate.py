@@ -37,35 +37,51 @@ def angles(
     name: str | None = None,
     method: None = None,
 ) -> LinkAngles:
-    """Angles of one or two links, in rad: counter-clockwise positive, zero hanging down, unwrapped over
-    turns.
+    """Angles of one or two links from where their markers are: counter-clockwise positive, zero hanging down.
 
-    ``estimator``:
+    Parameters
+    ----------
+    nodes : Nodes
+        Where each marker is in each of T frames.
+    estimator : {"rigid", "linkage", "pairwise"}
+        ``"rigid"``: weighted least-squares pose of each body by itself, robust against a bad marker. ``"linkage"``:
+        both links and the joints they share fitted together; needs a pivot that stays in place. ``"pairwise"``: the
+        paper's Eqs. 30-32 with a circular mean.
+    zero : str, float, sequence of float or Nodes
+        ``"rest"`` finds the stretches in which all links hang still, and believes them if nothing in the recording
+        contradicts that (docs/angles.md); ``"vertical"`` is the picture's vertical, with the camera's roll as
+        standard uncertainty, 1 deg or as in ``"vertical=0.5"``; the nodes of another recording with the same rig and
+        camera take the rest from there; one number per link says at what angles, in rad, the links stand in the rig's
+        reference picture; ``"reference_frame"`` says 0 for both.
+    bodies : sequence of str, optional
+        Names of the links from the pivot outwards; in the rig's order if not given.
+    mirrored : bool
+        Whether the film was taken from behind.
+    link_length_m : float, optional
+        Distance of pivot and elbow, m; it puts the scale into ``meta["linkage"]``.
+    link_length_sigma_m : float
+        Standard uncertainty of that distance, m.
+    gaps : {"error", "stop"}
+        What to do where a link was hidden for so long that a turn may be lost (more than ``pi / |w|``): refuse, or
+        leave the link's angles out from there on and say so in ``meta["notes"]``.
+    name : str, optional
+        Name of the angles; the recording's if not given.
+    method : None
+        The old name of `estimator`; refused.
 
-    - ``"rigid"``: weighted least-squares pose of each body by itself, robust against a bad marker.
-    - ``"linkage"``: both links and the joints they share fitted together; needs a pivot that stays in place.
-    - ``"pairwise"``: the paper's Eqs. 30-32 with a circular mean.
+    Returns
+    -------
+    LinkAngles
+        Angles in rad at the T times, unwrapped over turns, the first within (-pi, pi]. ``sigma_rad`` is each frame's
+        own standard error; that of the zero, common to all frames, is in ``meta["zero"]``. Where the table says that
+        its times are uncertain (a variable frame rate in coarse ticks), ``sigma_rad`` holds that too, times the
+        link's speed; ``meta["time"]`` says what the times are.
 
-    ``zero``: ``"rest"`` finds the stretches in which all links hang still, and believes them if nothing in the
-    recording contradicts that (docs/angles.md); ``"vertical"`` is the picture's vertical, with the camera's roll as
-    standard uncertainty, 1 deg or as in ``"vertical=0.5"``; the nodes of another recording with the same rig and
-    camera take the rest from there; one number per link says at what angles, in rad, the links stand in the rig's
-    reference picture; ``"reference_frame"`` says 0 for both. The turn is such that the first angle lies within
-    (-pi, pi].
-
-    ``bodies`` names the links from the pivot outwards (the rig's order by default). ``mirrored`` for a film
-    taken from behind. ``link_length_m`` (pivot to elbow) puts the scale into ``meta["linkage"]``. ``gaps``
-    says what to do where a link was hidden for so long that a turn may be lost (more than ``pi / |w|``):
-    refuse, or leave the link's angles out from there on and say so in ``meta["notes"]``.
-
-    ``sigma_rad`` holds each frame's own standard error; that of the zero, common to all frames, is in
-    ``meta["zero"]``. Where the table says that its times are uncertain (a variable frame rate in coarse ticks), it
-    holds that too, times the link's speed; ``meta["time"]`` says what the times are.
-
-    ``method`` is the old name of ``estimator`` and is refused.
-
-    Raises :class:`~pydpend.errors.AnglesError`: a body never seen, or in one marker only; no rest found, or one in
-    which the links are held and do not hang; a turn that may be lost; links that turn too little for a linkage.
+    Raises
+    ------
+    AnglesError
+        For a body never seen, or in one marker only; no rest found, or one in which the links are held and do not
+        hang; a turn that may be lost; links that turn too little for a linkage.
     """
     if method is not None:
         raise AnglesError(
@@ -103,8 +119,10 @@ def _time_sigma_s(nodes: Nodes) -> float:
 
 
 def _with_time(t_s: Floats, phi: Floats, sigma: Floats, time_sigma_s: float) -> Floats:
-    """Standard uncertainties of angles whose times have one too, each frame's own: a link that turns with w is at
-    another angle by ``w dt``. (T, L), rad."""
+    """Standard uncertainties (T, L), rad, of angles whose times have one too, each frame's own.
+
+    A link that turns with w is at another angle by ``w dt``.
+    """
     if time_sigma_s == 0.0:
         return sigma
     out = sigma.copy()
@@ -117,11 +135,26 @@ def _with_time(t_s: Floats, phi: Floats, sigma: Floats, time_sigma_s: float) -> 
 
 
 def find_linkage(nodes: Nodes, *, bodies: Sequence[str] | None = None, mirrored: bool = False) -> Linkage:
-    """Pivot, elbow, the places of the markers in their links and the link's length in px, with uncertainties.
+    """Joints and shape of the links: pivot, elbow, places of the markers, length in px, with uncertainties.
 
-    Places are in the world's directions (y up) and in square pixels, as high as the recorded ones; ``to_image`` turns
-    them back. Raises
-    :class:`~pydpend.errors.AnglesError` if the links turn too little to find the joints.
+    Parameters
+    ----------
+    nodes : Nodes
+        Where each marker is in each frame.
+    bodies : sequence of str, optional
+        Names of the links from the pivot outwards; in the rig's order if not given.
+    mirrored : bool
+        Whether the film was taken from behind.
+
+    Returns
+    -------
+    Linkage
+        Places in the world's directions (x right, y up) and in square pixels, as high as the recorded ones.
+
+    Raises
+    ------
+    AnglesError
+        If the links turn too little to find the joints.
     """
     poses = [fit_pose(m) for m in body_markers(nodes, bodies, mirrored)]
     return fit_linkage(poses[0], poses[1] if len(poses) > 1 else None).linkage

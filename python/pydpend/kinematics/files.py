@@ -39,19 +39,35 @@ def read_angles(
     unwrap: bool = False,
     name: str | None = None,
 ) -> LinkAngles:
-    """Reads an angles table, or a folder in the form in which the paper's authors published theirs.
+    """Angles from a table, or from a folder in the form in which the paper's authors published theirs.
 
-    ``path``: Parquet or CSV with ``time_s``, ``phi1_rad`` (or ``phi1_deg``) and, if there is a second link,
-    ``phi2_*``; ``frame`` and ``sigma1_*``, ``sigma2_*`` are optional; empty where not seen. Or a folder with
-    ``DPmean_data_RB0.npy``, ... (rows: s, degrees) and, for the sigmas, ``DPstd_data_RB0.npy``, ....
+    Parameters
+    ----------
+    path : path-like
+        Parquet or CSV with ``time_s``, ``phi1_rad`` (or ``phi1_deg``) and, if there is a second link, ``phi2_*``;
+        ``frame`` and ``sigma1_*``, ``sigma2_*`` are optional; empty where not seen. Or a folder with
+        ``DPmean_data_RB0.npy``, ... (rows: s, degrees) and, for the sigmas, ``DPstd_data_RB0.npy``, ....
+    columns : dict of str to str, optional
+        The file's columns where their names differ, ours first: ``{"time_s": "t_s", "phi1_rad": "theta1_rad"}``.
+    hanging_rad : float or tuple of float
+        What the file's angles read when the link hangs, rad (one number, or one per link); it is taken off.
+    clockwise : bool
+        Whether the file counts clockwise positive.
+    unwrap : bool
+        Whether the file keeps angles within one turn: neighbouring rows are then taken to be less than half a turn
+        apart, also over gaps.
+    name : str, optional
+        Name of the angles; the file's if not given.
 
-    ``columns`` names the file's columns where they differ, ours first:
-    ``{"time_s": "t_s", "phi1_rad": "theta1_rad"}``. ``hanging_rad`` is what the file's angles read when the
-    link hangs (one number, or one per link); it is taken off. ``clockwise=True`` if the file counts clockwise
-    positive. ``unwrap=True`` if it keeps angles within one turn: neighbouring rows are then taken to be less
-    than half a turn apart, also over gaps.
+    Returns
+    -------
+    LinkAngles
+        Angles, rad, counter-clockwise positive, zero hanging down.
 
-    Raises :class:`~pydpend.errors.AnglesError` naming file, line (or row) and column.
+    Raises
+    ------
+    AnglesError
+        Naming file, line (or row) and column.
     """
     path = path_of(path)
     # What a folder lacks is told below.
@@ -259,10 +275,20 @@ def written_files(path: AnyPath) -> tuple[Path, ...]:
 def write_angles(angles: LinkAngles, path: AnyPath) -> None:
     """Writes the table as Parquet or CSV, by the ending; empty (null) where a link was not seen.
 
-    ``meta`` and ``name`` go into the Parquet metadata, or beside a CSV into ``PATH.json``. Numbers read back
-    bit for bit. The file appears whole or not at all.
+    ``meta`` and ``name`` go into the Parquet metadata, or beside a CSV into ``PATH.json``. Numbers read back bit for
+    bit. The file appears whole or not at all.
 
-    Raises :class:`~pydpend.errors.AnglesError` for another ending or a path that cannot be written.
+    Parameters
+    ----------
+    angles : LinkAngles
+        The angles.
+    path : path-like
+        The file, .parquet or .csv; one that is there is replaced.
+
+    Raises
+    ------
+    AnglesError
+        For another ending or a path that cannot be written.
     """
     path = path_of(path)
     meta = json.dumps({**angles.meta, "name": angles.name}, sort_keys=True)

@@ -47,8 +47,11 @@ class Raw:
 
 
 def parse_zero(text: str) -> str | list[float] | None:
-    """What a text says of the zero: a word that `angles` knows, or angles in degrees (``12.5,-3``) as rad; ``None`` if
-    it can only be a file.
+    """What a text says of the zero; ``None`` if it can only be a file.
+
+    A word that `angles` knows, or angles in degrees (``12.5,-3``) as rad.
+
+    A word that `angles` knows, or angles in degrees (``12.5,-3``) as rad.
 
     Raises OptionError for degrees that may be read in two ways.
     """

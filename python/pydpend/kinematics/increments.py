@@ -62,15 +62,13 @@ def by_reference(vectors_px: Floats, sigma_px: float, reference_px: Floats | Non
 
 
 def steps(vectors_px: Floats) -> Floats:
-    """The turns (T - 1,) from frame to frame, rad, by the atan2 of cross and dot product; right below 180
-    deg.
-    """
+    """The turns (T - 1,) from frame to frame, rad, by the atan2 of cross and dot product; right below 180 deg."""
     v = _vectors(vectors_px)
     return _turn(v[:-1], v[1:])
 
 
 def arcsin_steps(vectors_px: Floats) -> Floats:
-    """The paper's Eq. 42: the arcsin of the normalised cross product. **Wrong for steps beyond 90 degrees.**
+    """The paper's Eq. 42: the arcsin of the normalised cross product, wrong for steps beyond 90 degrees.
 
     Here to show what it loses; nothing else uses it.
     """

@@ -31,11 +31,18 @@ _CHUNK = 4096
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """What stays the same in all frames, world directions (y up), px; turned as in the rig's reference picture.
+    """What stays the same in all frames, turned as in the rig's reference picture.
 
-    ``pivot_px`` (2,); ``upper_px`` (K1, 2): markers seen from the pivot; ``elbow_px`` (2,): the elbow seen
-    from the pivot; ``lower_px`` (K2, 2): markers seen from the elbow. With one link, ``lower_px`` is (0,
-    2).
+    Attributes
+    ----------
+    pivot_px : ndarray of float, shape (2,)
+        Pivot in the world's directions (x right, y up), px.
+    upper_px : ndarray of float, shape (K1, 2)
+        Markers of the upper link, seen from the pivot, px.
+    elbow_px : ndarray of float, shape (2,)
+        Elbow seen from the pivot, px.
+    lower_px : ndarray of float, shape (K2, 2)
+        Markers of the lower link, seen from the elbow, px; (0, 2) with one link.
     """
 
     pivot_px: Floats
@@ -51,12 +58,23 @@ class Shape:
 
 @dataclass(frozen=True, eq=False)
 class Linkage:
-    """A fitted shape and its uncertainties.
+    """Joints and shape of the links with their uncertainties, as `find_linkage` fits them to a recording.
 
-    ``covariance_px2``: of (pivot x, y, elbow x, y), px^2; the elbow's part is along and across the upper
-    link as turned in the reference picture. ``length_px``: pivot to elbow, NaN with one link.
-    ``sigma_scale``: factor by which the residuals make the stated sigmas larger; it is in every uncertainty
-    here.
+    Attributes
+    ----------
+    shape : pydpend.kinematics.Shape
+        Pivot, elbow and markers, px; x right, y up.
+    covariance_px2 : ndarray of float, shape (4, 4)
+        Of (pivot x, y, elbow x, y), px^2; the elbow's part is along and across the upper link as turned in the
+        reference picture.
+    length_px, length_sigma_px : float
+        Distance of pivot and elbow and its standard uncertainty, px; NaN with one link.
+    sigma_scale : float
+        Factor by which the residuals make the stated sigmas larger; it is in every uncertainty here.
+    chi2 : float
+        Sum of squared standardised residuals with the stated sigmas.
+    dof : int
+        Degrees of freedom of that sum.
     """
 
     shape: Shape
@@ -69,13 +87,26 @@ class Linkage:
 
     @property
     def pivot_sigma_px(self) -> Floats:
-        """Standard uncertainties of the pivot's x and y, px."""
+        """Standard uncertainties of the pivot's x and y, px, (2,)."""
         return np.sqrt(np.diag(self.covariance_px2)[:2])
 
     def metres_per_px(self, length_m: float, sigma_m: float = 0.0) -> tuple[float, float]:
-        """The scale and its standard uncertainty, m per px, from the true distance of pivot and elbow.
+        """The scale of the picture from the true distance of pivot and elbow.
 
-        Raises :class:`AnglesError` with one link or a length that is not above zero.
+        Parameters
+        ----------
+        length_m, sigma_m : float
+            Distance of pivot and elbow and its standard uncertainty, m.
+
+        Returns
+        -------
+        tuple of float
+            The scale and its standard uncertainty, m per px.
+
+        Raises
+        ------
+        AnglesError
+            With one link, or for a length that is not above zero.
         """
         if self.shape.links < 2:
             raise AnglesError(fault("linkage", "with one link there is no elbow, so no length to scale by"))
@@ -86,8 +117,7 @@ class Linkage:
 
 
 def first_shape(upper: Pose, lower: Pose | None) -> Shape:
-    """Pivot and elbow from the poses alone, by linear least squares: the points that do not move, or not
-    apart.
+    """Pivot and elbow from the poses alone, by linear least squares: the points that do not move, or not apart.
 
     Raises :class:`AnglesError` if the bodies hardly turn, so that every point will do.
     """
@@ -159,9 +189,7 @@ class Frames:
 
 
 def predicted(shape: Shape, theta: Floats) -> tuple[Floats, Floats]:
-    """Where the markers are at angles ``theta`` (T, L), (T, N, 2), and the derivatives by them, (T, N, 2,
-    L).
-    """
+    """Where the markers are at angles ``theta`` (T, L), (T, N, 2), and the derivatives by them, (T, N, 2, L)."""
     upper = rotate(theta[:, :1], shape.upper_px[None])
     places = shape.pivot_px + upper
     slopes = np.zeros((theta.shape[0], upper.shape[1], 2, theta.shape[1]))
@@ -189,8 +217,9 @@ def information(w: Floats, slopes: Floats) -> Floats:
 
 
 def remaining(w: Floats, slopes: Floats, inverse: Floats) -> tuple[Floats, Floats]:
-    """What a fit of the angles leaves of each marker's variance, as a part of it, (T, N, 2, 2), and ``slopes @
-    inverse`` (T, N, 2, L), with ``inverse`` (T, L, L) that of :func:`information`.
+    """Part of each marker's variance that a fit of the angles leaves, (T, N, 2, 2).
+
+    Also ``slopes @ inverse`` (T, N, 2, L), with ``inverse`` (T, L, L) that of :func:`information`.
     """
     spread = np.matmul(slopes, inverse[:, None])
     return np.eye(2) - np.matmul(spread, np.swapaxes(slopes, 2, 3)) * w[..., None, None], spread

@@ -182,7 +182,9 @@ def _all_frames(linkage: Linkage, frames: Frames, start: Floats) -> LinkageAngle
 
 @dataclass(frozen=True, eq=False)
 class _Solved:
-    """Angles (T, L) of some frames, normalised misfits d2 (T, N), chi2 and dof (T,), standard errors (T, L), and what
+    """Angles (T, L) of some frames and how well the markers agree with them.
+
+    Also normalised misfits d2 (T, N), chi2 and dof (T,), standard errors (T, L), and what
     :func:`~pydpend.kinematics.pose.pooled_scale2` is made of, for each angle (T, L).
     """
 

@@ -65,8 +65,7 @@ class Pose:
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """One closed-form solution for all frames: angle, centre, information on the angle, residuals, d2 (T,
-    K).
+    """One closed-form solution for all frames: angle, centre, information on the angle, residuals, d2 (T, K).
 
     ``scatter`` over ``freedom`` (T, 2), along and across the turn, is the squared scale of the sigmas as the angle
     feels it: see :func:`pooled_scale2`.

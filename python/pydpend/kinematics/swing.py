@@ -281,8 +281,10 @@ def _with_dry_friction(x: _Local, equations: tuple[Floats, Floats, Floats]) -> t
 
 
 def _creeping(x: _Local) -> tuple[Floats, Floats, Floats]:
-    """The same of one link over its friction instead of its inertia: for a link that creeps to where it hangs, whose
-    acceleration is lost in the noise."""
+    """The same of one link over its friction instead of its inertia.
+
+    For a link that creeps to where it hangs, whose acceleration is lost in the noise.
+    """
     a = x.phi[:, 0]
     rows = np.stack([np.sin(a), -np.cos(a), x.a[:, 0]], axis=1)[:, None, :]
     return rows, -x.w, x.w_sigma[:, None]

@@ -22,16 +22,28 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LinkAngles(TableResult):
-    """Angles of one or two links at T instants.
+    """Angles of one or two links at T instants (L = 1 or 2 links).
 
-    ``t_s`` (T,): s, finite, strictly increasing; dates become seconds from the first. ``phi_rad`` (T, L), L = 1
-    or 2: absolute angle of each link to the downward vertical, **counter-clockwise positive, zero hanging
-    down**, unwrapped over turns, NaN where the link was not seen. ``sigma_rad`` (T, L): standard uncertainty of
-    each, NaN where not seen
-    or not known. ``frame`` (T,): index in the recording, or ``None``. ``meta``: how they were had, JSON-like.
-    ``name``: the recording's, for messages and legends.
+    Parameters
+    ----------
+    t_s : ndarray of float, shape (T,)
+        Time, s, finite, strictly increasing; dates become seconds from the first.
+    phi_rad : ndarray of float, shape (T, L)
+        Absolute angle of each link to the downward vertical, rad: **counter-clockwise positive, zero hanging down**,
+        unwrapped over turns, NaN where the link was not seen.
+    sigma_rad : ndarray of float, shape (T, L)
+        Standard uncertainty of each, rad, NaN where not seen or not known.
+    frame : ndarray of int64, shape (T,), optional
+        Index in the recording.
+    meta : dict
+        How the angles were had, as plain values.
+    name : str
+        Name of the recording, for messages and legends.
 
-    Raises :class:`~pydpend.errors.AnglesError` if the shapes, times or uncertainties cannot be right.
+    Raises
+    ------
+    AnglesError
+        If the shapes, times or uncertainties cannot be right.
     """
 
     t_s: Floats
@@ -90,7 +102,23 @@ class LinkAngles(TableResult):
         return int(self.meta.get("left_out", 0))
 
     def between(self, start_s: float | None = None, stop_s: float | None = None) -> LinkAngles:
-        """The rows with ``start_s <= t <= stop_s``; raises :class:`AnglesError` if there are none."""
+        """The rows with ``start_s <= t <= stop_s``.
+
+        Parameters
+        ----------
+        start_s, stop_s : float, optional
+            First and last time, s; the recording's if not given.
+
+        Returns
+        -------
+        LinkAngles
+            These rows, with the same name and meta.
+
+        Raises
+        ------
+        AnglesError
+            If there are none.
+        """
         keep = np.ones(self.t_s.size, dtype=bool)
         if start_s is not None:
             keep &= self.t_s >= start_s
@@ -113,7 +141,13 @@ class LinkAngles(TableResult):
         )
 
     def to_columns(self) -> dict[str, NDArray[Any]]:
-        """The table's columns by name, in the order of the file."""
+        """The table's columns, in the order of the file.
+
+        Returns
+        -------
+        dict of str to ndarray, each of shape (T,)
+            ``frame`` if there is one, ``time_s``, and of each link ``phi1_rad`` and ``sigma1_rad``.
+        """
         out: dict[str, NDArray[Any]] = {}
         if self.frame is not None:
             out["frame"] = self.frame

@@ -38,12 +38,20 @@ GIVE_ZERO = (
 
 @dataclass(frozen=True, eq=False)
 class Rest:
-    """A stretch in which no link moves.
+    """A stretch in which no link of L moves.
 
-    Rows ``first`` to ``last`` (both inside), from ``start_s`` to ``stop_s``; ``phi_rad`` (L,) the mean angles
-    and ``sigma_rad`` (L,) their standard errors: scatter over sqrt(rows), rows that hang together counting as
-    fewer. Where the rows scatter by far less than their own sigmas, as compressed film of something at
-    rest does, they all have one and the same error, and that is it.
+    Attributes
+    ----------
+    first, last : int
+        Its rows in the angles, both inside.
+    start_s, stop_s : float
+        Their times, s.
+    phi_rad : ndarray of float, shape (L,)
+        Mean angles, rad, counter-clockwise positive.
+    sigma_rad : ndarray of float, shape (L,)
+        Standard errors of the means, rad: scatter over sqrt(rows), rows that hang together counting as fewer. Where
+        the rows scatter by far less than their own sigmas, as compressed film of something at rest does, they all
+        have one and the same error, and that is it.
     """
 
     first: int
@@ -55,9 +63,21 @@ class Rest:
 
 
 def find_rest(angles: LinkAngles, at_least_s: float = REST_AT_LEAST_S) -> list[Rest]:
-    """The stretches in which every link keeps still for ``at_least_s``, in the order of time.
+    """The stretches in which every link keeps still, in the order of time.
 
-    Upside down counts as well: which rest hangs, these angles cannot say. An empty list if there is none.
+    Upside down counts as well: which rest hangs, these angles cannot say.
+
+    Parameters
+    ----------
+    angles : LinkAngles
+        Angles of the links.
+    at_least_s : float
+        Shortest stretch that counts, s.
+
+    Returns
+    -------
+    list of pydpend.kinematics.Rest
+        Empty if there is none.
     """
     t, phi = angles.t_s, angles.phi_rad
     step = angles.step_s

@@ -55,7 +55,20 @@ _KIND = {
 def read_model(path: AnyPath) -> Model:
     """A pendulum from a TOML file of parts or of reduced constants (docs/model.md has the form).
 
-    Raises ModelError naming the file and the part or key at fault.
+    Parameters
+    ----------
+    path : path-like
+        The file.
+
+    Returns
+    -------
+    Model
+        The model, SI.
+
+    Raises
+    ------
+    ModelError
+        Naming the file and the part or key at fault.
     """
     path = path_of(path)
     expect(path, ("model",), ModelError)
@@ -74,10 +87,12 @@ NAMED: Mapping[str, Callable[[], Model]] = {"derived": lambda: derived("A"), "pu
 
 
 def model_called(word: str) -> Model:
-    """The model that the option ``model`` names: one of `NAMED`, or a TOML file. What is wrong with the published
-    constants is not warned of: whoever uses them says it with numbers.
+    """The model that the option ``model`` names: one of `NAMED`, or a TOML file.
 
-    Raises:
+    What is wrong with the published constants is not warned of: whoever uses them says it with numbers.
+
+    Raises
+    ------
         OptionError: if there is no such file.
         ModelError: as `read_model`.
     """

@@ -11,39 +11,53 @@ from pydpend.model.pendulum import Model
 
 @dataclass(frozen=True)
 class Damping:
-    """One coefficient per law, SI, 0 where the law is off. docs/physics.md section 6 has the moments.
+    """One coefficient per law of damping, SI, 0 where the law is off (Table 5 corrected; docs/physics.md section 6).
 
-    Joint 2's moments act on both links, equal and opposite, and see the relative rate ``w2 - w1`` (errata 13,
-    14); the drags see absolute rates.
+    Joint 2's moments act on both links, equal and opposite, and see the relative rate ``w2 - w1`` (errata 13, 14); the
+    drags see absolute rates.
+
+    Parameters
+    ----------
+    mu_v1, mu_v2 : float
+        Viscous, joints 1 and 2, N m s: ``mu_v1 w1``, ``mu_v2 (w2 - w1)``.
+    mu_q1, mu_q2 : float
+        Quadratic air drag of the upper and the lower link, N m s2: ``mu_q1 |w1| w1``, ``mu_q2 |w2| w2``.
+    rmu1, rmu2 : float
+        Contact radius times friction coefficient, joints 1 and 2, m: ``rmu1 N1 sgn(w1)``, ``rmu2 N2 sgn(w2 - w1)``
+        with the normal forces N of Eq. 34.
+    tau_c1, tau_c2 : float
+        Constant dry torque of joints 1 and 2, N m: ``tau_c1 sgn(w1)``, ``tau_c2 sgn(w2 - w1)``.
+    strip_drag : float
+        Air drag of the lower link in its true relative wind, N m s2: the moment is ``strip_drag |w2| w2`` for the
+        link turning alone about a fixed elbow.
+    offset1 : float
+        Constant torque driving link 1, N m, positive counter-clockwise (negative brakes that way).
+    offset2 : float
+        Constant torque in joint 2, N m: on link 2, reacting on link 1.
+    added_inertia : float
+        Inertia about the elbow of the air that moves with the lower link, kg m2.
+    tilt : float
+        Direction of gravity in the plane, rad, counter-clockwise from where the angles are zero.
+
+    Raises
+    ------
+    ModelError
+        For a coefficient that is not finite, or negative where it cannot be.
     """
 
     mu_v1: float = 0.0
-    """Viscous, joint 1, N m s: ``mu_v1 w1``."""
     mu_v2: float = 0.0
-    """Viscous, joint 2, N m s: ``mu_v2 (w2 - w1)``."""
     mu_q1: float = 0.0
-    """Quadratic air drag of the upper link, N m s2: ``mu_q1 |w1| w1``."""
     mu_q2: float = 0.0
-    """Quadratic air drag of the lower link, N m s2: ``mu_q2 |w2| w2``."""
     rmu1: float = 0.0
-    """Contact radius times friction coefficient, joint 1, m: ``rmu1 N1 sgn(w1)``."""
     rmu2: float = 0.0
-    """Contact radius times friction coefficient, joint 2, m: ``rmu2 N2 sgn(w2 - w1)``."""
     tau_c1: float = 0.0
-    """Constant dry torque of joint 1, N m: ``tau_c1 sgn(w1)``."""
     tau_c2: float = 0.0
-    """Constant dry torque of joint 2, N m: ``tau_c2 sgn(w2 - w1)``."""
     strip_drag: float = 0.0
-    """Air drag of the lower link in its true relative wind, N m s2: the moment is ``strip_drag |w2| w2``
-    for the link turning alone about a fixed elbow."""
     offset1: float = 0.0
-    """Constant torque driving link 1, N m, positive counter-clockwise (negative brakes that way)."""
     offset2: float = 0.0
-    """Constant torque in joint 2, N m: on link 2, reacting on link 1."""
     added_inertia: float = 0.0
-    """Inertia about the elbow of the air that moves with the lower link, kg m2."""
     tilt: float = 0.0
-    """Direction of gravity in the plane, rad, counter-clockwise from where the angles are zero."""
 
     def __post_init__(self) -> None:
         for f in fields(self):

@@ -31,16 +31,35 @@ CONSTANTS = (
 class Model:
     """A planar double pendulum in SI units; angles counter-clockwise positive, zero hanging.
 
-    ``T = psi w1^2 + lambda w2^2 + (zeta + a3 cos(phi2 - phi1)) w1 w2`` (Eq. 26; psi and lambda are half
-    moments of inertia) and ``V = sigma (1 - cos phi1) + kappa (1 - cos phi2)`` (Eq. 27).
+    ``T = psi w1^2 + lambda w2^2 + (zeta + a3 cos(phi2 - phi1)) w1 w2`` (Eq. 26; psi and lambda are half moments of
+    inertia) and ``V = sigma (1 - cos phi1) + kappa (1 - cos phi2)`` (Eq. 27).
 
-    ``m1_kg`` and ``m2_kg`` are the masses that joint 1 carries besides link 2, and that joint 2 carries (they
-    enter the normal forces only); ``l1_m`` is the distance from pivot to elbow. ``lower_inner_m`` and
-    ``lower_outer_m`` are the ends of the lower link along its axis from the elbow (inner may be negative),
-    where the air drags on it. ``covariance`` is (9, 9) in the order of `CONSTANTS`.
+    Parameters
+    ----------
+    psi_kg_m2, lambda_kg_m2 : float
+        Half moments of inertia of the upper link (with the lower one's mass at the elbow) and of the lower, kg m2.
+    zeta_kg_m2, a3_kg_m2 : float
+        Coupling of the links' rates: constant part, and factor of the cosine, kg m2.
+    sigma_j, kappa_j : float
+        Depth of the potential of the upper and the lower link, J.
+    m1_kg, m2_kg : float
+        Masses that joint 1 carries besides link 2, and that joint 2 carries, kg (they enter the normal forces only).
+    l1_m : float
+        Distance from pivot to elbow, m.
+    g_m_s2 : float
+        Gravity, m/s2.
+    lower_inner_m, lower_outer_m : float
+        Ends of the lower link along its axis from the elbow, m (inner may be negative), where the air drags on it.
+    covariance : ndarray of float, shape (9, 9), optional
+        Of the constants in the order of ``pydpend.model.CONSTANTS``, SI.
+    name : str
+        Name of the model, for messages.
 
-    Raises ModelError for constants that no pendulum can have, except the parallel-axis bounds, which
-    `problems` reports (Table 7 breaks one).
+    Raises
+    ------
+    ModelError
+        For constants that no pendulum can have, except the parallel-axis bounds, which `problems` reports (Table 7
+        breaks one).
     """
 
     psi_kg_m2: float
@@ -118,9 +137,34 @@ class Model:
         covariance: Array | None = None,
         name: str = "model",
     ) -> Model:
-        """A single pendulum: ``2 psi w' = -sigma sin phi - losses``. ``covariance`` is (3, 3), of psi, sigma and m1.
+        """A single pendulum: ``2 psi w' = -sigma sin phi - losses``.
 
         What stands for the lower link must hang at rest (else it would load joint 1).
+
+        Parameters
+        ----------
+        psi_kg_m2 : float
+            Half its moment of inertia about the pivot, kg m2.
+        sigma_j : float
+            Depth of its potential, J.
+        m1_kg : float
+            Mass that the joint carries, kg.
+        g_m_s2 : float
+            Gravity, m/s2.
+        covariance : ndarray of float, shape (3, 3), optional
+            Of psi, sigma and m1, SI.
+        name : str
+            Name of the model, for messages.
+
+        Returns
+        -------
+        Model
+            A model of which `links` is 1.
+
+        Raises
+        ------
+        ModelError
+            For constants that no pendulum can have.
         """
         spread = np.zeros((len(CONSTANTS), 3))
         for column, same in enumerate((("psi_kg_m2", "lambda_kg_m2"), ("sigma_j", "kappa_j"), ("m1_kg",))):
@@ -137,20 +181,37 @@ class Model:
         return 1 if self.a3_kg_m2 == 0 and self.m2_kg == 0 else 2
 
     def constants(self) -> Array:
-        """The constants in the order of `CONSTANTS`, shape (9,)."""
+        """The constants in the order of ``pydpend.model.CONSTANTS``.
+
+        Returns
+        -------
+        ndarray of float, shape (9,)
+            Values, SI.
+        """
         return np.array([getattr(self, name) for name in CONSTANTS])
 
     def sigmas(self) -> dict[str, float]:
-        """Standard uncertainty of each constant; 0 where no covariance is known."""
+        """Standard uncertainty of each constant.
+
+        Returns
+        -------
+        dict of str to float
+            By name, SI; 0 where no covariance is known.
+        """
         if self.covariance is None:
             return dict.fromkeys(CONSTANTS, 0.0)
         return dict(zip(CONSTANTS, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
 
     def problems(self) -> list[str]:
-        """What is wrong with these constants as one rigid pendulum: broken parallel-axis bounds, in words.
+        """What is wrong with these constants as one rigid pendulum: broken parallel-axis bounds.
 
-        A link of mass m with its centre at distance d from its joint has at least the inertia m d^2. Needs
+        A link of mass m with its centre at distance d from its joint has at least the inertia m d^2. The bound needs
         the masses; with a mass of 0 (not known) nothing can be said of that link.
+
+        Returns
+        -------
+        list of str
+            One sentence each; empty if nothing is wrong.
         """
         found = []
         if self.g_m_s2 > 0 and self.m2_kg > 0:
@@ -173,18 +234,51 @@ class Model:
         return found
 
     def checked(self) -> Model:
-        """Itself, or ModelError with the first of `problems`."""
+        """The model itself, if it has no `problems`.
+
+        Returns
+        -------
+        Model
+            Itself.
+
+        Raises
+        ------
+        ModelError
+            With the first of `problems`.
+        """
         for problem in self.problems():
             raise ModelError(fault(self.name, problem, "Check its inertias and distances"))
         return self
 
     def coupling(self, phi_rad: npt.ArrayLike) -> Array:
-        """``zeta + a3 cos(phi2 - phi1)``, kg m2, for angles (..., 2)."""
+        """Coupling of the rates, ``zeta + a3 cos(phi2 - phi1)`` (Eq. 26).
+
+        Parameters
+        ----------
+        phi_rad : array-like, shape (..., 2)
+            Angles, rad.
+
+        Returns
+        -------
+        ndarray of float, shape (...)
+            Coupling, kg m2.
+        """
         phi = np.asarray(phi_rad, dtype=np.float64)
         return np.asarray(self.zeta_kg_m2 + self.a3_kg_m2 * np.cos(phi[..., 1] - phi[..., 0]))
 
     def mass_matrix(self, phi_rad: npt.ArrayLike) -> Array:
-        """The mass matrix (..., 2, 2), kg m2, for angles (..., 2): T = w' M w / 2."""
+        """The mass matrix M of ``T = w' M w / 2`` (Eq. 26).
+
+        Parameters
+        ----------
+        phi_rad : array-like, shape (..., 2)
+            Angles, rad.
+
+        Returns
+        -------
+        ndarray of float, shape (..., 2, 2)
+            Mass matrices, kg m2.
+        """
         cross = self.coupling(phi_rad)
         out = np.empty((*cross.shape, 2, 2))
         out[..., 0, 0] = 2 * self.psi_kg_m2
@@ -193,14 +287,38 @@ class Model:
         return out
 
     def kinetic(self, phi_rad: npt.ArrayLike, w_rad_s: npt.ArrayLike) -> Array:
-        """Kinetic energy in J (Eq. 26) for angles and rates (..., 2)."""
+        """Kinetic energy (Eq. 26).
+
+        Parameters
+        ----------
+        phi_rad : array-like, shape (..., 2)
+            Angles, rad.
+        w_rad_s : array-like, shape (..., 2)
+            Rates, rad/s.
+
+        Returns
+        -------
+        ndarray of float, shape (...)
+            Energy, J.
+        """
         w = np.asarray(w_rad_s, dtype=np.float64)
         w1, w2 = w[..., 0], w[..., 1]
         own = self.psi_kg_m2 * w1**2 + self.lambda_kg_m2 * w2**2
         return np.asarray(own + self.coupling(phi_rad) * w1 * w2)
 
     def potential(self, phi_rad: npt.ArrayLike) -> Array:
-        """Potential energy in J (Eq. 27) for angles (..., 2), zero hanging."""
+        """Potential energy (Eq. 27), zero hanging.
+
+        Parameters
+        ----------
+        phi_rad : array-like, shape (..., 2)
+            Angles, rad.
+
+        Returns
+        -------
+        ndarray of float, shape (...)
+            Energy, J.
+        """
         phi = np.asarray(phi_rad, dtype=np.float64)
         # 2 sin^2 keeps its digits at small angles, where 1 - cos loses them.
         return np.asarray(
@@ -208,12 +326,27 @@ class Model:
         )
 
     def energy(self, phi_rad: npt.ArrayLike, w_rad_s: npt.ArrayLike) -> Array:
-        """Total energy in J (Eq. 22) for angles and rates (..., 2)."""
+        """Total energy (Eq. 22), zero hanging at rest.
+
+        Parameters
+        ----------
+        phi_rad : array-like, shape (..., 2)
+            Angles, rad.
+        w_rad_s : array-like, shape (..., 2)
+            Rates, rad/s.
+
+        Returns
+        -------
+        ndarray of float, shape (...)
+            Energy, J.
+        """
         return self.kinetic(phi_rad, w_rad_s) + self.potential(phi_rad)
 
 
 def uniform_bar(mass: float, inertia: float, centre: float) -> tuple[float, float]:
-    """Ends, from the joint, of the uniform bar of this mass, central inertia and centre; (centre, centre) for
-    no mass. Used where no drawing says how far the lower link reaches."""
+    """Ends, from the joint, of the uniform bar of this mass, central inertia and centre; (centre, centre) for no mass.
+
+    Used where no drawing says how far the lower link reaches.
+    """
     half = math.sqrt(3 * inertia / mass) if mass > 0 and inertia > 0 else 0.0
     return centre - half, centre + half

@@ -91,8 +91,10 @@ def from_parts(
 def constants_of(
     pendulum: Configuration, *, gravity: float = G_MM_S2, given: Mapping[str, float] | None = None
 ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], dict[str, float]]:
-    """The constants (9,) of a configuration, SI, in the order of `CONSTANTS`, their covariance (9, 9), and the values
-    of its quantities in g and mm. Raises ModelError as `from_parts`."""
+    """The constants (9,) of a configuration with their covariance (9, 9), SI, in the order of `CONSTANTS`.
+
+    Also the values of its quantities in g and mm. Raises ModelError as `from_parts`.
+    """
     quantities = dict(pendulum.quantities)
     q = values({s: v for s, v in quantities.items() if s not in (given or {})})
     for symbol, value in (given or {}).items():
@@ -117,11 +119,27 @@ def constants_of(
 
 
 def derived(config: str = "A", *, trackers: bool = False, given: Mapping[str, float] | None = None) -> Model:
-    """The constants of a configuration from its parts, corrected (errata section 0), with covariance.
+    """The constants of a configuration from its parts (Table 8), corrected (ERRATA section 0), with covariance.
 
-    Configuration A uses Table 8; ``trackers`` adds trackers and tape at assumed places (Table 8 gives none).
-    Configuration B has no published values: ``given`` must have them all, in g and mm. ``given`` also
-    replaces single values of A.
+    Parameters
+    ----------
+    config : {"A", "B"}
+        Configuration. B has no published values: `given` must have them all.
+    trackers : bool
+        Whether to add trackers and tape at assumed places (Table 8 gives none).
+    given : dict of str to float, optional
+        Values of quantities in g and mm, in place of Table 8's.
+
+    Returns
+    -------
+    Model
+        The model, SI.
+
+    Raises
+    ------
+    ModelError
+        For a configuration or quantity that is not known, a quantity without a value, or constants that no pendulum
+        can have.
     """
     return from_parts(configuration(config, trackers=trackers), given=given)
 
@@ -140,9 +158,18 @@ TABLE_7 = {
 def published() -> Model:
     """The constants of Table 7 as printed: for comparison only.
 
-    Masses and lengths, which Table 7 lacks, are the derived ones. Warns (`ModelWarning`) that lambda breaks
-    the parallel-axis bound and that psi and sigma disagree with Table 8, each with its number of standard
-    deviations.
+    Masses and lengths, which Table 7 lacks, are the derived ones.
+
+    Returns
+    -------
+    Model
+        The model, SI.
+
+    Warns
+    -----
+    ModelWarning
+        That lambda breaks the parallel-axis bound and that psi and sigma disagree with Table 8, each with its number
+        of standard deviations.
     """
     right = derived("A")
     sigmas = right.sigmas()

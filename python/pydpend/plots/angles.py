@@ -1,6 +1,4 @@
-"""Figures of angles: the series with their uncertainties (Fig. 16) and the two methods of Section 8.2.1
-(Fig. 12).
-"""
+"""Figures of angles: the series with their uncertainties (Fig. 16) and the two methods of Section 8.2.1 (Fig. 12)."""
 
 from __future__ import annotations
 

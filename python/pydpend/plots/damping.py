@@ -1,5 +1,4 @@
-"""Figures of damping fits: energy curve (Fig. 19), coefficients of trials (Fig. 20), shares, prediction,
-maps."""
+"""Figures of damping fits: energy curve (Fig. 19), coefficients of trials (Fig. 20), shares, prediction, maps."""
 
 from __future__ import annotations
 
@@ -50,8 +49,9 @@ def energy_figure(energy: Mapping[str, Floats], zoom_s: float = 2.0) -> Figure:
 
 
 def residuals_figure(residuals: Mapping[str, Floats]) -> Figure:
-    """Measured minus fitted angle of each link over time, between plus and minus the standard deviation it was
-    weighted by.
+    """Measured minus fitted angle of each link over time.
+
+    Between plus and minus the standard deviation that each was weighted by.
 
     ``residuals``: columns ``time_s``, ``phi1_residual_rad``, ``phi1_sigma_rad``, ... of a residual table.
     """
@@ -103,15 +103,29 @@ class Spreads(Protocol):
     """What the figure needs of a coefficient over the recordings, as `pydpend.trials.Spread` has it."""
 
     @property
-    def values(self) -> Sequence[float] | Floats: ...
+    def values(self) -> Sequence[float] | Floats:
+        """Of each recording (R,)."""
+        ...
+
     @property
-    def sigmas(self) -> Sequence[float] | Floats: ...
+    def sigmas(self) -> Sequence[float] | Floats:
+        """Standard errors of the values (R,)."""
+        ...
+
     @property
-    def mean(self) -> float: ...
+    def mean(self) -> float:
+        """Mean over the recordings; NaN where there is none."""
+        ...
+
     @property
-    def sigma(self) -> float: ...
+    def sigma(self) -> float:
+        """Standard error of the mean."""
+        ...
+
     @property
-    def unit(self) -> str: ...
+    def unit(self) -> str:
+        """Unit of all."""
+        ...
 
 
 @dataclass(frozen=True)

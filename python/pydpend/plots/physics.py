@@ -1,5 +1,7 @@
-"""Figures of motions and energies, and the pendulum's animation. Functions return figures and write nothing,
-except `animate`, which writes a film."""
+"""Figures of motions and energies, and the pendulum's animation.
+
+Functions return figures and write nothing, except `animate`, which writes a film.
+"""
 
 from __future__ import annotations
 
@@ -23,16 +25,23 @@ class Motion(Protocol):
     """Angles over time: a simulation, angles of a film, or smoothed states."""
 
     @property
-    def t_s(self) -> Array: ...
+    def t_s(self) -> Array:
+        """Times (T,), s."""
+        ...
+
     @property
-    def phi_rad(self) -> Array: ...
+    def phi_rad(self) -> Array:
+        """Angles (T, L), rad."""
+        ...
 
 
 class Rates(Motion, Protocol):
     """Angles and rates over time."""
 
     @property
-    def w_rad_s(self) -> Array: ...
+    def w_rad_s(self) -> Array:
+        """Rates (T, L), rad/s."""
+        ...
 
 
 def energies(run: Simulation, model: Model) -> Figure:

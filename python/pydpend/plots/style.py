@@ -72,8 +72,10 @@ def save(figure: Figure, path: AnyPath) -> None:
 
 
 def inline_svg(figure: Figure) -> str:
-    """The figure as SVG to stand in an HTML page; text and frames take the page's text colour, curves its ``--s0``,
-    ``--s1``, ... where it has them."""
+    """The figure as SVG to stand in an HTML page.
+
+    Text and frames take the page's text colour, curves its ``--s0``, ``--s1``, ... where it has them.
+    """
     for axes in figure.axes:
         axes.patch.set_alpha(0.0)
         for spine in axes.spines.values():
