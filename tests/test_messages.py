@@ -202,8 +202,8 @@ SAID: dict[str, tuple[Callable[[Path], object], Callable[[Path], list[str]], lis
     "a free parameter that is none": (
         lambda d: dp.fit_damping(motion(), dp.derived("A"), free=("foo",)),
         lambda d: [*FIT, "--free", "foo", "-o", str(d / "out")],
-        ["free: 'foo' is not known. Give added_inertia, tilt, offset1 or offset2"],
-        ["--free: 'foo' is not known. Give added_inertia, tilt, offset1 or offset2"],
+        ["free: 'foo' is not known. Give offset1, offset2, added_inertia or tilt"],
+        ["--free: 'foo' is not known. Give offset1, offset2, added_inertia or tilt"],
     ),
     "an end before the start": (
         lambda d: dp.fit_damping(motion(), dp.derived("A"), start_s=3.0, stop_s=2.0),

@@ -2,12 +2,26 @@
 
 from __future__ import annotations
 
+import ast
+import inspect
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
 import pytest
+from pydpend.coefficients import FREE, FULL, JOINT_OF, LAW_OF, PAPER, RATIO_UNITS, WORDS
 from pydpend.errors import ModelError
-from pydpend.model import CONSTANTS, Damping, Model, ModelWarning, derived, published, read_model
+from pydpend.model import (
+    CONSTANTS,
+    FORCES,
+    LAW_TABLE,
+    Damping,
+    Model,
+    ModelWarning,
+    derived,
+    published,
+    read_model,
+)
 
 # Errata section 0, g mm2 and g mm2/s2, and the rounding they are printed with.
 EXPECTED = {
@@ -166,3 +180,28 @@ def test_energy_of_the_drop_is_that_of_the_errata() -> None:
     w = np.array([1.5, -2.5])
     phi = np.array([0.4, -1.1])
     assert float(model.kinetic(phi, w)) == pytest.approx(float(w @ model.mass_matrix(phi) @ w / 2), rel=1e-14)
+
+
+def test_damping_has_the_coefficients_of_the_compiled_table_with_their_units() -> None:
+    assert [f.name for f in fields(Damping)] == list(LAW_TABLE)
+    body = ast.parse(inspect.getsource(Damping)).body[0]
+    assert isinstance(body, ast.ClassDef)
+    names = [
+        n.target.id for n in body.body if isinstance(n, ast.AnnAssign) and isinstance(n.target, ast.Name)
+    ]
+    said = [ast.literal_eval(n.value) for n in body.body[1:] if isinstance(n, ast.Expr)]
+    for name, words in zip(names, said, strict=True):
+        assert f", {LAW_TABLE[name].unit}" in words, name
+        assert LAW_TABLE[name].words
+        assert LAW_TABLE[name].source
+
+
+def test_lists_of_coefficients_are_those_of_the_compiled_table() -> None:
+    assert PAPER == ("mu_v1", "mu_v2", "mu_q1", "mu_q2", "rmu1", "rmu2")
+    assert (*PAPER, "tau_c1", "tau_c2", "strip_drag") == FULL
+    assert (*FULL, "offset1", "offset2") == FORCES
+    assert set(FREE) | set(FULL) == set(LAW_TABLE)
+    assert [LAW_OF[n] for n in FULL] == [*("viscous",) * 2, *("drag",) * 2, *("dry",) * 4, "drag"]
+    assert [n for n in FULL if JOINT_OF[n] == "upper"] == ["mu_v1", "mu_q1", "rmu1", "tau_c1"]
+    assert RATIO_UNITS == {"lambda": "1", "sigma": "1/s2", "kappa": "1/s2", "a3": "1"}
+    assert all(WORDS[n] for n in (*LAW_TABLE, *RATIO_UNITS))

@@ -19,6 +19,7 @@ from pydpend.crossing import (
     HeldColumns,
     OpenArguments,
     Row,
+    SegmentArrays,
 )
 from pydpend.errors import Message
 from pydpend.kinds import Kind
@@ -26,7 +27,13 @@ from pydpend.kinds import Kind
 __all__ = [
     "VERSION",
     "Film",
+    "IntegratorSettings",
+    "Law",
     "LiveTracker",
+    "Ratio",
+    "ShootingFit",
+    "ShootingSettings",
+    "SimulatedMotion",
     "arrow_reader",
     "check_outputs",
     "check_table",
@@ -36,10 +43,12 @@ __all__ = [
     "follow_motion",
     "info",
     "kind_of",
+    "laws",
     "learn_noise",
     "misplaced",
     "overlay_film",
     "poincare_section",
+    "ratios",
     "read_meta",
     "read_rig",
     "read_table",
@@ -54,7 +63,6 @@ __all__ = [
     "simulate_motion",
     "smooth_angles",
     "tangent_growth",
-    "term_names",
     "track",
     "unit_powers",
     "write_rig",
@@ -225,29 +233,132 @@ def score_places(
 ) -> str:
     """A table's places against the truth, as JSON: frames (T,), places in px (T, N, 2), sigmas in px (T, N)."""
 
-def simulate_motion(
-    model: dict[str, float],
-    state: list[float],
-    times_s: NDArray[np.float64],
-    *,
-    tolerance: float,
-    width_rad_s: float | None = None,
-    pinned: bool = False,
-) -> dict[str, Any]:
-    """The motion from `state` (phi1, phi2 in rad, w1, w2 in rad/s), sampled at `times_s` (T,).
+@final
+class Law:
+    """A law of damping or driving and its coefficient: a row of the compiled half's table."""
 
-    `state` (T, 4), `a` (T, 2) in rad/s2, `normal` (T, 2) in N, `dry` (T, 2) in N m, `energy` (T,) in J, `works`
-    (T, terms) in J, `events` (E, 4): time in s, joint, contact before and after; `at_rest`, `end_s`, `steps`.
-    """
+    @property
+    def name(self) -> str:
+        """The coefficient's name."""
+
+    @property
+    def unit(self) -> str:
+        """The coefficient's unit, SI."""
+
+    @property
+    def law(self) -> str:
+        """``viscous``, ``quadratic``, ``load``, ``constant``, ``strip``, ``added mass``, ``tilt`` or ``offset``."""
+
+    @property
+    def share(self) -> str | None:
+        """Share of the dissipated energy in which it counts, ``viscous``, ``drag`` or ``dry``; None: no loss."""
+
+    @property
+    def joint(self) -> str:
+        """Joint and link in whose share it counts: ``upper``, ``lower`` or ``both``."""
+
+    @property
+    def words(self) -> str:
+        """What people read for the coefficient."""
+
+    @property
+    def source(self) -> str:
+        """Where in the paper it stands, or what it is for."""
+
+    @property
+    def is_of_the_paper(self) -> bool:
+        """Whether it is one of Table 5 corrected."""
+
+    @property
+    def is_force(self) -> bool:
+        """Whether it has a power and a work; else it changes inertia or gravity."""
+
+    @property
+    def is_signed(self) -> bool:
+        """Whether the coefficient may be below zero."""
+
+@final
+class Ratio:
+    """A constant of the model whose ratio to psi a fit may free."""
+
+    @property
+    def name(self) -> str:
+        """The constant's name."""
+
+    @property
+    def unit(self) -> str:
+        """The ratio's unit, SI."""
+
+    @property
+    def words(self) -> str:
+        """What people read for it."""
+
+    @property
+    def is_of_one_link(self) -> bool:
+        """Whether a pendulum of one link has it."""
+
+def laws() -> list[Law]:
+    """The laws, in the order of powers and works."""
+
+def ratios() -> list[Ratio]:
+    """The ratios, in the order of fits."""
+
+@final
+class IntegratorSettings:
+    """How a motion is integrated."""
+
+    def __new__(cls, *, tolerance: float, width_rad_s: float | None = None, pinned: bool = False) -> Self: ...
+
+@final
+class SimulatedMotion:
+    """A motion at T samples, with E events."""
+
+    @property
+    def state(self) -> NDArray[np.float64]:
+        """Angles in rad and rates in rad/s, (T, 4)."""
+
+    @property
+    def a(self) -> NDArray[np.float64]:
+        """Accelerations in rad/s2, (T, 2)."""
+
+    @property
+    def normal(self) -> NDArray[np.float64]:
+        """Normal forces in the joints in N, (T, 2)."""
+
+    @property
+    def dry(self) -> NDArray[np.float64]:
+        """Dry torques in the joints in N m, (T, 2)."""
+
+    @property
+    def energy(self) -> NDArray[np.float64]:
+        """In J, (T,)."""
+
+    @property
+    def works(self) -> NDArray[np.float64]:
+        """Energy taken out by each of `laws` in J, (T, laws)."""
+
+    @property
+    def events(self) -> NDArray[np.float64]:
+        """Time in s, joint (0 or 1), contact before and after: the sign of sliding, 0 stuck, NaN smooth; (E, 4)."""
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether both joints stuck for good."""
+
+    @property
+    def end_s(self) -> float:
+        """When the motion ended."""
+
+def simulate_motion(
+    model: dict[str, float], state: list[float], times_s: NDArray[np.float64], settings: IntegratorSettings
+) -> SimulatedMotion:
+    """The motion from `state` (phi1, phi2 in rad, w1, w2 in rad/s), sampled at `times_s` (T,)."""
 
 def simulate_ensemble(
     models: list[dict[str, float]],
     states: NDArray[np.float64],
     times_s: NDArray[np.float64],
-    *,
-    tolerance: float,
-    width_rad_s: float | None = None,
-    pinned: bool = False,
+    settings: IntegratorSettings,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
     """Motions of K `states` (K, 4) on all cores, one model for all or one each.
 
@@ -258,12 +369,11 @@ def poincare_section(
     model: dict[str, float],
     state: list[float],
     duration_s: float,
+    settings: IntegratorSettings,
     *,
     link: int,
     angle_rad: float,
     direction: float,
-    tolerance: float,
-    pinned: bool = False,
 ) -> NDArray[np.float64]:
     """Passages of link 0 or 1 through an angle: rows of time in s and state in rad and rad/s, (K, 5)."""
 
@@ -290,39 +400,138 @@ def shooting_segments(
     Rows (K, 4): recording, first sample, one past the last, chained; start and end in s (K, 2); states (K, 4).
     """
 
+@final
+class ShootingSettings:
+    """What a fit is asked for; `pydpend.damping.shooting.solve` names each."""
+
+    def __new__(
+        cls,
+        *,
+        free: list[str],
+        bounded: list[str],
+        clock: bool,
+        zeros: bool,
+        slack: Sequence[float],
+        learned: bool,
+        huber: float,
+        max_iterations: int,
+    ) -> Self: ...
+
+@final
+class ShootingFit:
+    """A fit of K segments of R recordings with G shared parameters."""
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """The model's and the laws' numbers, SI."""
+
+    @property
+    def clock_scale(self) -> float:
+        """The motion's seconds to a second of the recording."""
+
+    @property
+    def zeros_rad(self) -> _Floats:
+        """Zeros of the angles, (R, 2)."""
+
+    @property
+    def states(self) -> _Floats:
+        """Angles in rad and rates in rad/s at the segments' starts, (K, 4)."""
+
+    @property
+    def information(self) -> _Floats:
+        """Second derivatives of half chi-square, (G, G)."""
+
+    @property
+    def angle_information(self) -> _Floats:
+        """What of it the angles give, (G, G)."""
+
+    @property
+    def jump_information(self) -> _Floats:
+        """What of it the jumps give, (G, G)."""
+
+    @property
+    def jumps_shown(self) -> _Floats:
+        """Variance that the jumps show over the slack's square, (4,)."""
+
+    @property
+    def gradient(self) -> _Floats:
+        """Gradient of half chi-square, (G,)."""
+
+    @property
+    def scores(self) -> _Floats:
+        """Each segment's part of the gradient, (K, G)."""
+
+    @property
+    def slack(self) -> _Floats:
+        """Standard deviations allowed to the jumps, (4,)."""
+
+    @property
+    def own_sigma(self) -> _Floats:
+        """Median standard deviations of a segment's state from its own samples, (4,)."""
+
+    @property
+    def jump_chi2(self) -> _Floats:
+        """Mean squared jump over slack squared, (4,)."""
+
+    @property
+    def log_evidence(self) -> float:
+        """Logarithm of the marginal likelihood but for a constant."""
+
+    @property
+    def cost(self) -> float:
+        """Half the robust sum of squares."""
+
+    @property
+    def squares(self) -> _Floats:
+        """Sum of weighted squared residuals of each link, (2,)."""
+
+    @property
+    def counts(self) -> _Ints:
+        """Residuals of each link, (2,)."""
+
+    @property
+    def state_freedom(self) -> float:
+        """Degrees of freedom that the states take up."""
+
+    @property
+    def state_covariance(self) -> _Floats:
+        """Of each segment's state, (K, 4, 4)."""
+
+    @property
+    def transfer(self) -> _Floats:
+        """Derivatives of each segment's end with respect to its start, (K, 4, 4)."""
+
+    @property
+    def stuck(self) -> int:
+        """Segments in which a joint stuck."""
+
+    @property
+    def iterations(self) -> int:
+        """Steps taken."""
+
+    @property
+    def status(self) -> str:
+        """A value of `pydpend.fit_status.FitStatus`."""
+
 def shooting_fit(
     recordings: Sequence[_Angles],
-    segment_rows: _Ints,
-    segment_times: _Floats,
-    segment_states: _Floats,
+    segments: SegmentArrays,
     model: dict[str, float],
     zeros: Sequence[tuple[float, float]],
+    settings: ShootingSettings,
     *,
-    free: Sequence[str],
-    bounded: Sequence[str],
-    clock: bool,
-    free_zeros: bool,
-    slack: Sequence[float],
-    learned: bool,
-    huber: float,
-    max_iterations: int,
-    clock_scale: float = 1.0,
-    progress: Callable[[int, int, float], object] | None = None,
-) -> dict[str, Any]:
-    """The multiple-shooting fit; `pydpend.damping.shooting` names the shapes and units of each argument and result."""
+    clock_scale: float,
+    progress: Callable[[int, int, float], object] | None,
+) -> ShootingFit:
+    """The multiple-shooting fit, from `model`, `zeros` in rad and the segments' states."""
 
 def shooting_trace(
-    recordings: Sequence[_Angles],
-    segment_rows: _Ints,
-    segment_times: _Floats,
-    segment_states: _Floats,
-    model: dict[str, float],
-    clock_scale: float,
+    recordings: Sequence[_Angles], segments: SegmentArrays, model: dict[str, float], clock_scale: float
 ) -> tuple[_Ints, _Floats, _Floats]:
     """The motion of every segment at its R samples.
 
     Rows of recording, sample, segment (R, 3); states in rad and rad/s (R, 4); the power of each term in W for a
-    coefficient of one, (R, terms).
+    coefficient of one, (R, laws).
     """
 
 def follow_motion(
@@ -330,11 +539,8 @@ def follow_motion(
 ) -> _Floats:
     """States at `times_s` (T,), ascending, from `state` at `start_s`: (T, 4) in rad and rad/s."""
 
-def term_names() -> list[tuple[str, str]]:
-    """Name and unit of each term's coefficient, in the order of the powers."""
-
 def unit_powers(model: dict[str, float], state: _Floats, accelerations: _Floats) -> _Floats:
-    """Powers (T, terms) for a coefficient of one along states (T, 4) and accelerations (T, 2) in rad/s2."""
+    """Powers (T, laws) for a coefficient of one along states (T, 4) and accelerations (T, 2) in rad/s2."""
 
 def learn_noise(
     t_s: NDArray[np.float64],

@@ -4,43 +4,46 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from pydpend import _tracker
 from pydpend.errors import FitOptionError, Setting, fault
-from pydpend.model import UNITS, Model, constants
+from pydpend.model import LAW_TABLE, UNITS, Model, constants
 
-PAPER = ("mu_v1", "mu_v2", "mu_q1", "mu_q2", "rmu1", "rmu2")
+PAPER = tuple(name for name, law in LAW_TABLE.items() if law.is_of_the_paper)
 """The paper's laws (Table 5 corrected): viscous, quadratic and load-proportional dry friction at each
 joint."""
 
-FULL = (*PAPER, "tau_c1", "tau_c2", "strip_drag")
-"""The paper's, a constant dry torque at each joint, and drag of the lower link in its true relative wind."""
+FULL = tuple(name for name, law in LAW_TABLE.items() if law.share is not None)
+"""All laws that only dissipate: the paper's, a constant dry torque at each joint, and drag of the lower link in its
+true relative wind."""
 
-RATIOS = ("lambda", "sigma", "kappa", "a3")
+FREE = tuple(name for name in LAW_TABLE if name not in FULL)
+"""Parameters that a fit may free too: a constant torque in each joint, inertia of the air that moves along, the angle
+of the stand."""
+
+LAW_OF = {name: law.share for name, law in LAW_TABLE.items() if law.share is not None}
+"""Share of the energy in which each of `FULL` counts: the paper's viscous, quadratic (here: all drag), Coulomb (all
+dry)."""
+
+JOINT_OF = {name: law.joint for name, law in LAW_TABLE.items()}
+"""Joint and link in whose share each coefficient counts: ``upper``, ``lower`` or ``both``."""
+
+TERMS = tuple(LAW_TABLE)
+"""Columns of the compiled half's powers."""
+
+_RATIOS = _tracker.ratios()
+
+RATIOS = tuple(ratio.name for ratio in _RATIOS)
 """Constants whose ratio to psi free motion determines; psi itself is a common factor that it does not."""
+
+RATIO_UNITS = {ratio.name: ratio.unit for ratio in _RATIOS}
+
+WORDS = {law.name: law.words for law in LAW_TABLE.values()} | {ratio.name: ratio.words for ratio in _RATIOS}
+"""What people read for each coefficient and ratio."""
 
 
 def ratios_of(links: int) -> tuple[str, ...]:
     """The ratios that a pendulum of so many links has."""
-    return RATIOS if links == 2 else ("sigma",)
-
-
-RATIO_UNITS = {"lambda": "1", "sigma": "1/s2", "kappa": "1/s2", "a3": "1"}
-
-LAW_OF = {
-    "mu_v1": "viscous",
-    "mu_v2": "viscous",
-    "mu_q1": "drag",
-    "mu_q2": "drag",
-    "strip_drag": "drag",
-    "rmu1": "dry",
-    "rmu2": "dry",
-    "tau_c1": "dry",
-    "tau_c2": "dry",
-}
-"""Law in whose share each coefficient counts: the paper's viscous, quadratic (here: all drag), Coulomb (all
-dry)."""
-
-JOINT_OF = {name: "lower" if name.endswith("2") or name == "strip_drag" else "upper" for name in FULL}
-"""Joint and link in whose share each coefficient counts."""
+    return tuple(ratio.name for ratio in _RATIOS if links == 2 or ratio.is_of_one_link)
 
 
 def coefficients(laws: str | Sequence[str]) -> tuple[str, ...]:

@@ -6,7 +6,7 @@ T frames, N nodes, D detections. What is not seen is NaN.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TypeAlias
+from typing import Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,3 +36,19 @@ OpenArguments: TypeAlias = tuple[float | None, str, str, bool, int, str | None]
 Frames: TypeAlias = tuple[int, int | None] | None
 Callback: TypeAlias = Callable[[str, int, int | None], object] | None
 """Called with stage, frames done and frames in all, if known."""
+
+
+class SegmentArrays(Protocol):
+    """What the compiled fit reads of `pydpend.damping.shooting.Segments`, K segments."""
+
+    @property
+    def rows(self) -> NDArray[np.int64]:
+        """Recording, first sample, one past the last, whether the next continues it, (K, 4)."""
+
+    @property
+    def times_s(self) -> NDArray[np.float64]:
+        """Start and end, (K, 2)."""
+
+    @property
+    def states(self) -> NDArray[np.float64]:
+        """Angles in rad and rates in rad/s at the start, (K, 4)."""

@@ -15,15 +15,13 @@ import scipy
 from numpy.typing import NDArray
 
 from pydpend import _tracker
-from pydpend.coefficients import coefficients, parameters
+from pydpend.coefficients import TERMS, coefficients, parameters
 from pydpend.errors import FitError, Setting, fault
 from pydpend.fit_status import FitStatus
 from pydpend.information import check_errors, invert, undetermined
 from pydpend.model import Model
 
 Floats = NDArray[np.float64]
-
-TERMS = tuple(name for name, _ in _tracker.term_names())
 
 
 class States(Protocol):

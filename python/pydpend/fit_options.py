@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from typing import Any, Self, TypedDict
 
-from pydpend.coefficients import FULL, JOINT_OF, PAPER, check_once, coefficients
+from pydpend.coefficients import FREE, FULL, JOINT_OF, PAPER, check_once, coefficients
 from pydpend.errors import FitOptionError, Message, Setting, Text, fault, listed, one_of
 from pydpend.option_fields import choices_of, method_of, option
 
@@ -23,11 +23,7 @@ RATIOS = ("free", "fixed")
 INTERVALS = ("covariance", "profile")
 """How each coefficient's uncertainty is told."""
 
-FREE = ("added_inertia", "tilt", "offset1", "offset2")
-"""Parameters that may be fitted too: inertia of the air that moves along, the angle of the stand, a constant torque in
-each joint."""
-
-UPPER = ("tilt", "offset1")
+UPPER = tuple(name for name in FREE if JOINT_OF[name] != "lower")
 """Those of `FREE` that a single pendulum has."""
 
 OLD_NAMES = {"predict": "prediction", "compare": "comparison"}

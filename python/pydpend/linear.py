@@ -142,10 +142,10 @@ def poincare(
             parameters(model, damping),
             [float(x) for x in np.asarray(state, dtype=np.float64).ravel()],
             duration_s,
+            _tracker.IntegratorSettings(tolerance=tolerance),
             link=link - 1,
             angle_rad=angle_rad,
             direction=float(direction),
-            tolerance=tolerance,
         )
     except ValueError as error:
         raise SimulationError(str(error)) from error

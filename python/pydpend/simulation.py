@@ -15,24 +15,12 @@ import numpy.typing as npt
 
 from pydpend import _tracker
 from pydpend.errors import SimulationError, fault
-from pydpend.model import Damping, Model, parameters
+from pydpend.model import FORCES, LAW_TABLE, Damping, Model, parameters
 from pydpend.tabular import TableResult, by_link, html_table
 
 Array = npt.NDArray[np.float64]
 
-LAWS = (
-    "mu_v1",
-    "mu_v2",
-    "mu_q1",
-    "mu_q2",
-    "rmu1",
-    "rmu2",
-    "tau_c1",
-    "tau_c2",
-    "strip_drag",
-    "offset1",
-    "offset2",
-)
+LAWS = FORCES
 """The columns of `Simulation.works_j`: one per coefficient of `Damping` that is a force."""
 
 TOLERANCE = 3e-13
@@ -184,31 +172,26 @@ def simulate(
         For a state that is not finite, times that do not increase, or a tolerance that is not reached.
     """
     t = np.atleast_1d(np.asarray(t_s, dtype=np.float64))
-    run = _call(
-        _tracker.simulate_motion,
-        parameters(model, damping),
-        _state(state).tolist(),
-        t,
-        tolerance=tolerance,
-        width_rad_s=smooth_width_rad_s,
-        pinned=pinned,
+    how = _tracker.IntegratorSettings(tolerance=tolerance, width_rad_s=smooth_width_rad_s, pinned=pinned)
+    run: _tracker.SimulatedMotion = _call(
+        _tracker.simulate_motion, parameters(model, damping), _state(state).tolist(), t, how
     )
-    energy = run["energy"]
-    works = run["works"][:, : len(LAWS)]
+    energy = run.energy
+    works = run.works[:, [name in LAWS for name in LAW_TABLE]]
     scale = abs(energy[0]) or float(np.ptp(energy)) or 1.0
-    rest = bool(run["at_rest"])
+    rest = run.at_rest
     return Simulation(
         t_s=t,
-        phi_rad=run["state"][:, :2],
-        w_rad_s=run["state"][:, 2:],
-        a_rad_s2=run["a"],
-        normal_n=run["normal"],
-        dry_n_m=run["dry"],
+        phi_rad=run.state[:, :2],
+        w_rad_s=run.state[:, 2:],
+        a_rad_s2=run.a,
+        normal_n=run.normal,
+        dry_n_m=run.dry,
         energy_j=energy,
         works_j=works,
-        events=tuple(Event(float(e[0]), int(e[1]) + 1, _named(e[2]), _named(e[3])) for e in run["events"]),
+        events=tuple(Event(float(e[0]), int(e[1]) + 1, _named(e[2]), _named(e[3])) for e in run.events),
         status="at rest" if rest else "done",
-        message=f"both joints stuck for good at {run['end_s']:.6g} s" if rest else "",
+        message=f"both joints stuck for good at {run.end_s:.6g} s" if rest else "",
         balance=float(np.max(np.abs(energy + works.sum(axis=1) - energy[0])) / scale),
     )
 
@@ -291,15 +274,8 @@ def simulate_many(
         parameters(models[i if len(models) > 1 else 0], dampings[i if len(dampings) > 1 else 0])
         for i in range(count)
     ]
-    rows, energy, rest = _call(
-        _tracker.simulate_ensemble,
-        pairs,
-        x,
-        t,
-        tolerance=tolerance,
-        width_rad_s=smooth_width_rad_s,
-        pinned=pinned,
-    )
+    how = _tracker.IntegratorSettings(tolerance=tolerance, width_rad_s=smooth_width_rad_s, pinned=pinned)
+    rows, energy, rest = _call(_tracker.simulate_ensemble, pairs, x, t, how)
     cube = rows.reshape(len(x), len(t), 4)
     return Ensemble(t, cube[:, :, :2], cube[:, :, 2:], energy.reshape(len(x), len(t)), rest)
 

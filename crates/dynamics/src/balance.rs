@@ -3,7 +3,7 @@
 use crate::parameters::{Field, Parameters};
 use crate::scalar::Real;
 use crate::state::{Contact, Motion, State};
-use crate::terms::{Kind, Kinematics, TERMS};
+use crate::terms::{Kinematics, TERMS};
 
 /// Sines and cosines of a state, once.
 #[derive(Clone, Copy)]
@@ -114,9 +114,7 @@ impl<'a, S: Real> Balance<'a, S> {
         let mut power = [zero; TERMS.len()];
         for (term, watt) in TERMS.iter().zip(&mut power) {
             // The load-dependent terms see no load here; they are added with the accelerations.
-            if !p.is_active(term.field)
-                || matches!(term.field, Field::Rmu1 | Field::Rmu2)
-                || !matches!(term.kind, Kind::Drag | Kind::Dry | Kind::Drive)
+            if !p.is_active(term.field) || matches!(term.field, Field::Rmu1 | Field::Rmu2) || !term.is_force()
             {
                 continue;
             }

@@ -32,7 +32,7 @@ pub mod state;
 pub mod terms;
 
 pub use motion::{accelerations, energies, mass_matrix, normal_forces};
-pub use parameters::{Field, Fixed, Parameters};
+pub use parameters::{Field, Fixed, Parameters, RATIOS, Ratio};
 pub use scalar::{Dual, Real};
 pub use state::{Contact, Motion, State};
 pub use terms::{Kind, Law, Place, TERMS, Term};

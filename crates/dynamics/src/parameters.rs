@@ -143,6 +143,27 @@ impl Field {
     }
 }
 
+/// A constant of the model of which free motion determines the ratio to [`Field::Psi`] (psi itself is a common factor).
+#[derive(Clone, Copy, Debug)]
+pub struct Ratio {
+    /// The constant.
+    pub field: Field,
+    /// Unit of its ratio to psi.
+    pub unit: &'static str,
+    /// Whether a pendulum of one link has it.
+    pub is_of_one_link: bool,
+    /// What people read for it.
+    pub words: &'static str,
+}
+
+/// Every ratio, in the order of fits.
+pub const RATIOS: [Ratio; 4] = [
+    Ratio { field: Field::Lambda, unit: "1", is_of_one_link: false, words: "inertia of the lower link" },
+    Ratio { field: Field::Sigma, unit: "1/s2", is_of_one_link: true, words: "gravity on the upper link" },
+    Ratio { field: Field::Kappa, unit: "1/s2", is_of_one_link: false, words: "gravity on the lower link" },
+    Ratio { field: Field::A3, unit: "1", is_of_one_link: false, words: "coupling of the links" },
+];
+
 impl<S: Real> Parameters<S> {
     /// All values zero.
     #[must_use]

@@ -23,7 +23,7 @@ pub enum Kind {
     Gravity,
 }
 
-/// Where a term acts.
+/// The joint whose share a term counts in, with the link that hangs from it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
     /// Joint 1 and link 1.
@@ -34,7 +34,19 @@ pub enum Place {
     Both,
 }
 
-/// The law a term belongs to, the unit in which shares are counted.
+impl Place {
+    /// The word for it in files and in Python.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Place::Upper => "upper",
+            Place::Lower => "lower",
+            Place::Both => "both",
+        }
+    }
+}
+
+/// The law a term belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Law {
     /// `mu_v * rate`, in the bearing.
@@ -55,6 +67,41 @@ pub enum Law {
     Offset,
 }
 
+impl Law {
+    /// The word for it in files and in Python.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Law::Viscous => "viscous",
+            Law::Quadratic => "quadratic",
+            Law::Load => "load",
+            Law::Constant => "constant",
+            Law::Strip => "strip",
+            Law::AddedMass => "added mass",
+            Law::Tilt => "tilt",
+            Law::Offset => "offset",
+        }
+    }
+
+    /// The share of the dissipated energy in which the paper would count it: viscous, quadratic (here all drag of the
+    /// air) or Coulomb (here all dry friction); `None` for what dissipates nothing.
+    #[must_use]
+    pub const fn share(self) -> Option<&'static str> {
+        match self {
+            Law::Viscous => Some("viscous"),
+            Law::Quadratic | Law::Strip => Some("drag"),
+            Law::Load | Law::Constant => Some("dry"),
+            Law::AddedMass | Law::Tilt | Law::Offset => None,
+        }
+    }
+
+    /// Whether it is one of the paper's three (Table 5 corrected).
+    #[must_use]
+    pub const fn is_of_the_paper(self) -> bool {
+        matches!(self, Law::Viscous | Law::Quadratic | Law::Load)
+    }
+}
+
 /// One row of the table.
 #[derive(Clone, Copy, Debug)]
 pub struct Term {
@@ -66,30 +113,49 @@ pub struct Term {
     pub kind: Kind,
     /// Where.
     pub place: Place,
+    /// What people read for its coefficient.
+    pub words: &'static str,
     /// Source in the paper, or what it stands for.
     pub source: &'static str,
 }
 
-const fn term(field: Field, law: Law, kind: Kind, place: Place, source: &'static str) -> Term {
-    Term { field, law, kind, place, source }
+const fn term(
+    field: Field,
+    law: Law,
+    kind: Kind,
+    place: Place,
+    words: &'static str,
+    source: &'static str,
+) -> Term {
+    Term { field, law, kind, place, words, source }
 }
 
 /// Every term, in the order of works and fits.
-pub const TERMS: [Term; 13] = [
-    term(Field::MuV1, Law::Viscous, Kind::Drag, Place::Upper, "Table 5, Eq. 37"),
-    term(Field::MuV2, Law::Viscous, Kind::Drag, Place::Lower, "Table 5, Eq. 37, relative rate"),
-    term(Field::MuQ1, Law::Quadratic, Kind::Drag, Place::Upper, "Table 5 with |w| w, Eq. 38"),
-    term(Field::MuQ2, Law::Quadratic, Kind::Drag, Place::Lower, "Table 5 with |w| w, Eq. 38"),
-    term(Field::Rmu1, Law::Load, Kind::Dry, Place::Upper, "Eqs. 33-36 corrected"),
-    term(Field::Rmu2, Law::Load, Kind::Dry, Place::Lower, "Eqs. 33-36 corrected, relative rate"),
-    term(Field::TauC1, Law::Constant, Kind::Dry, Place::Upper, "preload: load-independent dry torque"),
-    term(Field::TauC2, Law::Constant, Kind::Dry, Place::Lower, "preload: load-independent dry torque"),
-    term(Field::StripDrag, Law::Strip, Kind::Drag, Place::Both, "strip theory, elbow's motion included"),
-    term(Field::Offset1, Law::Offset, Kind::Drive, Place::Upper, "constant torque on link 1"),
-    term(Field::Offset2, Law::Offset, Kind::Drive, Place::Lower, "constant torque between the links"),
-    term(Field::AddedInertia, Law::AddedMass, Kind::Inertial, Place::Both, "air carried by the strips"),
-    term(Field::Tilt, Law::Tilt, Kind::Gravity, Place::Both, "direction of gravity in the plane"),
-];
+#[rustfmt::skip]
+pub const TERMS: [Term; 13] = {
+    use {Field as F, Kind as K, Law as L, Place as P};
+    [
+        term(F::MuV1, L::Viscous, K::Drag, P::Upper, "viscous friction, upper joint", "Table 5, Eq. 37"),
+        term(F::MuV2, L::Viscous, K::Drag, P::Lower, "viscous friction, lower joint", "Table 5, Eq. 37, relative rate"),
+        term(F::MuQ1, L::Quadratic, K::Drag, P::Upper, "air drag, upper link", "Table 5 with |w| w, Eq. 38"),
+        term(F::MuQ2, L::Quadratic, K::Drag, P::Lower, "air drag, lower link", "Table 5 with |w| w, Eq. 38"),
+        term(F::Rmu1, L::Load, K::Dry, P::Upper, "dry friction with the load, upper joint", "Eqs. 33-36 corrected"),
+        term(F::Rmu2, L::Load, K::Dry, P::Lower, "dry friction with the load, lower joint",
+            "Eqs. 33-36 corrected, relative rate"),
+        term(F::TauC1, L::Constant, K::Dry, P::Upper, "constant dry torque, upper joint",
+            "preload: load-independent dry torque"),
+        term(F::TauC2, L::Constant, K::Dry, P::Lower, "constant dry torque, lower joint",
+            "preload: load-independent dry torque"),
+        term(F::StripDrag, L::Strip, K::Drag, P::Lower, "air drag, lower link in its own wind",
+            "strip theory, elbow's motion included"),
+        term(F::Offset1, L::Offset, K::Drive, P::Upper, "driving torque, upper link", "constant torque on link 1"),
+        term(F::Offset2, L::Offset, K::Drive, P::Lower, "driving torque, lower joint",
+            "constant torque between the links"),
+        term(F::AddedInertia, L::AddedMass, K::Inertial, P::Lower, "inertia of the air that moves with the lower link",
+            "air carried by the strips"),
+        term(F::Tilt, L::Tilt, K::Gravity, P::Both, "tilt of the stand", "direction of gravity in the plane"),
+    ]
+};
 
 /// What the forces are functions of.
 #[derive(Clone, Copy, Debug)]
@@ -105,6 +171,18 @@ pub struct Kinematics<S> {
 }
 
 impl Term {
+    /// Whether it is a force, with a power and a work; else it changes inertia or gravity.
+    #[must_use]
+    pub const fn is_force(&self) -> bool {
+        matches!(self.kind, Kind::Drag | Kind::Dry | Kind::Drive)
+    }
+
+    /// Whether its coefficient may be below zero: a drive and a direction have a sign, a loss and an inertia have none.
+    #[must_use]
+    pub const fn is_signed(&self) -> bool {
+        matches!(self.kind, Kind::Drive | Kind::Gravity)
+    }
+
     /// Generalised forces on the two links for a coefficient of one, with opposite sign: `Q = -c * unit_force`.
     /// Zero for terms that are not forces.
     #[inline]

@@ -6,9 +6,11 @@ mod dynamics;
 mod errors;
 mod film;
 mod images;
+mod laws;
 mod live;
 mod rig;
 mod settings;
+mod shooting;
 mod simulation;
 mod smoothing;
 mod tables;
@@ -27,7 +29,10 @@ mod _tracker {
     #[pymodule_export]
     use super::rig::{read_rig, rig_toml, write_rig};
     #[pymodule_export]
-    use super::simulation::{poincare_section, simulate_ensemble, simulate_motion, tangent_growth};
+    use super::simulation::{
+        IntegratorSettings, SimulatedMotion, poincare_section, simulate_ensemble, simulate_motion,
+        tangent_growth,
+    };
     #[pymodule_export]
     use super::smoothing::{learn_noise, smooth_angles};
     #[pymodule_export]
@@ -38,10 +43,12 @@ mod _tracker {
     use super::track::{check_outputs, fingerprint, info, overlay_film, recording_files, setup, track};
 
     #[pymodule_export]
-    const VERSION: &str = env!("CARGO_PKG_VERSION");
+    use super::dynamics::{follow_motion, unit_powers};
+    #[pymodule_export]
+    use super::laws::{PyLaw, PyRatio, laws, ratios};
+    #[pymodule_export]
+    use super::shooting::{ShootingFit, ShootingSettings, shooting_fit, shooting_segments, shooting_trace};
 
     #[pymodule_export]
-    use super::dynamics::{
-        follow_motion, shooting_fit, shooting_segments, shooting_trace, term_names, unit_powers,
-    };
+    const VERSION: &str = env!("CARGO_PKG_VERSION");
 }

@@ -7,17 +7,27 @@ use dynamics::TERMS;
 use dynamics::analysis::ensemble::{Case, ensemble};
 use dynamics::analysis::lyapunov::{Growth, growth_rates};
 use dynamics::analysis::section::{Section, poincare};
-use dynamics::analysis::simulate::{Ending, Failure, Run, Settings};
+use dynamics::analysis::simulate::{Ending, Failure, Run, Sample, Settings, simulate};
 use dynamics::friction::Friction;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
 
 use crate::dynamics::parameters;
 
-fn settings(tolerance: f64, width_rad_s: Option<f64>, pinned: bool) -> Settings {
-    Settings { tolerance, friction: width_rad_s.map_or(Friction::Exact, Friction::Smooth), pinned }
+/// How a motion is integrated.
+#[pyclass(frozen, module = "pydpend._tracker")]
+pub struct IntegratorSettings(Settings);
+
+#[pymethods]
+impl IntegratorSettings {
+    /// `width_rad_s` of smooth dry friction, `None` where it is exact.
+    #[new]
+    #[pyo3(signature = (*, tolerance, width_rad_s=None, pinned=false))]
+    fn new(tolerance: f64, width_rad_s: Option<f64>, pinned: bool) -> Self {
+        let friction = width_rad_s.map_or(Friction::Exact, Friction::Smooth);
+        Self(Settings { tolerance, friction, pinned })
+    }
 }
 
 fn failed(failure: &Failure) -> PyErr {
@@ -37,48 +47,57 @@ fn table<'py>(py: Python<'py>, flat: &[f64], columns: usize) -> PyResult<Bound<'
     flat.to_pyarray(py).reshape([flat.len() / columns, columns])
 }
 
-/// One motion as arrays: `state` (T, 4), `a` (T, 2), `normal` (T, 2), `dry` (T, 2), `energy` (T,), `works` (T, terms),
-/// `events` (E, 4: time, joint 0/1, contact before, contact after), `at_rest`, `end_s`, `steps`.
-fn run_dict<'py>(py: Python<'py>, run: &Run) -> PyResult<Bound<'py, PyDict>> {
-    let flat = |f: &dyn Fn(&dynamics::analysis::simulate::Sample) -> Vec<f64>| -> Vec<f64> {
-        run.samples.iter().flat_map(f).collect()
-    };
-    let out = PyDict::new(py);
-    out.set_item("state", table(py, &flat(&|s| s.x.to_vec()), 4)?)?;
-    out.set_item("a", table(py, &flat(&|s| s.a.to_vec()), 2)?)?;
-    out.set_item("normal", table(py, &flat(&|s| s.normal.to_vec()), 2)?)?;
-    out.set_item("dry", table(py, &flat(&|s| s.dry.to_vec()), 2)?)?;
-    out.set_item("energy", flat(&|s| vec![s.energy]).to_pyarray(py))?;
-    out.set_item("works", table(py, &flat(&|s| s.works.to_vec()), TERMS.len())?)?;
-    let events: Vec<f64> =
-        run.events.iter().flat_map(|e| [e.t_s, e.joint as f64, contact(e.from), contact(e.to)]).collect();
-    out.set_item("events", table(py, &events, 4)?)?;
-    out.set_item("at_rest", run.ending == Ending::AtRest)?;
-    out.set_item("end_s", run.end_s)?;
-    out.set_item("steps", run.steps)?;
-    Ok(out)
+/// One motion at T samples, with E events.
+#[pyclass(frozen, get_all, module = "pydpend._tracker")]
+pub struct SimulatedMotion {
+    state: Py<PyArray2<f64>>,
+    a: Py<PyArray2<f64>>,
+    normal: Py<PyArray2<f64>>,
+    dry: Py<PyArray2<f64>>,
+    energy: Py<PyArray1<f64>>,
+    works: Py<PyArray2<f64>>,
+    events: Py<PyArray2<f64>>,
+    at_rest: bool,
+    end_s: f64,
+}
+
+impl SimulatedMotion {
+    fn of(py: Python<'_>, run: &Run) -> PyResult<Self> {
+        let columns = |width: usize, f: &dyn Fn(&Sample) -> Vec<f64>| -> PyResult<Py<PyArray2<f64>>> {
+            let flat: Vec<f64> = run.samples.iter().flat_map(f).collect();
+            Ok(table(py, &flat, width)?.unbind())
+        };
+        let energy: Vec<f64> = run.samples.iter().map(|s| s.energy).collect();
+        let events: Vec<f64> =
+            run.events.iter().flat_map(|e| [e.t_s, e.joint as f64, contact(e.from), contact(e.to)]).collect();
+        Ok(Self {
+            state: columns(4, &|s| s.x.to_vec())?,
+            a: columns(2, &|s| s.a.to_vec())?,
+            normal: columns(2, &|s| s.normal.to_vec())?,
+            dry: columns(2, &|s| s.dry.to_vec())?,
+            energy: energy.to_pyarray(py).unbind(),
+            works: columns(TERMS.len(), &|s| s.works.to_vec())?,
+            events: table(py, &events, 4)?.unbind(),
+            at_rest: run.ending == Ending::AtRest,
+            end_s: run.end_s,
+        })
+    }
 }
 
 /// The motion from `state` (phi1, phi2, w1, w2), sampled at `times_s`. `model` has the names of `dynamics::Field` and
 /// m1, m2, l1, g, lower_inner, lower_outer. Raises ValueError with the whole message.
 #[pyfunction]
-#[pyo3(signature = (model, state, times_s, *, tolerance, width_rad_s=None, pinned=false))]
-pub fn simulate_motion<'py>(
-    py: Python<'py>,
+pub fn simulate_motion(
+    py: Python<'_>,
     model: HashMap<String, f64>,
     state: [f64; 4],
-    times_s: PyReadonlyArray1<'py, f64>,
-    tolerance: f64,
-    width_rad_s: Option<f64>,
-    pinned: bool,
-) -> PyResult<Bound<'py, PyDict>> {
+    times_s: PyReadonlyArray1<'_, f64>,
+    settings: &IntegratorSettings,
+) -> PyResult<SimulatedMotion> {
     let p = parameters(&model)?;
     let times = times_s.as_array().to_vec();
-    let ask = settings(tolerance, width_rad_s, pinned);
-    let run = py
-        .detach(|| dynamics::analysis::simulate::simulate(&p, state, &times, &ask))
-        .map_err(|e| failed(&e))?;
-    run_dict(py, &run)
+    let run = py.detach(|| simulate(&p, state, &times, &settings.0)).map_err(|e| failed(&e))?;
+    SimulatedMotion::of(py, &run)
 }
 
 type Many<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<bool>>);
@@ -86,15 +105,12 @@ type Many<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>, Bound<'p
 /// Many motions on all cores: `states` (K, 4), one model for all or one each. Returns states (K*T, 4), energies
 /// (K*T,) and which came to rest (K,).
 #[pyfunction]
-#[pyo3(signature = (models, states, times_s, *, tolerance, width_rad_s=None, pinned=false))]
 pub fn simulate_ensemble<'py>(
     py: Python<'py>,
     models: Vec<HashMap<String, f64>>,
     states: PyReadonlyArray2<'py, f64>,
     times_s: PyReadonlyArray1<'py, f64>,
-    tolerance: f64,
-    width_rad_s: Option<f64>,
-    pinned: bool,
+    settings: &IntegratorSettings,
 ) -> PyResult<Many<'py>> {
     let pendulums = models.iter().map(parameters).collect::<PyResult<Vec<_>>>()?;
     let rows = states.as_array();
@@ -110,8 +126,7 @@ pub fn simulate_ensemble<'py>(
         })
         .collect();
     let times = times_s.as_array().to_vec();
-    let ask = settings(tolerance, width_rad_s, pinned);
-    let runs = py.detach(|| ensemble(&cases, &times, &ask));
+    let runs = py.detach(|| ensemble(&cases, &times, &settings.0));
     let (mut x, mut energy, mut rest) = (Vec::new(), Vec::new(), Vec::new());
     for (i, run) in runs.iter().enumerate() {
         let run = run.as_ref().map_err(|e| PyValueError::new_err(format!("run {i}: {e}")))?;
@@ -124,26 +139,24 @@ pub fn simulate_ensemble<'py>(
 
 /// Passages of a link through an angle: rows of time and state, (K, 5).
 #[pyfunction]
-#[pyo3(signature = (model, state, duration_s, *, link, angle_rad, direction, tolerance, pinned=false))]
-#[expect(clippy::too_many_arguments, reason = "one keyword each in Python")]
+#[pyo3(signature = (model, state, duration_s, settings, *, link, angle_rad, direction))]
 pub fn poincare_section<'py>(
     py: Python<'py>,
     model: HashMap<String, f64>,
     state: [f64; 4],
     duration_s: f64,
+    settings: &IntegratorSettings,
     link: usize,
     angle_rad: f64,
     direction: f64,
-    tolerance: f64,
-    pinned: bool,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     if link > 1 {
         return Err(PyValueError::new_err(format!("link {link}: there are 0 and 1")));
     }
     let p = parameters(&model)?;
-    let ask = settings(tolerance, None, pinned);
     let section = Section { link, angle_rad, direction };
-    let found = py.detach(|| poincare(&p, state, duration_s, section, &ask)).map_err(|e| failed(&e))?;
+    let found =
+        py.detach(|| poincare(&p, state, duration_s, section, &settings.0)).map_err(|e| failed(&e))?;
     let flat: Vec<f64> = found.iter().flat_map(|(t, x)| [*t, x[0], x[1], x[2], x[3]]).collect();
     table(py, &flat, 5)
 }

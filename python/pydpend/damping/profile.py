@@ -15,9 +15,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pydpend.coefficients import parameters
+from pydpend.coefficients import TERMS, parameters
 from pydpend.damping import shooting
-from pydpend.damping.shares import TERMS, cumulative
+from pydpend.damping.shares import cumulative
 from pydpend.damping.shooting import Progress, Segments, Track
 from pydpend.energy import EnergyFit, EnergyProfile, fit_profiles
 from pydpend.errors import FitError, fault

@@ -7,15 +7,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pydpend import _tracker
-from pydpend.coefficients import JOINT_OF, LAW_OF
+from pydpend.coefficients import JOINT_OF, LAW_OF, TERMS
 from pydpend.damping.result import EnergyCurve, Estimate
 from pydpend.damping.shooting import Trace, Track
 from pydpend.model import Model
 
 Floats = NDArray[np.float64]
-
-TERMS = tuple(name for name, _ in _tracker.term_names())
 
 
 def unit_works(tracks: Sequence[Track], path: Trace, names: Sequence[str]) -> Floats:

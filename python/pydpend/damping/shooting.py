@@ -200,23 +200,19 @@ def solve(
 ) -> Solution:
     """Runs the fit. Raises FitError when there is nothing to fit or the motion is not determined."""
     try:
-        out = _tracker.shooting_fit(
-            tracks,
-            segments.rows,
-            segments.times_s,
-            segments.states,
-            parameters,
-            [(float(a), float(b)) for a, b in np.asarray(zeros_rad, dtype=np.float64)],
+        settings = _tracker.ShootingSettings(
             free=list(free),
             bounded=list(bounded),
             clock=clock,
-            free_zeros=zeros,
+            zeros=zeros,
             slack=[slack] if isinstance(slack, float | int) else list(slack),
             learned=learned,
             huber=huber,
             max_iterations=max_iterations,
-            clock_scale=clock_scale,
-            progress=progress,
+        )
+        starts = [(float(a), float(b)) for a, b in np.asarray(zeros_rad, dtype=np.float64)]
+        out = _tracker.shooting_fit(
+            tracks, segments, parameters, starts, settings, clock_scale=clock_scale, progress=progress
         )
     except ValueError as problem:
         advice = "Give angles with fewer gaps, and check that the model is this pendulum's"
@@ -227,30 +223,30 @@ def solve(
     # One link's recordings have one zero each; the other's column says nothing.
     known = np.array([not (n.startswith("zero2") and tracks[0][1].shape[1] == 1) for n in names], dtype=bool)
     return Solution(
-        {**parameters, **{k: v for k, v in sorted(out["parameters"].items()) if k in parameters or v != 0.0}},
-        out["zeros_rad"],
-        replace(segments, states=out["states"]),
+        {**parameters, **{k: v for k, v in sorted(out.parameters.items()) if k in parameters or v != 0.0}},
+        out.zeros_rad,
+        replace(segments, states=out.states),
         tuple(n for n, k in zip(names, known, strict=True) if k),
-        out["information"][np.ix_(known, known)],
-        out["angle_information"][np.ix_(known, known)],
-        out["jump_information"][np.ix_(known, known)],
-        np.array(out["jumps_shown"]),
-        out["gradient"][known],
-        out["scores"][:, known],
-        np.array(out["slack"]),
-        np.array(out["own_sigma"]),
-        np.array(out["jump_chi2"]),
-        out["log_evidence"],
-        out["cost"],
-        np.array(out["squares"]),
-        np.array(out["counts"]),
-        out["state_freedom"],
-        out["state_covariance"],
-        out["transfer"],
-        out["stuck"],
-        out["iterations"],
-        FitStatus(out["status"]),
-        out["clock_scale"],
+        out.information[np.ix_(known, known)],
+        out.angle_information[np.ix_(known, known)],
+        out.jump_information[np.ix_(known, known)],
+        out.jumps_shown,
+        out.gradient[known],
+        out.scores[:, known],
+        out.slack,
+        out.own_sigma,
+        out.jump_chi2,
+        out.log_evidence,
+        out.cost,
+        out.squares,
+        out.counts,
+        out.state_freedom,
+        out.state_covariance,
+        out.transfer,
+        out.stuck,
+        out.iterations,
+        FitStatus(out.status),
+        out.clock_scale,
     )
 
 
@@ -301,16 +297,14 @@ class Trace:
     state: Floats
     """(M, 4), zeros not added."""
     unit_power: Floats
-    """(M, terms), W per unit of each coefficient, in the order of ``_tracker.term_names()``."""
+    """(M, terms), W per unit of each coefficient, in the order of `pydpend.coefficients.TERMS`."""
 
 
 def trace(
     tracks: Sequence[Track], segments: Segments, parameters: dict[str, float], clock_scale: float = 1.0
 ) -> Trace:
     """Follows each segment from its state."""
-    index, state, power = _tracker.shooting_trace(
-        tracks, segments.rows, segments.times_s, segments.states, parameters, clock_scale
-    )
+    index, state, power = _tracker.shooting_trace(tracks, segments, parameters, clock_scale)
     return Trace(index[:, 0], index[:, 1], index[:, 2], state, power)
 
 

@@ -13,9 +13,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from pydpend.coefficients import JOINT_OF, PAPER, unit
+from pydpend.coefficients import JOINT_OF, PAPER, TERMS, unit
 from pydpend.damping.result import Estimate, TenCoefficients
-from pydpend.damping.shares import TERMS
 from pydpend.damping.shooting import Trace, Track
 from pydpend.energy import EnergyFit, EnergyProfile
 from pydpend.information import invert

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pydpend.model.file import check_model_called, model_called, read_model
-from pydpend.model.laws import UNITS, Damping, constants, parameters
+from pydpend.model.laws import FORCES, LAW_TABLE, UNITS, Damping, constants, parameters
 from pydpend.model.pendulum import CONSTANTS, Model, uniform_bar
 from pydpend.model.reduce import (
     G_MM_S2,
@@ -18,7 +18,9 @@ from pydpend.model.reduce import (
 
 __all__ = [
     "CONSTANTS",
+    "FORCES",
     "G_MM_S2",
+    "LAW_TABLE",
     "TABLE_7",
     "UNITS",
     "Damping",

@@ -5,8 +5,16 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, fields
 
+from pydpend._tracker import Law, laws
 from pydpend.errors import ModelError, fault
 from pydpend.model.pendulum import Model
+
+LAW_TABLE: dict[str, Law] = {law.name: law for law in laws()}
+"""The laws by the names of their coefficients, in the order of powers and works: the compiled half's one table
+(``dynamics::TERMS``). Lists of coefficients, units and words are made from it."""
+
+FORCES = tuple(name for name, law in LAW_TABLE.items() if law.is_force)
+"""Coefficients of the laws that are forces, and so have a work."""
 
 
 @dataclass(frozen=True)
@@ -62,8 +70,7 @@ class Damping:
     def __post_init__(self) -> None:
         for f in fields(self):
             value = getattr(self, f.name)
-            signed = f.name in ("offset1", "offset2", "tilt")
-            if not math.isfinite(value) or (value < 0 and not signed):
+            if not math.isfinite(value) or (value < 0 and not LAW_TABLE[f.name].is_signed):
                 raise ModelError(
                     fault(
                         "damping", f"{f.name} is {value}", "A damping coefficient is finite and not negative"
@@ -71,21 +78,7 @@ class Damping:
                 )
 
 
-UNITS = {
-    "mu_v1": "N m s",
-    "mu_v2": "N m s",
-    "mu_q1": "N m s2",
-    "mu_q2": "N m s2",
-    "rmu1": "m",
-    "rmu2": "m",
-    "tau_c1": "N m",
-    "tau_c2": "N m",
-    "strip_drag": "N m s2",
-    "offset1": "N m",
-    "offset2": "N m",
-    "added_inertia": "kg m2",
-    "tilt": "rad",
-}
+UNITS = {name: law.unit for name, law in LAW_TABLE.items()}
 """Unit of each coefficient of `Damping`."""
 
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from pydpend.coefficients import RATIO_UNITS
+from pydpend.coefficients import RATIO_UNITS, WORDS
 from pydpend.damping import DampingFit
 from pydpend.damping.result import number
 from pydpend.errors import Setting
@@ -33,22 +33,6 @@ from pydpend.run_folder import Floats, StoredPrediction, StoredRun, StoredScale,
 ZOOM_S = 2.0
 """The first seconds of the energy stand alone too (Fig. 19)."""
 
-MEANING = {
-    "mu_v1": "viscous friction, upper joint",
-    "mu_v2": "viscous friction, lower joint",
-    "mu_q1": "air drag, upper link",
-    "mu_q2": "air drag, lower link",
-    "rmu1": "dry friction with the load, upper joint",
-    "rmu2": "dry friction with the load, lower joint",
-    "tau_c1": "constant dry torque, upper joint",
-    "tau_c2": "constant dry torque, lower joint",
-    "strip_drag": "air drag, lower link in its own wind",
-    "lambda": "inertia of the lower link",
-    "sigma": "gravity on the upper link",
-    "kappa": "gravity on the lower link",
-    "a3": "coupling of the links",
-}
-
 SHARE = {
     "viscous": "viscous friction",
     "drag": "air drag",
@@ -69,7 +53,7 @@ def links_of(fit: DampingFit) -> int:
 
 def meaning(name: str, links: int) -> str:
     """What a coefficient or ratio is, in words."""
-    words = MEANING.get(name, "")
+    words = WORDS.get(name, "")
     return words if links > 1 else words.replace("upper ", "")
 
 
