@@ -17,33 +17,25 @@ import pyarrow as pa
 import pydpend as dp
 import pytest
 from pydpend import _tracker
-from pydpend.encoder import EncoderSignal, compare, encoder_angles
+from pydpend.encoder import EncoderSignal
 from pydpend.json_text import JsonResult
 from pydpend.tabular import TableResult
+from pydpend.tracking import OverlayFilm
 
 from tests.drawn_nodes import some_nodes
-from tests.free_decays import measured, released
-
-
-def motion() -> dp.LinkAngles:
-    return measured(released(3, 4.0, 250.0), 3, 0.05)
-
-
-def fit() -> dp.DampingFit:
-    return dp.fit_damping(
-        motion(), dp.derived("A"), laws="mu_v1,mu_v2", ratios=False, start_s=0.1, stop_s=4.0
-    )
-
-
-def comparison() -> dp.Comparison:
-    angles = motion()
-    noise = np.random.default_rng(5).normal(0.0, 1e-3, angles.t_s.size)
-    return compare(angles, encoder_angles(EncoderSignal(angles.t_s, angles.phi_rad[:, 0] + noise, "rad")))
-
-
-def simulation() -> dp.Simulation:
-    return dp.simulate(dp.derived("A"), dp.Damping(), [0.5, 0.2, 0.0, 0.0], np.arange(0.0, 0.1, 0.01))
-
+from tests.made_results import (
+    calibration,
+    comparison,
+    ensemble,
+    fit,
+    motion,
+    outcome,
+    prediction,
+    score,
+    section,
+    simulation,
+    trials,
+)
 
 RESULTS: dict[str, Callable[[], Any]] = {
     "Nodes": some_nodes,
@@ -76,6 +68,18 @@ def test_a_result_is_one_line_and_a_small_table(kind: str) -> None:
         (simulation, 10, "tau_c1_j"),
         (comparison, 1001, "residual_rad"),
         (fit, 6, "sigma"),
+        (lambda: EncoderSignal(np.arange(5.0), np.ones(5)), 5, "voltage_v"),
+        (lambda: EncoderSignal(np.arange(5.0), np.ones(5), "rad"), 5, "phi1_rad"),
+        (calibration, 4, "residual_v"),
+        (prediction, 8, "phi2_rms_deg"),
+        (trials, 6, "value2"),
+        (lambda: fit().energy[0], 976, "mu_v2_j"),
+        (lambda: fit().residuals[0], 976, "phi2_sigma_rad"),
+        (lambda: dp.Film("clean", frames=3).truth(), 27, "visible"),
+        (lambda: OverlayFilm("a.mp4", np.arange(4), np.arange(4.0), 30), 4, "time_s"),
+        (section, 9, "w2_rad_s"),
+        (ensemble, 6, "energy_j"),
+        (some_nodes, 150, "x_px"),
     ],
 )
 def test_a_table_goes_to_pandas_arrow_and_polars(
@@ -83,20 +87,67 @@ def test_a_table_goes_to_pandas_arrow_and_polars(
 ) -> None:
     result = made()
     frame, table = result.to_dataframe(), result.to_arrow()
-    assert list(frame.columns) == table.column_names == list(result.to_columns())
+    assert list(frame.columns) == table.column_names
     assert column in table.column_names
     assert 0.9 * rows <= len(frame) == table.num_rows <= rows
     assert pa.table(result).equals(table)
     assert pl.DataFrame(result).columns == table.column_names
-    np.testing.assert_allclose(frame[column], np.asarray(result.to_columns()[column], dtype=np.float64))
+    if isinstance(result, TableResult):
+        assert table.column_names == list(result.to_columns())
+        np.testing.assert_allclose(frame[column], np.asarray(result.to_columns()[column], dtype=np.float64))
 
 
 def test_what_has_plain_values_has_them_as_text_too() -> None:
-    for result in (fit(), comparison(), some_nodes().rig):
-        assert isinstance(result.to_json(), str)
-        assert json.loads(result.to_json()) == result.to_dict()
-    assert issubclass(dp.DampingFit, JsonResult)
-    assert issubclass(dp.Prediction, JsonResult)
+    rig = some_nodes().rig
+    assert json.loads(rig.to_json()) == rig.to_dict()
+    assert dp.Rig.from_json(rig.to_json()) == rig
+    with pytest.raises(dp.RigError, match="missing field"):
+        dp.Rig.from_json("{}")
+
+
+JSON: dict[str, Callable[[], JsonResult]] = {
+    "DampingFit": fit,
+    "Prediction": prediction,
+    "Trials": trials,
+    "Comparison": comparison,
+    "Synchronisation": lambda: comparison().sync,
+    "Calibration": calibration,
+    "Score": score,
+    "Outcome": outcome,
+}
+
+
+@pytest.mark.parametrize("kind", JSON)
+def test_a_result_goes_to_json_and_back(kind: str) -> None:
+    result = JSON[kind]()
+    assert type(result).__name__ == kind
+    text = result.to_json()
+    assert json.loads(text) == result.to_dict()
+    again = type(result).from_json(text)
+    assert again.to_json() == text
+    for field in dataclasses.fields(again):  # type: ignore[arg-type]
+        one, other = getattr(result, field.name), getattr(again, field.name)
+        # What is in tables of their own is empty.
+        if isinstance(one, float | int | str) and one == one:
+            assert other == one, field.name
+
+
+@pytest.mark.parametrize("kind", JSON)
+def test_a_text_that_is_no_result_is_one_line(kind: str) -> None:
+    cls = type(JSON[kind]())
+    for text in ("", "[]", "{}", '{"status": 1}'):
+        with pytest.raises(dp.PydpendError) as caught:
+            cls.from_json(text, "mine.json")
+        assert str(caught.value).startswith("mine.json")
+        assert "\n" not in str(caught.value)
+
+
+def test_every_json_result_goes_there_and_back() -> None:
+    """A class that comes later is tried above too."""
+    for module in pkgutil.walk_packages(dp.__path__, "pydpend."):
+        if not module.name.endswith(("__main__", "_tracker")):
+            importlib.import_module(module.name)
+    assert {cls.__name__ for cls in JsonResult.__subclasses__()} == set(JSON)
 
 
 def test_no_function_hides_a_module() -> None:

@@ -97,6 +97,10 @@ ANALYSE = Step("pydpend analyse", "pydpend.analyse.analyse")
 """Does everything from films to a report."""
 FIT = Step("pydpend fit", "dp.fit_damping")
 """Fits the damping."""
+PREDICT = Step("pydpend predict", "pydpend.damping.predict")
+"""Predicts a recording from a fit of others."""
+COMPARE = Step("pydpend compare", "dp.compare")
+"""Compares a film's angles with an encoder's."""
 FILM_TRUTH = Step("tracker film --truth", "dp.film(truth=...)")
 """Writes the truth of a film that is made."""
 

@@ -27,6 +27,7 @@ from pydpend import _tracker
 from pydpend.columns import PARQUET_FAULTS
 from pydpend.errors import FILM_TRUTH, FilmError, fault
 from pydpend.output import AnyPath
+from pydpend.tabular import TableResult
 
 StrPath: TypeAlias = AnyPath
 Codec: TypeAlias = Literal["h264", "ffv1", "mjpeg", "raw"]
@@ -36,7 +37,7 @@ PRESETS = ("clean", "noisy", "dim", "glints", "late", "dropout", "occluded", "fa
 
 
 @dataclass(frozen=True, eq=False)
-class Truth:
+class Truth(TableResult):
     """What is true of a film of T frames, N markers and L links.
 
     Attributes
@@ -59,6 +60,29 @@ class Truth:
     phi_rad: NDArray[np.float64]
     nodes: tuple[str, ...]
     bodies: tuple[str, ...]
+
+    def to_columns(self) -> dict[str, NDArray[Any]]:
+        """The truth as columns of a table, as `Film.write` writes it.
+
+        Returns
+        -------
+        dict of str to ndarray, each of shape (T N,)
+            ``frame``, ``time_s``, ``node``, ``body``, ``x_px``, ``y_px``, ``visible`` and the angles ``phi1_rad``, ...,
+            a row for each frame and marker.
+        """
+        frames, markers = self.visible.shape
+        out: dict[str, NDArray[Any]] = {
+            "frame": np.repeat(np.arange(frames), markers),
+            "time_s": np.repeat(self.t_s, markers),
+            "node": np.tile(np.array(self.nodes, dtype=object), frames),
+            "body": np.tile(np.array(self.bodies, dtype=object), frames),
+            "x_px": self.xy_px[:, :, 0].ravel(),
+            "y_px": self.xy_px[:, :, 1].ravel(),
+            "visible": self.visible.ravel(),
+        }
+        return out | {
+            f"phi{k + 1}_rad": np.repeat(self.phi_rad[:, k], markers) for k in range(self.phi_rad.shape[1])
+        }
 
 
 class Film:

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from pydpend import _tracker
 from pydpend.errors import SimulationError, fault
 from pydpend.model import Damping, Model, parameters
+from pydpend.tabular import TableResult, by_link
 
 Array = npt.NDArray[np.float64]
 
@@ -71,7 +72,7 @@ def modes(model: Model, damping: Damping | None = None) -> Modes:
 
 
 @dataclass(frozen=True, eq=False)
-class Section:
+class Section(TableResult):
     """K passages of a link through an angle.
 
     Attributes
@@ -87,6 +88,10 @@ class Section:
     t_s: Array
     phi_rad: Array
     w_rad_s: Array
+
+    def to_columns(self) -> dict[str, Array]:
+        """The passages as columns of a table: ``time_s``, ``phi1_rad``, ``w1_rad_s``, ..., each (K,)."""
+        return by_link({"time_s": self.t_s, "phi#_rad": self.phi_rad, "w#_rad_s": self.w_rad_s})
 
 
 def poincare(

@@ -21,6 +21,7 @@ from pydpend.tabular import html_table
 
 if TYPE_CHECKING:
     import pandas as pd
+    import pyarrow as pa
 
 MISSING, SEEN, REACQUIRED, AMBIGUOUS, UNDECODED = range(5)
 """Numbers in `Nodes.status`: not seen; seen; the first frame back; may be it, but another name is possible; the
@@ -136,7 +137,13 @@ class Rig:
         -------
         Rig
             The rig.
+
+        Raises
+        ------
+        RigError
+            Naming what is wrong.
         """
+        _tracker.rig_toml(text)  # refuses what is no rig
         return _rig(json.loads(text))
 
     def to_dict(self) -> dict[str, Any]:
@@ -377,10 +384,20 @@ class Nodes:
         pandas.DataFrame
             One row per frame and node, in the columns of the file (docs/conventions.md); names are categories.
         """
+        frame: pd.DataFrame = self.to_arrow().to_pandas()
+        return frame
+
+    def to_arrow(self) -> pa.Table:
+        """The table as Arrow has it.
+
+        Returns
+        -------
+        pyarrow.Table
+            One row per frame and node, in the columns of the file (docs/conventions.md).
+        """
         import pyarrow as pa
 
-        frame: pd.DataFrame = pa.table(self).to_pandas()
-        return frame
+        return pa.table(self)
 
     def __arrow_c_stream__(self, requested_schema: object | None = None) -> object:
         """The table as an Arrow stream: `pyarrow.table(nodes)`, `polars.DataFrame(nodes)`.

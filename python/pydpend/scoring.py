@@ -5,15 +5,18 @@ from __future__ import annotations
 import json
 import os
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 from pydpend import _tracker
+from pydpend.documents import Table
+from pydpend.errors import TableError
 from pydpend.filming import Film, StrPath
+from pydpend.json_text import JsonResult
 from pydpend.nodes import Nodes, read_nodes
 
 
 @dataclass(frozen=True)
-class Score:
+class Score(JsonResult):
     """A node table against the truth. A place agrees with a marker when it is within the limit of it.
 
     Attributes
@@ -42,6 +45,9 @@ class Score:
         Everything, as ``tracker score --json`` prints it.
     """
 
+    _error: ClassVar = TableError
+    _source: ClassVar = "the score"
+
     frames: int
     frames_missing: int
     coverage: float
@@ -62,18 +68,42 @@ class Score:
         dict
             `details`: numbers, texts, lists and tables; None for what is not known.
         """
-        value: dict[str, Any] = json.loads(self.to_json())
-        return value
+        return self.details
 
-    def to_json(self) -> str:
-        """The score as JSON.
+    @classmethod
+    def of_table(cls, table: Table) -> Score:
+        """The score from what ``tracker score --json`` printed, read already.
+
+        Parameters
+        ----------
+        table : pydpend.documents.Table
+            What `to_json` gave.
 
         Returns
         -------
-        str
-            `to_dict` as text.
+        Score
+            The score.
+
+        Raises
+        ------
+        TableError
+            Naming the key that is missing or not what it must be.
         """
-        return json.dumps(self.details, indent=2)
+        return cls(
+            table.whole("frames"),
+            table.whole("frames_missing"),
+            table.number_or_nan("coverage"),
+            table.whole("wrong"),
+            table.whole("switches"),
+            table.whole("false_positives"),
+            rms_px=(table.number_or_nan("rms_x_px"), table.number_or_nan("rms_y_px")),
+            error_over_sigma=table.number("error_over_sigma") if "error_over_sigma" in table else None,
+            angle_rms_deg={a.text("body"): a.number_or_nan("rms_deg") for a in table.tables("angles")},
+            matches={
+                m.text("node"): m.text("truth") if "truth" in m else None for m in table.tables("matches")
+            },
+            details=table.values,
+        )
 
 
 def score(nodes: Nodes | StrPath, truth: Film | StrPath, limit_px: float = 2.0) -> Score:
@@ -115,21 +145,4 @@ def score(nodes: Nodes | StrPath, truth: Film | StrPath, limit_px: float = 2.0) 
             limit_px,
         )
     )
-    return Score(
-        frames=found["frames"],
-        frames_missing=found["frames_missing"],
-        coverage=found["coverage"],
-        wrong=found["wrong"],
-        switches=found["switches"],
-        false_positives=found["false_positives"],
-        rms_px=(_number(found["rms_x_px"]), _number(found["rms_y_px"])),
-        error_over_sigma=found["error_over_sigma"],
-        angle_rms_deg={a["body"]: _number(a["rms_deg"]) for a in found["angles"]},
-        matches={m["node"]: m["truth"] for m in found["matches"]},
-        details=found,
-    )
-
-
-def _number(value: float | None) -> float:
-    """JSON has no NaN; what is not known comes as null."""
-    return float("nan") if value is None else value
+    return Score.of_table(Table(found, "the score", TableError))

@@ -197,7 +197,7 @@ def simulate(
 
 
 @dataclass(frozen=True, eq=False)
-class Ensemble:
+class Ensemble(TableResult):
     """K motions sampled at the same T times.
 
     Attributes
@@ -219,6 +219,15 @@ class Ensemble:
     w_rad_s: Array
     energy_j: Array
     at_rest: npt.NDArray[np.bool_]
+
+    def to_columns(self) -> dict[str, npt.NDArray[Any]]:
+        """The motions one after the other as columns of a table, a row for each motion and time, (K T,)."""
+        motions, times = self.energy_j.shape
+        both = {"phi#_rad": self.phi_rad.reshape(-1, 2), "w#_rad_s": self.w_rad_s.reshape(-1, 2)}
+        rows: dict[str, npt.NDArray[Any]] = {"motion": np.repeat(np.arange(motions), times)}
+        return rows | by_link(
+            {"time_s": np.tile(self.t_s, motions)} | both | {"energy_j": self.energy_j.ravel()}
+        )
 
 
 def simulate_many(

@@ -21,6 +21,7 @@ from pydpend.errors import ArgumentError, fault
 from pydpend.live import aspect_text
 from pydpend.nodes import Nodes, Rig, nodes_of, read_nodes
 from pydpend.output import AnyPath
+from pydpend.tabular import TableResult
 
 Path: TypeAlias = AnyPath
 
@@ -299,7 +300,7 @@ def setup(
 
 
 @dataclass(frozen=True, eq=False)
-class OverlayFilm:
+class OverlayFilm(TableResult):
     """A film of K pictures with nodes drawn into their recording.
 
     Attributes
@@ -318,6 +319,16 @@ class OverlayFilm:
     frame: NDArray[np.int64]
     t_s: NDArray[np.float64]
     play_fps: int
+
+    def to_columns(self) -> dict[str, NDArray[Any]]:
+        """The pictures as columns of a table, a row each.
+
+        Returns
+        -------
+        dict of str to ndarray, each of shape (K,)
+            ``frame`` and ``time_s``.
+        """
+        return {"frame": self.frame, "time_s": self.t_s}
 
 
 def overlay(

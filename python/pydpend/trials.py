@@ -3,49 +3,90 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import asdict, dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
 from pydpend.damping import DampingFit, fit_damping
-from pydpend.damping.result import clean
 from pydpend.damping.shooting import Progress
-from pydpend.errors import FitError, fault
+from pydpend.documents import Table
+from pydpend.errors import FIT, FitError, fault
 from pydpend.fit_options import FitOptions
-from pydpend.json_text import JsonResult
+from pydpend.json_text import JsonResult, plain
 from pydpend.kinematics import LinkAngles
 from pydpend.model import Model
+from pydpend.tabular import TableResult
 
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
 class Spread:
-    """One coefficient or ratio over the trials."""
+    """One coefficient or ratio over R recordings.
+
+    Attributes
+    ----------
+    values, sigmas : ndarray of float, shape (R,)
+        Each recording's value and its own standard error, in `unit`.
+    mean, sigma : float
+        Mean, weighted with the spread between recordings (random effects, DerSimonian-Laird), and its standard error.
+    spread : float
+        Standard deviation between recordings beyond their own errors.
+    deviation : float
+        Plain standard deviation of the values, as in Table 6; NaN of a single one.
+    p_value : float
+        Probability of recordings this different if they had one common value; NaN of a single one.
+    unit : str
+        Unit; ``"1"`` for a ratio.
+    """
 
     values: Floats
-    """(R,)"""
     sigmas: Floats
-    """(R,), each trial's own standard error."""
     mean: float
-    """Weighted with the spread between trials (random effects, DerSimonian-Laird)."""
     sigma: float
-    """Standard error of the mean, spread included."""
     spread: float
-    """Standard deviation between trials beyond their own errors."""
     deviation: float
-    """Plain standard deviation of the values, as in Table 6."""
     p_value: float
-    """Probability of trials this different if they had one common value."""
     unit: str
+
+    def to_dict(self) -> dict[str, Any]:
+        """As in ``trials.json``."""
+        out: dict[str, Any] = plain(asdict(self))
+        return out
+
+    @classmethod
+    def of_table(cls, table: Table) -> Spread:
+        """The inverse of `to_dict`."""
+        values, sigmas = table.array("values", -1), table.array("sigmas", -1)
+        if values.shape != sigmas.shape:
+            table.refuse("sigmas", f"{sigmas.size} uncertainties for {values.size} values")
+        numbers = (table.number("mean"), table.number("sigma"), table.number_or_nan("spread"))
+        chances = (table.number_or_nan("deviation"), table.number_or_nan("p_value"))
+        return cls(values, sigmas, *numbers, *chances, table.text("unit"))
 
 
 @dataclass(frozen=True, eq=False)
-class Trials(JsonResult):
-    """Fits of several recordings."""
+class Trials(JsonResult, TableResult):
+    """Fits of several recordings of one pendulum.
+
+    Attributes
+    ----------
+    each : tuple of DampingFit
+        The fit of each recording alone.
+    joint : DampingFit
+        The fit of all together.
+    spreads : dict of str to Spread
+        Each coefficient and ratio over the recordings.
+    message : str
+        Whether they agree, in words.
+    """
+
+    _error: ClassVar = FitError
+    _source: ClassVar = "trials.json"
+    _advice: ClassVar = "Give the trials.json that " + FIT + " wrote"
 
     each: tuple[DampingFit, ...]
     joint: DampingFit
@@ -53,26 +94,64 @@ class Trials(JsonResult):
     message: str
 
     def to_dict(self) -> dict[str, Any]:
-        """Numbers only."""
-        out: dict[str, Any] = clean(
-            {
-                "message": self.message,
-                "coefficients": {
-                    k: {
-                        "values": s.values,
-                        "sigmas": s.sigmas,
-                        "mean": s.mean,
-                        "sigma": s.sigma,
-                        "spread": s.spread,
-                        "deviation": s.deviation,
-                        "p_value": s.p_value,
-                        "unit": s.unit,
-                    }
-                    for k, s in self.spreads.items()
-                },
-            }
+        """The trials as plain values: ``trials.json``.
+
+        Returns
+        -------
+        dict
+            ``message``, ``coefficients`` over the recordings, and the fits (``joint``, ``each``) as in ``fit.json``.
+        """
+        return {
+            "message": self.message,
+            "coefficients": {name: spread.to_dict() for name, spread in self.spreads.items()},
+            "joint": self.joint.to_dict(),
+            "each": [fit.to_dict() for fit in self.each],
+        }
+
+    @classmethod
+    def of_table(cls, table: Table) -> Trials:
+        """The trials from a ``trials.json`` that is read already. The fits have no energies and residuals.
+
+        Parameters
+        ----------
+        table : pydpend.documents.Table
+            What `to_json` gave.
+
+        Returns
+        -------
+        Trials
+            The trials.
+
+        Raises
+        ------
+        FitError
+            Naming the key that is missing or not what it must be.
+        """
+        given = table.table("coefficients")
+        return cls(
+            tuple(DampingFit.of_table(fit) for fit in table.tables("each")),
+            DampingFit.of_table(table.table("joint")),
+            {name: Spread.of_table(given.table(name)) for name in given},
+            table.text("message"),
         )
-        return out
+
+    def to_columns(self) -> dict[str, NDArray[Any]]:
+        """The coefficients over the recordings as columns of a table, a row each.
+
+        Returns
+        -------
+        dict of str to ndarray
+            ``name``, ``value1``, ``sigma1`` and so on of each recording, ``mean``, ``sigma``, ``spread``,
+            ``deviation``, ``p_value`` and ``unit``.
+        """
+        found = list(self.spreads.values())
+        out: dict[str, NDArray[Any]] = {"name": np.array(list(self.spreads), dtype=object)}
+        for k in range(len(self.each)):
+            out[f"value{k + 1}"] = np.array([s.values[k] for s in found])
+            out[f"sigma{k + 1}"] = np.array([s.sigmas[k] for s in found])
+        for name in ("mean", "sigma", "spread", "deviation", "p_value"):
+            out[name] = np.array([getattr(s, name) for s in found])
+        return out | {"unit": np.array([s.unit for s in found], dtype=object)}
 
 
 def combine(values: Floats, sigmas: Floats, unit: str) -> Spread:

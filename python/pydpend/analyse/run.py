@@ -12,13 +12,14 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from pydpend.analyse import provenance, stages
-from pydpend.analyse.folder import UNFINISHED, Digests, RunFolder, digest, write_whole
+from pydpend.analyse.folder import UNFINISHED, Digests, RunFolder, RunFolderError, digest, write_whole
 from pydpend.analyse.options import Options, check_files
 from pydpend.analyse.recordings import Recording, check_options, recordings
 from pydpend.analyse.state import Progress, RunState, StageResult, StageState, Started, Tell
+from pydpend.documents import Table
 from pydpend.errors import OptionError, PydpendError, Setting, fault
 from pydpend.json_text import JsonResult
 from pydpend.output import keeping
@@ -49,6 +50,9 @@ class Stage:
 class Outcome(JsonResult):
     """What a run came to."""
 
+    _error: ClassVar = RunFolderError
+    _source: ClassVar = "the outcome of a run"
+
     folder: Path
     status: RunState
     message: str
@@ -70,6 +74,27 @@ class Outcome(JsonResult):
             "seconds": self.seconds,
             "report": str(self.folder / PAGE),
         }
+
+    @classmethod
+    def of_table(cls, table: Table) -> Outcome:
+        """The inverse of `to_dict`, of a document that is read already."""
+        status, stages, why, took = (
+            table.text("status"),
+            *(table.table(k) for k in ("stages", "reasons", "seconds")),
+        )
+        if status not in list(RunState):
+            table.refuse("status", f"{status!r} is not known")
+        for name in stages:
+            if stages.text(name) not in list(StageState):
+                stages.refuse(name, f"{stages.text(name)!r} is not known")
+        return cls(
+            Path(table.text("folder")),
+            RunState(status),
+            table.text("message"),
+            {name: StageState(stages.text(name)) for name in stages},
+            {name: why.text(name) for name in why},
+            {name: took.number(name) for name in took},
+        )
 
 
 def plan(options: Options, folder: Path, digests: Digests | None = None) -> list[Stage]:

@@ -6,8 +6,8 @@ from pydpend.damping.compare import compare_terms
 from pydpend.damping.fit import fit_damping
 from pydpend.damping.maps import Maps
 from pydpend.damping.prediction import Prediction, Window, predict
-from pydpend.damping.result import (
-    DampingFit,
+from pydpend.damping.result import DampingFit
+from pydpend.damping.result_parts import (
     EnergyCurve,
     Estimate,
     Identifiability,

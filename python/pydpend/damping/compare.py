@@ -15,7 +15,7 @@ from pydpend.coefficients import FULL, parameters, ratios_of
 from pydpend.damping import shooting
 from pydpend.damping.prediction import predict, split
 from pydpend.damping.recording import Recording
-from pydpend.damping.result import Term
+from pydpend.damping.result_parts import Term
 from pydpend.damping.shooting import Progress
 from pydpend.damping.trajectory import FLOOR, HUBER, SEGMENT_S, length_of
 from pydpend.damping.uncertainty import covariance

@@ -16,7 +16,8 @@ from pydpend.damping.plausible import check_followed, modes_hz
 from pydpend.damping.prediction import held_out
 from pydpend.damping.profile import fit_energy
 from pydpend.damping.recording import Recording, check_distinct, prepare
-from pydpend.damping.result import DampingFit, EnergyCurve, estimates
+from pydpend.damping.result import DampingFit
+from pydpend.damping.result_parts import EnergyCurve, estimates
 from pydpend.damping.shares import shares
 from pydpend.damping.shooting import Progress
 from pydpend.damping.single import reduced
@@ -142,7 +143,9 @@ def _energy(
     path = shooting.trace(tracks, smoothed.segments, constants)
     freed = fit_ten(tracks, path, few, fit, model) if ten else None
     curves = tuple(
-        EnergyCurve(p.t_s, p.energy_j, e0 - p.unit_works @ fit.values, p.unit_works * fit.values)
+        EnergyCurve(
+            p.t_s, p.energy_j, e0 - p.unit_works @ fit.values, p.unit_works * fit.values, tuple(names)
+        )
         for p, e0 in zip(profiles, fit.e0_j, strict=True)
     )
     excess = np.max([p.rectification for p in profiles], axis=0)

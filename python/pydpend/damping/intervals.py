@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from pydpend.coefficients import FULL, unit
 from pydpend.damping import shooting
-from pydpend.damping.result import Estimate, Interval
+from pydpend.damping.result_parts import Estimate, Interval
 from pydpend.damping.shooting import Progress, Solution, Track
 from pydpend.errors import FitError
 from pydpend.fit_status import FitStatus

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +17,12 @@ from numpy.typing import NDArray
 from pydpend.damping import shooting
 from pydpend.damping.maps import Maps, corrected
 from pydpend.damping.recording import Recording
-from pydpend.damping.result import DampingFit, clean
+from pydpend.damping.result import DampingFit
 from pydpend.damping.shooting import Segments, Track
-from pydpend.errors import FitError, Setting, fault
-from pydpend.json_text import JsonResult
+from pydpend.documents import Table
+from pydpend.errors import PREDICT, FitError, Setting, fault
+from pydpend.json_text import JsonResult, plain
+from pydpend.tabular import TableResult
 
 Floats = NDArray[np.float64]
 
@@ -62,14 +64,20 @@ class Window:
 
     def to_dict(self) -> dict[str, Any]:
         """As in ``predict.json``."""
-        out: dict[str, Any] = clean(
+        out: dict[str, Any] = plain(
             {"rms_deg": list(self.rms_deg), "median_deg": list(self.median_deg), "n": self.n}
         )
         return out
 
+    @classmethod
+    def of_table(cls, table: Table) -> Window:
+        """The inverse of `to_dict`."""
+        rms, median = (tuple(table.array(key, -1).tolist()) for key in ("rms_deg", "median_deg"))
+        return cls(rms, median, table.whole("n"))
+
 
 @dataclass(frozen=True, eq=False)
-class Prediction(JsonResult):
+class Prediction(JsonResult, TableResult):
     """How well a fit predicts one recording that it has not seen.
 
     In a window only the initial state is fitted; a forecast fits the state to the past half second alone and looks
@@ -92,6 +100,10 @@ class Prediction(JsonResult):
     message : str
         Free decay and errors in words.
     """
+
+    _error: ClassVar = FitError
+    _source: ClassVar = "predict.json"
+    _advice: ClassVar = "Give the predict.json that " + PREDICT + " wrote"
 
     name: str
     in_window: dict[str, Window]
@@ -119,9 +131,61 @@ class Prediction(JsonResult):
             "forecast": group(self.forecast),
             "forecast_calm": group(self.calm),
             "zeros_deg": [float(np.degrees(z)) for z in self.zeros_rad],
+            "zeros_rad": list(self.zeros_rad),
+            "windows": {k: plain(rows) for k, rows in self.rows.items()},
             "message": self.message,
         }
         return out
+
+    @classmethod
+    def of_table(cls, table: Table) -> Prediction:
+        """The prediction from a ``predict.json`` that is read already.
+
+        Parameters
+        ----------
+        table : pydpend.documents.Table
+            What `to_json` gave.
+
+        Returns
+        -------
+        Prediction
+            The prediction.
+
+        Raises
+        ------
+        FitError
+            Naming the key that is missing or not what it must be.
+        """
+
+        def group(key: str) -> dict[str, Window]:
+            given = table.table(key)
+            return {window: Window.of_table(given.table(window)) for window in given}
+
+        rows = table.table("windows")
+        upper, lower = table.array("zeros_rad", 2).tolist()
+        return cls(
+            table.text("name"),
+            group("in_window"),
+            group("forecast"),
+            group("forecast_calm"),
+            (upper, lower),
+            {window: rows.array(window, -1, -1) for window in rows},
+            table.text("message"),
+        )
+
+    def to_columns(self) -> dict[str, Floats]:
+        """The windows as columns of a table: ``windows.csv``.
+
+        Returns
+        -------
+        dict of str to ndarray, each of shape (n,)
+            ``window_s`` and ``start_s`` of each window, and the root mean square of each link (``phi1_rms_deg``).
+        """
+        found = [(float(window), *row) for window, rows in self.rows.items() for row in rows]
+        links = next((rows.shape[1] - 1 for rows in self.rows.values()), 2)
+        table = np.array(found, dtype=np.float64).reshape(-1, 2 + links)
+        names = ("window_s", "start_s", "phi1_rms_deg", "phi2_rms_deg")[: 2 + links]
+        return dict(zip(names, table.T, strict=True))
 
 
 def predict(

@@ -3,314 +3,32 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass, field
-from typing import Any
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pydpend import _tracker
 from pydpend.coefficients import FULL, RATIOS, unit
-from pydpend.documents import Table, parse_json
+from pydpend.damping.result_parts import (
+    SHORT_S,
+    EnergyCurve,
+    Estimate,
+    Identifiability,
+    Interval,
+    Residuals,
+    TenCoefficients,
+    Term,
+)
+from pydpend.documents import Table
 from pydpend.errors import FIT, FitError
 from pydpend.fit_options import METHODS
-from pydpend.fit_status import FitStatus, Verdict
-from pydpend.json_text import JsonResult
+from pydpend.fit_status import FitStatus
+from pydpend.json_text import JsonResult, plain
 from pydpend.tabular import TableResult, html_table
 
 Floats = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """A number with its standard uncertainty and unit.
-
-    Attributes
-    ----------
-    value, sigma : float
-        The number and its standard uncertainty, in `unit`.
-    unit : str
-        Unit; ``"1"`` for a ratio or a share.
-    """
-
-    value: float
-    sigma: float
-    unit: str
-
-    def to_dict(self) -> dict[str, Any]:
-        """Value, sigma and unit; null where not finite."""
-        return {"value": number(self.value), "sigma": number(self.sigma), "unit": self.unit}
-
-    @classmethod
-    def of_table(cls, table: Table) -> Estimate:
-        """The inverse of `to_dict`."""
-        return cls(table.number("value"), table.number_or_nan("sigma"), table.text("unit"))
-
-
-def estimates(
-    names: Iterable[str], values: Mapping[str, float], sigma: Mapping[str, float]
-) -> dict[str, Estimate]:
-    """Coefficients or ratios with their units; without a standard error in ``sigma`` one was held fixed: 0."""
-    return {n: Estimate(float(values[n]), float(sigma.get(n, 0.0)), unit(n)) for n in names}
-
-
-@dataclass(frozen=True, eq=False)
-class EnergyCurve:
-    """Energy of one recording's motion at T times and what the laws take out of it (Fig. 19).
-
-    Attributes
-    ----------
-    t_s : ndarray of float, shape (T,)
-        Time, s.
-    energy_j : ndarray of float, shape (T,)
-        Energy (Eq. 22), J.
-    model_j : ndarray of float, shape (T,)
-        Initial energy minus the works of all laws, J.
-    works_j : ndarray of float, shape (T, C)
-        Energy taken out by each coefficient since the start, J, in the order of the fit's coefficients.
-    """
-
-    t_s: Floats
-    energy_j: Floats
-    model_j: Floats
-    works_j: Floats
-
-
-@dataclass(frozen=True, eq=False)
-class Residuals:
-    """What is left of one recording's angles when the fitted motion, its zeros and angle maps are taken off.
-
-    Attributes
-    ----------
-    t_s : ndarray of float, shape (T,)
-        Time of the samples that were fitted, s.
-    residual_rad : ndarray of float, shape (T, L)
-        Measured minus fitted, rad; NaN where not seen.
-    sigma_rad : ndarray of float, shape (T, L)
-        Standard deviation that each was weighted by, rad.
-    """
-
-    t_s: Floats
-    residual_rad: Floats
-    sigma_rad: Floats
-
-
-SHORT_S = 20.0
-"""A motion shorter than this does not separate laws that differ by their dependence on speed or load, s."""
-
-
-@dataclass(frozen=True)
-class Identifiability:
-    """What the data determine and what they do not.
-
-    Attributes
-    ----------
-    condition : float
-        Condition number of the correlation-scaled information matrix of coefficients and ratios.
-    correlations : dict of str to float
-        ``"a/b"``: correlation, for pairs beyond 0.9.
-    duration_s : float
-        Length of the motion that was fitted, s.
-    remarks : tuple of str
-        What the numbers say of single coefficients and of all, in words.
-    """
-
-    condition: float
-    correlations: dict[str, float]
-    duration_s: float
-    remarks: tuple[str, ...]
-
-    @property
-    def too_short(self) -> bool:
-        """Whether the motion lasts too short a time to tell laws of like shape apart."""
-        return self.duration_s < SHORT_S
-
-    @property
-    def warning(self) -> str:
-        """What a motion that is `too_short` means, in words; empty for a longer one."""
-        if not self.too_short:
-            return ""
-        return (
-            f"The motion fitted lasts {self.duration_s:.1f} s: too short to separate laws that differ by their "
-            "dependence on speed or load; trust the shares and the prediction, not single coefficients."
-        )
-
-    @property
-    def sentences(self) -> tuple[str, ...]:
-        """Everything in words."""
-        return ((self.warning,) if self.too_short else ()) + self.remarks
-
-
-@dataclass(frozen=True)
-class Term:
-    """What the data say of one term.
-
-    Attributes
-    ----------
-    name : str
-        Its coefficient.
-    gain : float
-        Twice the gain in log-likelihood that it brings beside all others, over the residuals' chi-square.
-    prediction : float
-        How much worse the rest is predicted without it: change of the mean square, relative.
-    prediction_z : float
-        The same over its standard error, from the windows.
-    partner : str
-        The term it is most correlated with.
-    correlation : float
-        Their correlation.
-    verdict : pydpend.fit_status.Verdict
-        What follows from these numbers.
-    """
-
-    name: str
-    gain: float
-    prediction: float
-    prediction_z: float
-    partner: str
-    correlation: float
-    verdict: Verdict
-
-    def to_dict(self) -> dict[str, Any]:
-        """As in ``fit.json``."""
-        return {**asdict(self), "verdict": str(self.verdict), "sentence": self.sentence}
-
-    @classmethod
-    def of_table(cls, name: str, table: Table) -> Term:
-        """The inverse of `to_dict`."""
-        verdict = table.text("verdict")
-        if verdict not in list(Verdict):
-            table.refuse("verdict", f"{verdict!r} is not known")
-        return cls(
-            name,
-            table.number("gain"),
-            table.number("prediction"),
-            table.number("prediction_z"),
-            table.text("partner"),
-            table.number("correlation"),
-            Verdict(verdict),
-        )
-
-    @property
-    def sentence(self) -> str:
-        """The verdict in words."""
-        said = f"is {self.verdict.words}"
-        if self.verdict is Verdict.INSEPARABLE:
-            said = f"{self.verdict.words} from {self.partner} (correlation {self.correlation:+.2f})"
-        return (
-            f"{self.name} {said}: without it twice the log-likelihood falls by {self.gain:.1f} and the mean square "
-            f"of the prediction of unused data changes by {100 * self.prediction:+.2f} % "
-            f"({self.prediction_z:+.1f} standard errors)"
-        )
-
-
-@dataclass(frozen=True)
-class Interval:
-    """A coefficient's 95 % interval by profile likelihood (`damping.intervals`).
-
-    Attributes
-    ----------
-    low, high : float
-        Its ends, in `unit`: low is 0 where the data do not exclude that; NaN for an end that was not found.
-    unit : str
-        Unit of the coefficient.
-    values : tuple of float
-        Values at which everything else was fitted again, rising; the estimate is one.
-    rises : tuple of float
-        How much twice the negative log-likelihood is above the estimate's, in units in which a standard error is 1.
-    note : str
-        What should be known of an end; empty if nothing.
-    """
-
-    low: float
-    high: float
-    unit: str
-    values: tuple[float, ...]
-    rises: tuple[float, ...]
-    note: str
-
-    def to_dict(self) -> dict[str, Any]:
-        """As in ``fit.json``; null for an end that was not found."""
-        return asdict(self)
-
-    @classmethod
-    def of_table(cls, table: Table) -> Interval:
-        """The inverse of `to_dict`."""
-        values, rises = (tuple(table.array(key, -1).tolist()) for key in ("values", "rises"))
-        ends = (table.number_or_nan("low"), table.number_or_nan("high"))
-        return cls(*ends, table.text("unit"), values, rises, table.text("note"))
-
-    def sentence(self, name: str) -> str:
-        """The interval in words."""
-        ends = " to ".join(f"{v:.4e}" if math.isfinite(v) else "?" for v in (self.low, self.high))
-        said = f"{name} is within {ends} {self.unit} (95 %, profile likelihood)"
-        return f"{said}: {self.note}" if self.note else said
-
-
-@dataclass(frozen=True)
-class TenCoefficients:
-    """The paper's ten (Table 6), and how little they mean.
-
-    Attributes
-    ----------
-    values : dict of str to Estimate
-        ``mu_v1`` ... ``mu_q2`` and ``mu_c1_1`` (first of joint 1) ... ``mu_c3_2``; the standard errors are those of ten
-        free ones.
-    rmu : dict of str to Estimate
-        ``rmu1``, ``rmu2``, m: what the three of each joint dissipate together, as r mu.
-    weights : dict of str to list of float
-        With which the three mu_c of a joint add up to it.
-    rank : int
-        Of the ten, how many combinations the energies determine.
-    condition : float
-        Condition number of the ten works, scaled.
-    """
-
-    values: dict[str, Estimate]
-    rmu: dict[str, Estimate]
-    weights: dict[str, list[float]]
-    rank: int
-    condition: float
-
-    def to_dict(self) -> dict[str, Any]:
-        """As in ``fit.json``."""
-        return {
-            "values": {k: v.to_dict() for k, v in self.values.items()},
-            "rmu": {k: v.to_dict() for k, v in self.rmu.items()},
-            "weights": self.weights,
-            "rank": self.rank,
-            "condition": self.condition,
-            "warning": self.warning,
-        }
-
-    @classmethod
-    def of_table(cls, table: Table) -> TenCoefficients:
-        """The inverse of `to_dict`."""
-        values, rmu, weights = (table.table(key) for key in ("values", "rmu", "weights"))
-        return cls(
-            {name: Estimate.of_table(values.table(name)) for name in values},
-            {name: Estimate.of_table(rmu.table(name)) for name in rmu},
-            {name: weights.array(name, 3).tolist() for name in weights},
-            table.whole("rank"),
-            table.number("condition"),
-        )
-
-    @property
-    def warning(self) -> str:
-        """What may not be believed, in words."""
-        sums = "; ".join(
-            f"{name} = {' '.join(f'{w:+.3g} mu_c{i}_{name[-1]}' for i, w in enumerate(self.weights[name], 1))} "
-            f"= {e.value:.3g} +- {e.sigma:.1g} m"
-            for name, e in self.rmu.items()
-        )
-        return (
-            f"of the ten coefficients these energies determine {self.rank} combinations (condition number "
-            f"{self.condition:.2g}). The six mu_c are r mu of two joints times known masses and lengths, so only these "
-            f"sums are physical: {sums}. The split of a joint's sum among its three is arbitrary: it may depart from "
-            "the model's ratios by noise or where the model is wrong, and where the energies do not determine it, the "
-            "split nearest to these ratios is given. Do not compare single mu_c."
-        )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -375,6 +93,10 @@ class DampingFit(JsonResult, TableResult):
     notes : tuple of str
         What was left out or should be known.
     """
+
+    _error: ClassVar = FitError
+    _source: ClassVar = "fit.json"
+    _advice: ClassVar = "Give the fit.json that " + FIT + " wrote"
 
     method: str
     status: FitStatus
@@ -473,19 +195,17 @@ class DampingFit(JsonResult, TableResult):
             "ten_coefficients": None if self.ten is None else self.ten.to_dict(),
             "notes": list(self.notes),
         }
-        cleaned: dict[str, Any] = clean(out)
-        return cleaned
+        values: dict[str, Any] = plain(out)
+        return values
 
     @classmethod
-    def from_json(cls, text: str, source: str = "fit.json") -> DampingFit:
-        """A fit from the text of its ``fit.json``. Energies and residuals are in tables of their own, and empty here.
+    def of_table(cls, table: Table) -> DampingFit:
+        """The fit from a ``fit.json`` that is read already. Energies and residuals are empty.
 
         Parameters
         ----------
-        text : str
+        table : pydpend.documents.Table
             What `to_json` gave.
-        source : str
-            Name of the text, for messages.
 
         Returns
         -------
@@ -495,55 +215,34 @@ class DampingFit(JsonResult, TableResult):
         Raises
         ------
         FitError
-            Naming the key, for a text that is none.
+            Naming the key that is missing or not what it must be.
         """
-        return cls.of_table(parse_json(text, source, FitError, "Give the fit.json that " + FIT + " wrote"))
-
-    @classmethod
-    def of_table(cls, given: Table) -> DampingFit:
-        """A fit from its document, as `from_json`.
-
-        Parameters
-        ----------
-        given : pydpend.documents.Table
-            What was read of a ``fit.json``.
-
-        Returns
-        -------
-        DampingFit
-            The fit.
-
-        Raises
-        ------
-        FitError
-            Naming the key, for a document that is none.
-        """
-        status, method = given.text("status"), given.text("method")
+        status, method = table.text("status"), table.text("method")
         if status not in list(FitStatus):
-            given.refuse("status", f"{status!r} is not known")
+            table.refuse("status", f"{status!r} is not known")
         if method not in METHODS:
-            given.refuse("method", f"{method!r} is not known")
-        coefficients, ratios = given.table("coefficients"), given.table("ratios")
+            table.refuse("method", f"{method!r} is not known")
+        coefficients, ratios = table.table("coefficients"), table.table("ratios")
         sigmas, shares, told = (
-            given.table("ratio_sigmas"),
-            given.table("shares"),
-            given.table("identifiability"),
+            table.table("ratio_sigmas"),
+            table.table("shares"),
+            table.table("identifiability"),
         )
         for name in (*coefficients, *ratios):
             if name not in (*FULL, *RATIOS):
-                given.refuse("coefficients", f"{name} is no coefficient and no ratio")
-        names = given.table("covariance").texts("names")
-        terms, intervals, numbers = (given.table(key) for key in ("terms", "intervals", "slack"))
-        correlations, parameters = told.table("correlations"), given.table("parameters")
-        prediction = given.table("prediction")
+                table.refuse("coefficients", f"{name} is no coefficient and no ratio")
+        names = table.table("covariance").texts("names")
+        terms, intervals, numbers = (table.table(key) for key in ("terms", "intervals", "slack"))
+        correlations, parameters = told.table("correlations"), table.table("parameters")
+        prediction = table.table("prediction")
         sentences = told.texts("sentences")
         short = told.number("duration_s") < SHORT_S
         return cls(
             method=method,
             status=FitStatus(status),
-            message=given.text("message"),
-            chi2=given.number_or_nan("chi2"),
-            n=given.whole("n"),
+            message=table.text("message"),
+            chi2=table.number_or_nan("chi2"),
+            n=table.whole("n"),
             coefficients={n: Estimate.of_table(coefficients.table(n)) for n in coefficients},
             ratios={n: Estimate(ratios.number(n), sigmas.number_or_nan(n), unit(n)) for n in ratios},
             shares={
@@ -558,21 +257,21 @@ class DampingFit(JsonResult, TableResult):
             ),
             parameters={n: parameters.number(n) for n in parameters},
             names=names,
-            covariance=given.table("covariance").array("matrix", len(names), len(names)),
-            inputs=tuple(_input_of(table) for table in given.tables("inputs")),
-            within_noise=given.flag("within_noise") if "within_noise" in given else None,
+            covariance=table.table("covariance").array("matrix", len(names), len(names)),
+            inputs=tuple(_input_of(each) for each in table.tables("inputs")),
+            within_noise=table.flag("within_noise") if "within_noise" in table else None,
             prediction={w: _window_of(prediction.table(w)) for w in prediction},
             terms=tuple(Term.of_table(n, terms.table(n)) for n in terms),
             intervals={n: Interval.of_table(intervals.table(n)) for n in intervals},
-            chi2_slack=given.number_or_nan("chi2_slack"),
+            chi2_slack=table.number_or_nan("chi2_slack"),
             slack={n: numbers.number_or_nan(n) for n in numbers},
-            iterations=given.whole("iterations"),
-            modes_hz=tuple(given.array("modes_hz", -1).tolist()),
-            maps=given.table("maps").values if "maps" in given else None,
-            ten=TenCoefficients.of_table(given.table("ten_coefficients"))
-            if "ten_coefficients" in given
+            iterations=table.whole("iterations"),
+            modes_hz=tuple(table.array("modes_hz", -1).tolist()),
+            maps=table.table("maps").values if "maps" in table else None,
+            ten=TenCoefficients.of_table(table.table("ten_coefficients"))
+            if "ten_coefficients" in table
             else None,
-            notes=given.texts("notes"),
+            notes=table.texts("notes"),
         )
 
 
@@ -595,25 +294,3 @@ def _share_of(table: Table) -> Estimate:
 def _window_of(table: Table) -> dict[str, Any]:
     """The prediction's errors in windows of one length, checked."""
     return {key: table.whole(key) if key == "n" else table.number(key) for key in table}
-
-
-def number(value: float) -> float | None:
-    """The number, or None where it is not finite (JSON has no NaN)."""
-    return float(value) if math.isfinite(value) else None
-
-
-def clean(value: Any) -> Any:
-    """Arrays as lists, numbers as Python's, not-finite ones as None, all the way down."""
-    if isinstance(value, dict):
-        return {str(k): clean(v) for k, v in value.items()}
-    if isinstance(value, list | tuple):
-        return [clean(v) for v in value]
-    if isinstance(value, np.ndarray):
-        return clean(value.tolist())
-    if isinstance(value, bool | np.bool_):
-        return bool(value)
-    if isinstance(value, int | np.integer):
-        return int(value)
-    if isinstance(value, float | np.floating):
-        return number(float(value))
-    return value

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pydpend.coefficients import JOINT_OF, LAW_OF, TERMS
-from pydpend.damping.result import EnergyCurve, Estimate
+from pydpend.damping.result_parts import EnergyCurve, Estimate
 from pydpend.damping.shooting import Trace, Track
 from pydpend.model import Model
 
@@ -93,4 +93,4 @@ def energy_curve(
     lost = works.sum(axis=1)
     # The curve starts where it fits best, not at the first sample's noise.
     e0 = float(np.mean(energy + lost)) if t.size else float("nan")
-    return EnergyCurve(t, energy, e0 - lost, works)
+    return EnergyCurve(t, energy, e0 - lost, works, tuple(names))

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pydpend import _tracker
-from pydpend.damping.result import Residuals
+from pydpend.damping.result_parts import Residuals
 from pydpend.errors import FitError, fault
 from pydpend.fit_status import FitStatus
 

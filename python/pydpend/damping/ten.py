@@ -14,7 +14,7 @@ import scipy
 from numpy.typing import NDArray
 
 from pydpend.coefficients import JOINT_OF, PAPER, TERMS, unit
-from pydpend.damping.result import Estimate, TenCoefficients
+from pydpend.damping.result_parts import Estimate, TenCoefficients
 from pydpend.damping.shooting import Trace, Track
 from pydpend.energy import EnergyFit, EnergyProfile
 from pydpend.information import invert

@@ -12,7 +12,8 @@ from pydpend.coefficients import FULL, RATIOS, parameters, ratios_of
 from pydpend.damping import maps, plausible, shooting
 from pydpend.damping.intervals import profile_intervals, refusal
 from pydpend.damping.recording import FittedZero, Recording
-from pydpend.damping.result import DampingFit, estimates
+from pydpend.damping.result import DampingFit
+from pydpend.damping.result_parts import estimates
 from pydpend.damping.shares import energy_curve, shares, unit_works
 from pydpend.damping.shooting import Progress, Solution, Track
 from pydpend.damping.uncertainty import covariance, identifiability

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pydpend.coefficients import FULL, RATIOS, unit
-from pydpend.damping.result import Identifiability
+from pydpend.damping.result_parts import Identifiability
 from pydpend.damping.shooting import Solution
 from pydpend.information import LEAST, invert, principal_axes
 

@@ -8,20 +8,21 @@ exactly the same place.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from pydpend.documents import read_json
+from pydpend.documents import Table, read_json
 from pydpend.encoder.holds import Hold
 from pydpend.errors import CALIBRATE, EncoderError, fault
+from pydpend.json_text import JsonResult
 from pydpend.kinds import expect
 from pydpend.output import AnyPath, path_of, write_text
+from pydpend.tabular import TableResult
 
 Floats = NDArray[np.float64]
 
@@ -44,7 +45,7 @@ LEAST_DOF = 3
 
 
 @dataclass(frozen=True, eq=False)
-class Calibration:
+class Calibration(JsonResult, TableResult):
     """The line between an encoder's volts and its angle, ``V = offset_v + slope_v_per_rad * phi`` (Fig. 10).
 
     Attributes
@@ -76,6 +77,10 @@ class Calibration:
     notes : tuple of str
         What should be known of the line.
     """
+
+    _error: ClassVar = EncoderError
+    _source: ClassVar = "encoder.json"
+    _advice: ClassVar = "Make one with " + CALIBRATE
 
     offset_v: float
     slope_v_per_rad: float
@@ -151,26 +156,15 @@ class Calibration:
         return self.noise_v / abs(self.slope_v_per_rad)
 
     def to_dict(self) -> dict[str, Any]:
-        """The calibration as plain values.
+        """The calibration as plain values, as ``pydpend calibrate`` writes it.
 
         Returns
         -------
         dict
-            All of it, as ``pydpend calibrate`` writes it.
-        """
-        value: dict[str, Any] = json.loads(self.to_json())
-        return value
-
-    def to_json(self) -> str:
-        """The calibration as JSON.
-
-        Returns
-        -------
-        str
-            `to_dict` as text.
+            All fields, and what follows from them: standard uncertainties, 95 % intervals, volts per turn.
         """
         low, high = self.interval_95
-        value: dict[str, Any] = {
+        return {
             "schema": 1,
             "offset_v": self.offset_v,
             "slope_v_per_rad": self.slope_v_per_rad,
@@ -194,7 +188,77 @@ class Calibration:
             "wraps": self.wraps,
             "notes": list(self.notes),
         }
-        return json.dumps(value, indent=2) + "\n"
+
+    @classmethod
+    def of_table(cls, table: Table) -> Calibration:
+        """The calibration from an ``encoder.json`` that is read already.
+
+        Parameters
+        ----------
+        table : pydpend.documents.Table
+            What `to_json` gave.
+
+        Returns
+        -------
+        Calibration
+            The line.
+
+        Raises
+        ------
+        EncoderError
+            Naming the key that is missing or not what it must be.
+        """
+        holds = table.tables("holds")
+        low, high = table.array("range_v", 2)
+        covariance = table.array("covariance", 2, 2)
+        slope = table.number("slope_v_per_rad")
+        noise, spec = table.number("noise_v"), table.number("spec_v")
+        for key, bad in (
+            ("slope_v_per_rad", slope == 0),
+            ("covariance", not (np.diag(covariance) >= 0).all()),
+            ("noise_v", not noise > 0),
+            ("range_v", not low < high),
+        ):
+            if bad:
+                table.refuse(key, "no calibration has this value")
+        return cls(
+            table.number("offset_v"),
+            slope,
+            covariance,
+            table.whole("dof"),
+            tuple(
+                Hold(
+                    h.number("angle_rad"),
+                    h.number("mean_v"),
+                    h.number("std_v"),
+                    h.whole("n"),
+                    h.number("sigma_v"),
+                    h.text("name"),
+                )
+                for h in holds
+            ),
+            np.array([h.number("residual_v") for h in holds], dtype=np.float64),
+            table.number("linearity"),
+            noise,
+            spec,
+            table.texts("noisy_holds"),
+            (float(low), float(high)),
+            table.flag("wraps"),
+            table.texts("notes"),
+        )
+
+    def to_columns(self) -> dict[str, NDArray[Any]]:
+        """The holds as columns of a table, a row each.
+
+        Returns
+        -------
+        dict of str to ndarray, each of shape (n,)
+            ``name``, ``angle_rad``, ``mean_v``, ``std_v``, ``n``, ``sigma_v`` and ``residual_v``.
+        """
+        out: dict[str, NDArray[Any]] = {"name": np.array([h.name for h in self.holds], dtype=object)}
+        for key in ("angle_rad", "mean_v", "std_v", "n", "sigma_v"):
+            out[key] = np.array([getattr(h, key) for h in self.holds])
+        return out | {"residual_v": self.residual_v}
 
     def write(self, path: AnyPath) -> None:
         """Writes the JSON; a file that is there is replaced.
@@ -236,45 +300,7 @@ def read_calibration(path: AnyPath) -> Calibration:
         Naming the file, and the key that is missing or not what it must be.
     """
     expect(path_of(path), ("calibration",), EncoderError)
-    value = read_json(path_of(path), EncoderError, "Make one with " + CALIBRATE)
-    holds = value.tables("holds")
-    low, high = value.array("range_v", 2)
-    covariance = value.array("covariance", 2, 2)
-    slope = value.number("slope_v_per_rad")
-    noise, spec = value.number("noise_v"), value.number("spec_v")
-    for key, bad in (
-        ("slope_v_per_rad", slope == 0),
-        ("covariance", not (np.diag(covariance) >= 0).all()),
-        ("noise_v", not noise > 0),
-        ("range_v", not low < high),
-    ):
-        if bad:
-            value.refuse(key, "no calibration has this value")
-    return Calibration(
-        value.number("offset_v"),
-        slope,
-        covariance,
-        value.whole("dof"),
-        tuple(
-            Hold(
-                h.number("angle_rad"),
-                h.number("mean_v"),
-                h.number("std_v"),
-                h.whole("n"),
-                h.number("sigma_v"),
-                h.text("name"),
-            )
-            for h in holds
-        ),
-        np.array([h.number("residual_v") for h in holds], dtype=np.float64),
-        value.number("linearity"),
-        noise,
-        spec,
-        value.texts("noisy_holds"),
-        (float(low), float(high)),
-        value.flag("wraps"),
-        value.texts("notes"),
-    )
+    return Calibration.of_table(read_json(path_of(path), EncoderError, Calibration._advice))
 
 
 def calibrate(

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pydpend.documents import Table
 from pydpend.encoder.sync import Course, Synchronisation, synchronise
-from pydpend.errors import EncoderError, fault
+from pydpend.errors import COMPARE, EncoderError, fault
+from pydpend.json_text import JsonResult, plain
 from pydpend.kinematics.table import LinkAngles
 from pydpend.series import correlation_time, highpass_noise
 from pydpend.tabular import TableResult
@@ -30,7 +31,7 @@ video's angle is a thousand times more."""
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison(TableResult):
+class Comparison(JsonResult, TableResult):
     """The encoder's n readings on the video's clock, and how far the video is from them (Section 6, Fig. 15).
 
     Each standard uncertainty is from residuals whose neighbours hang together for `correlation_samples`.
@@ -41,6 +42,8 @@ class Comparison(TableResult):
         Names of the video's and the encoder's recordings.
     link : int
         The video's link, from 0.
+    n : int
+        Number of readings that were compared.
     sync : Synchronisation
         The clocks.
     t_s : ndarray of float, shape (n,)
@@ -49,6 +52,8 @@ class Comparison(TableResult):
         Angles, rad; the encoder's with its whole turns taken off, its gain and zero as they are.
     video_sigma_rad : ndarray of float, shape (n,)
         Stated standard uncertainty of the video's angles, rad.
+    video_sigma_rms_rad : float
+        Root mean square of these, rad; NaN where none is stated.
     encoder_sigma_rad : float
         Stated standard uncertainty of a reading, rad; NaN where none is.
     residual_rad : ndarray of float, shape (n,)
@@ -81,14 +86,20 @@ class Comparison(TableResult):
         How many of the video's angles and the encoder's readings were left out, by the regression too.
     """
 
+    _error: ClassVar = EncoderError
+    _source: ClassVar = "compare.json"
+    _advice: ClassVar = "Give the compare.json that " + COMPARE + " wrote"
+
     name: str
     encoder_name: str
     link: int
+    n: int
     sync: Synchronisation
     t_s: Floats
     video_rad: Floats
     encoder_rad: Floats
     video_sigma_rad: Floats
+    video_sigma_rms_rad: float
     encoder_sigma_rad: float
     residual_rad: Floats
     gain: float
@@ -113,74 +124,120 @@ class Comparison(TableResult):
     left_out: int
     """How many of the video's angles and the encoder's readings were left out, by the regression too."""
 
-    def to_json(self) -> str:
-        """The comparison as JSON.
+    @property
+    def shares(self) -> dict[str, float]:
+        """Parts of the residual's variance that are known: of ``encoder``, ``video`` and ``unexplained``."""
+        parts = (self.share_encoder, self.share_video, self.share_unexplained)
+        named = dict(zip(("encoder", "video", "unexplained"), parts, strict=True))
+        return {name: share for name, share in named.items() if np.isfinite(share)}
 
-        Returns
-        -------
-        str
-            `to_dict` as text.
-        """
-        return json.dumps(self.to_dict(), indent=2) + "\n"
+    @property
+    def stated_sigma_rad(self) -> float:
+        """Stated standard uncertainty of a reading less an angle, rad, of what states one; NaN where nothing does."""
+        stated = np.array([self.encoder_sigma_rad, self.video_sigma_rms_rad])
+        known = np.isfinite(stated)
+        return float(np.hypot(*np.where(known, stated, 0.0))) if known.any() else float("nan")
 
     def to_dict(self) -> dict[str, Any]:
-        """The comparison as plain values, without its series.
+        """The comparison as plain values: ``compare.json``. Its series are in a table (`to_columns`) and not here.
 
         Returns
         -------
         dict
             All numbers, angles in degrees too where people read them; None for what is not known.
         """
-        s = self.sync
-        value: dict[str, Any] = {
-            "video": self.name,
-            "encoder": self.encoder_name,
-            "link": self.link + 1,
-            "n": int(self.residual_rad.size),
-            "clocks": {
-                "given": s.given,
-                "offset_s": s.offset_s,
-                "offset_sigma_s": s.offset_sigma_s,
-                "drift": s.drift,
-                "drift_sigma": s.drift_sigma,
-                "reference_s": s.reference_s,
-                "rival_offset_s": s.rival_offset_s,
-                "turns": s.turns,
-                "left_out": s.left_out,
-            },
-            "gain": self.gain,
-            "gain_sigma": self.gain_sigma,
-            "offset_rad": self.offset_rad,
-            "offset_sigma_rad": self.offset_sigma_rad,
-            "delay_s": self.delay_s,
-            "delay_sigma_s": self.delay_sigma_s,
-            "rms_rad": self.rms_rad,
-            "rms_deg": float(np.degrees(self.rms_rad)),
-            "largest_rad": self.largest_rad,
-            "largest_deg": float(np.degrees(self.largest_rad)),
-            "mean_rad": self.mean_rad,
-            "mean_interval_95_rad": list(self.mean_interval_rad),
-            "correlation_samples": self.correlation_samples,
-            "block_s": BLOCK_S,
-            "block_rms_rad": self.block_rms_rad,
-            "block_expected_rad": self.block_expected_rad,
-            "shares": {
-                "encoder": self.share_encoder,
-                "video": self.share_video,
-                "unexplained": self.share_unexplained,
-            },
-            "stated_sigma_rad": {
-                "encoder": self.encoder_sigma_rad,
-                "video": float(np.sqrt(np.nanmean(self.video_sigma_rad**2)))
-                if np.isfinite(self.video_sigma_rad).any()
-                else None,
-            },
-            "own_noise_rad": {"encoder": self.encoder_noise_rad, "video": self.video_noise_rad},
-            "notes": list(self.notes),
-            "left_out": self.left_out,
-        }
-        plain: dict[str, Any] = _plain(value)
-        return plain
+        out: dict[str, Any] = plain(
+            {
+                "video": self.name,
+                "encoder": self.encoder_name,
+                "link": self.link + 1,
+                "n": self.n,
+                "clocks": self.sync.to_dict(),
+                "gain": self.gain,
+                "gain_sigma": self.gain_sigma,
+                "offset_rad": self.offset_rad,
+                "offset_sigma_rad": self.offset_sigma_rad,
+                "delay_s": self.delay_s,
+                "delay_sigma_s": self.delay_sigma_s,
+                "rms_rad": self.rms_rad,
+                "rms_deg": np.degrees(self.rms_rad),
+                "largest_rad": self.largest_rad,
+                "largest_deg": np.degrees(self.largest_rad),
+                "mean_rad": self.mean_rad,
+                "mean_interval_95_rad": self.mean_interval_rad,
+                "correlation_samples": self.correlation_samples,
+                "block_s": BLOCK_S,
+                "block_rms_rad": self.block_rms_rad,
+                "block_expected_rad": self.block_expected_rad,
+                "shares": {
+                    "encoder": self.share_encoder,
+                    "video": self.share_video,
+                    "unexplained": self.share_unexplained,
+                },
+                "stated_sigma_rad": {"encoder": self.encoder_sigma_rad, "video": self.video_sigma_rms_rad},
+                "own_noise_rad": {"encoder": self.encoder_noise_rad, "video": self.video_noise_rad},
+                "notes": self.notes,
+                "left_out": self.left_out,
+            }
+        )
+        return out
+
+    @classmethod
+    def of_table(cls, table: Table) -> Comparison:
+        """The comparison from a ``compare.json`` that is read already. Its series are empty.
+
+        Parameters
+        ----------
+        table : pydpend.documents.Table
+            What `to_json` gave.
+
+        Returns
+        -------
+        Comparison
+            The comparison.
+
+        Raises
+        ------
+        EncoderError
+            Naming the key that is missing or not what it must be.
+        """
+        shares, stated, own = (table.table(key) for key in ("shares", "stated_sigma_rad", "own_noise_rad"))
+        low, high = table.array("mean_interval_95_rad", 2).tolist()
+        none = np.zeros(0)
+        return cls(
+            name=table.text("video"),
+            encoder_name=table.text("encoder"),
+            link=table.whole("link", 1, 2) - 1,
+            n=table.whole("n"),
+            sync=Synchronisation.of_table(table.table("clocks")),
+            t_s=none,
+            video_rad=none,
+            encoder_rad=none,
+            video_sigma_rad=none,
+            video_sigma_rms_rad=stated.number_or_nan("video"),
+            encoder_sigma_rad=stated.number_or_nan("encoder"),
+            residual_rad=none,
+            gain=table.number("gain"),
+            gain_sigma=table.number_or_nan("gain_sigma"),
+            offset_rad=table.number("offset_rad"),
+            offset_sigma_rad=table.number_or_nan("offset_sigma_rad"),
+            delay_s=table.number_or_nan("delay_s"),
+            delay_sigma_s=table.number_or_nan("delay_sigma_s"),
+            rms_rad=table.number("rms_rad"),
+            largest_rad=table.number("largest_rad"),
+            mean_rad=table.number("mean_rad"),
+            mean_interval_rad=(low, high),
+            correlation_samples=table.number("correlation_samples"),
+            block_rms_rad=table.number_or_nan("block_rms_rad"),
+            block_expected_rad=table.number_or_nan("block_expected_rad"),
+            share_encoder=shares.number_or_nan("encoder"),
+            share_video=shares.number_or_nan("video"),
+            share_unexplained=shares.number_or_nan("unexplained"),
+            video_noise_rad=own.number_or_nan("video"),
+            encoder_noise_rad=own.number_or_nan("encoder"),
+            notes=table.texts("notes"),
+            left_out=table.whole("left_out"),
+        )
 
     def to_columns(self) -> dict[str, Floats]:
         """The residual series as columns of a table.
@@ -196,15 +253,6 @@ class Comparison(TableResult):
             "encoder_rad": self.encoder_rad,
             "residual_rad": self.residual_rad,
         }
-
-
-def _plain(value: Any) -> Any:
-    """NaN has no JSON: ``null``."""
-    if isinstance(value, dict):
-        return {k: _plain(v) for k, v in value.items()}
-    if isinstance(value, list):
-        return [_plain(v) for v in value]
-    return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
 def compare(
@@ -306,36 +354,38 @@ def compare(
     c = sync.covariance
     slope = np.array([-1.0 / sync.gain, sync.zero_rad / sync.gain**2])
     return Comparison(
-        video.name,
-        encoder.name,
-        link,
-        sync,
-        t,
-        video_rad,
-        encoder_rad,
-        sigma_video,
-        encoder_sigma,
-        residual,
-        gain,
-        sync.gain_sigma / sync.gain**2,
-        offset,
-        float(np.sqrt(slope @ c[:2, :2] @ slope)),
-        delay,
-        delay_sigma,
-        float(np.sqrt(variance)),
-        float(np.abs(residual).max()),
-        mean,
-        (mean - half, mean + half),
-        together,
-        blocks,
-        expected,
-        part_encoder,
-        part_video,
-        1.0 - part_encoder - (part_video if np.isfinite(part_video) else 0.0),
-        highpass_noise(video.phi_rad[:, link]),
-        highpass_noise(encoder.phi_rad[:, 0]),
-        tuple(notes),
-        video.left_out + encoder.left_out + sync.left_out,
+        name=video.name,
+        encoder_name=encoder.name,
+        link=link,
+        n=residual.size,
+        sync=sync,
+        t_s=t,
+        video_rad=video_rad,
+        encoder_rad=encoder_rad,
+        video_sigma_rad=sigma_video,
+        video_sigma_rms_rad=float(np.sqrt(part_video * variance)),
+        encoder_sigma_rad=encoder_sigma,
+        residual_rad=residual,
+        gain=gain,
+        gain_sigma=sync.gain_sigma / sync.gain**2,
+        offset_rad=offset,
+        offset_sigma_rad=float(np.sqrt(slope @ c[:2, :2] @ slope)),
+        delay_s=delay,
+        delay_sigma_s=delay_sigma,
+        rms_rad=float(np.sqrt(variance)),
+        largest_rad=float(np.abs(residual).max()),
+        mean_rad=mean,
+        mean_interval_rad=(mean - half, mean + half),
+        correlation_samples=together,
+        block_rms_rad=blocks,
+        block_expected_rad=expected,
+        share_encoder=part_encoder,
+        share_video=part_video,
+        share_unexplained=1.0 - part_encoder - (part_video if np.isfinite(part_video) else 0.0),
+        video_noise_rad=highpass_noise(video.phi_rad[:, link]),
+        encoder_noise_rad=highpass_noise(encoder.phi_rad[:, 0]),
+        notes=tuple(notes),
+        left_out=video.left_out + encoder.left_out + sync.left_out,
     )
 
 

@@ -17,6 +17,7 @@ from pydpend.errors import EncoderError, Setting, fault
 from pydpend.instants import seconds_of_numpy, stamp_in
 from pydpend.kinds import expect
 from pydpend.output import AnyPath, path_of
+from pydpend.tabular import TableResult
 
 Floats = NDArray[np.float64]
 
@@ -25,7 +26,7 @@ KNOWN_COLUMNS = ("voltage_v", "phi1_rad", "phi1_deg")
 
 
 @dataclass(frozen=True, eq=False)
-class EncoderSignal:
+class EncoderSignal(TableResult):
     """What an encoder recorded: T readings over time.
 
     Parameters
@@ -78,6 +79,16 @@ class EncoderSignal:
     def step_s(self) -> float:
         """Median time between samples, s; NaN for a single one."""
         return float(np.median(np.diff(self.t_s))) if self.t_s.size > 1 else float("nan")
+
+    def to_columns(self) -> dict[str, Floats]:
+        """The readings as columns of a table, named as `read_encoder` knows them.
+
+        Returns
+        -------
+        dict of str to ndarray, each of shape (T,)
+            ``time_s``, and ``voltage_v`` or ``phi1_rad``.
+        """
+        return {TIME_COLUMN: self.t_s, "voltage_v" if self.unit == "v" else "phi1_rad": self.value}
 
 
 def read_encoder(

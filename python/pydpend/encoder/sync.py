@@ -9,12 +9,15 @@ is the maximum likelihood on the rates with the zero free, without ever differen
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any, ClassVar
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from pydpend.documents import Table
 from pydpend.errors import EncoderError, fault, one_of
+from pydpend.json_text import JsonResult, plain
 from pydpend.kinematics.table import LinkAngles
 from pydpend.series import correlation_time, highpass_noise
 
@@ -41,7 +44,7 @@ ALIKE = 1.05
 
 
 @dataclass(frozen=True, eq=False)
-class Synchronisation:
+class Synchronisation(JsonResult):
     """The encoder's clock on the video's, with gain and zero of its angles.
 
     ``video time = t + offset_s + drift (t - reference_s)`` for an encoder time ``t``.
@@ -76,6 +79,9 @@ class Synchronisation:
         Another offset that explains the readings as well, over a shorter time, s; None if there is none.
     """
 
+    _error: ClassVar = EncoderError
+    _source: ClassVar = "the clocks"
+
     offset_s: float
     drift: float
     gain: float
@@ -109,6 +115,70 @@ class Synchronisation:
     def zero_sigma_rad(self) -> float:
         """Standard uncertainty of the zero, rad."""
         return float(np.sqrt(self.covariance[0, 0]))
+
+    def to_dict(self) -> dict[str, Any]:
+        """The clocks as plain values.
+
+        Returns
+        -------
+        dict
+            All fields and the standard uncertainties of offset and drift; None for what is not known.
+        """
+        out: dict[str, Any] = plain(
+            {
+                "given": self.given,
+                "offset_s": self.offset_s,
+                "offset_sigma_s": self.offset_sigma_s,
+                "drift": self.drift,
+                "drift_sigma": self.drift_sigma,
+                "reference_s": self.reference_s,
+                "rival_offset_s": self.rival_offset_s,
+                "turns": self.turns,
+                "gain": self.gain,
+                "zero_rad": self.zero_rad,
+                "covariance": self.covariance,
+                "sigma_rad": self.sigma_rad,
+                "n": self.n,
+                "left_out": self.left_out,
+                "correlation_samples": self.correlation_samples,
+            }
+        )
+        return out
+
+    @classmethod
+    def of_table(cls, table: Table) -> Synchronisation:
+        """The clocks from a document that is read already.
+
+        Parameters
+        ----------
+        table : pydpend.documents.Table
+            What `to_json` gave, or ``clocks`` of a comparison.
+
+        Returns
+        -------
+        Synchronisation
+            The clocks.
+
+        Raises
+        ------
+        EncoderError
+            Naming the key that is missing or not what it must be.
+        """
+        return cls(
+            table.number("offset_s"),
+            table.number("drift"),
+            table.number("gain"),
+            table.number("zero_rad"),
+            table.whole("turns", -(2**53)),
+            table.number("reference_s"),
+            table.array("covariance", 4, 4),
+            table.number("sigma_rad"),
+            table.whole("n"),
+            table.whole("left_out"),
+            table.number("correlation_samples"),
+            table.flag("given"),
+            table.number("rival_offset_s") if "rival_offset_s" in table else None,
+        )
 
     def video_time(self, t_s: Floats) -> Floats:
         """The video's time at encoder times.

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from pydpend.coefficients import RATIOS
 from pydpend.damping import DampingFit, Maps, Prediction
-from pydpend.damping.result import EnergyCurve, Estimate
+from pydpend.damping.result_parts import EnergyCurve, Estimate
 from pydpend.damping.stored import recording_suffix
 from pydpend.plots.angles import thinned
 from pydpend.plots.style import COLORS, new_figure, save, style

@@ -9,9 +9,9 @@ import numpy as np
 
 from pydpend.coefficients import RATIO_UNITS, WORDS
 from pydpend.damping import DampingFit
-from pydpend.damping.result import number
 from pydpend.errors import Setting
 from pydpend.fit_status import FitStatus, Verdict
+from pydpend.json_text import number
 from pydpend.plots.damping import coefficients_figure, shares_figure
 from pydpend.plots.style import inline_svg
 from pydpend.report.page import (
