@@ -38,7 +38,7 @@ GROUPS: tuple[tuple[str, ...], ...] = (
     ("encoder",),
     ("simulation", "linear", "link_states"),
     ("decay", "energy", "damping", "trials"),
-    ("run_folder",),
+    ("fit_folder", "recording_folder", "run_folder"),
     ("plots",),
     ("report",),
     ("analyse",),

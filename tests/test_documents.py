@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from pydpend.analyse import read_config
 from pydpend.arrays import read_npy
-from pydpend.damping.stored import load_fit
 from pydpend.documents import read_json, read_toml
 from pydpend.encoder import read_calibration, read_encoder
 from pydpend.errors import EncoderError, PydpendError
+from pydpend.fit_folder import load_fit
 from pydpend.kinematics import read_angles
 from pydpend.model import read_model
 

@@ -15,7 +15,8 @@ from pydpend.analyse.contents import about, made_by
 from pydpend.analyse.folder import RUN_SCHEMA, RunFolder, RunFolderError
 from pydpend.cli import main
 from pydpend.errors import PydpendError
-from pydpend.run_folder import RunFileError, read_run
+from pydpend.recording_folder import RunFileError
+from pydpend.run_folder import read_run
 
 
 def test_every_file_of_a_run_is_one_that_its_stage_makes(demo_run: Path) -> None:
@@ -28,6 +29,8 @@ def test_every_file_of_a_run_is_one_that_its_stage_makes(demo_run: Path) -> None
     assert made_by("fit", "fit/energy-12.csv")
     assert made_by("prediction", "trial_2/windows.csv")
     assert made_by("prediction", "prediction.json")
+    assert not made_by("fit", "fit/energy.txt")
+    assert not made_by("fit", "fit/shares-2.png")
 
 
 OUTSIDE = (

@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 import math
 from abc import ABC, abstractmethod
+from pathlib import Path
 from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from pydpend.documents import Table, parse_json
 from pydpend.errors import PydpendError, Text
+from pydpend.output import write_text
 
 
 class JsonResult(ABC):
@@ -86,6 +88,11 @@ class JsonResult(ABC):
         PydpendError
             The document's error, naming the key that is missing or not what it must be.
         """
+
+
+def write_json(path: Path, value: Any) -> None:
+    """A JSON file, whole or not at all; not-finite numbers as null."""
+    write_text(path, json.dumps(plain(value), indent=1, allow_nan=False) + "\n")
 
 
 def number(value: float) -> float | None:

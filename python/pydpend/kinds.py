@@ -25,6 +25,7 @@ Kind: TypeAlias = Literal[
     "fit",
     "page",
     "spreadsheet",
+    "npz",
     "compressed",
     "unknown",
 ]

@@ -5,10 +5,13 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from pydpend.output import whole
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -73,3 +76,26 @@ def html_table(title: str, header: Sequence[str], rows: Iterable[Sequence[str]])
     head = "".join(f"<th>{escape(cell)}</th>" for cell in header)
     body = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
     return f"<table><caption>{escape(title)}</caption><tr>{head}</tr>{body}</table>"
+
+
+def write_csv(path: Path, columns: Mapping[str, NDArray[Any]]) -> None:
+    """A CSV table of numbers, whole or not at all; nan where there is no number."""
+    with whole(path) as new:
+        np.savetxt(
+            new,
+            np.column_stack(list(columns.values())),
+            fmt="%.9g",
+            delimiter=",",
+            header=",".join(columns),
+            comments="",
+        )
+
+
+def write_parquet(path: Path, columns: Mapping[str, NDArray[Any]]) -> None:
+    """A Parquet table, whole or not at all."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    # A file, because pyarrow looks for addresses in names.
+    with whole(path) as new, new.open("wb") as file:
+        pq.write_table(pa.table(dict(columns)), file, use_dictionary=False)

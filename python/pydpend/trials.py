@@ -63,7 +63,7 @@ class Spread:
         values, sigmas = table.array("values", -1), table.array("sigmas", -1)
         if values.shape != sigmas.shape:
             table.refuse("sigmas", f"{sigmas.size} uncertainties for {values.size} values")
-        numbers = (table.number("mean"), table.number("sigma"), table.number_or_nan("spread"))
+        numbers = (table.number_or_nan("mean"), table.number_or_nan("sigma"), table.number_or_nan("spread"))
         chances = (table.number_or_nan("deviation"), table.number_or_nan("p_value"))
         return cls(values, sigmas, *numbers, *chances, table.text("unit"))
 
@@ -154,6 +154,15 @@ class Trials(JsonResult, TableResult):
         return out | {"unit": np.array([s.unit for s in found], dtype=object)}
 
 
+def alone(fit: DampingFit) -> dict[str, Spread]:
+    """The coefficients of a fit of one recording as trials have them; there is no mean."""
+    none = float("nan")
+    return {
+        name: Spread(np.array([e.value]), np.array([e.sigma]), none, none, none, none, none, e.unit)
+        for name, e in fit.coefficients.items()
+    }
+
+
 def combine(values: Floats, sigmas: Floats, unit: str) -> Spread:
     """Mean and spread of independent estimates (R,) by random effects."""
     weight = 1 / sigmas**2
@@ -181,12 +190,12 @@ def fit_trials(
     options: FitOptions | None = None,
     *,
     progress: Progress | None = None,
-    alone: Callable[[int], object] | None = None,
+    before_each: Callable[[int], object] | None = None,
 ) -> Trials:
     """Fits all recordings jointly (common damping and inertias) and each alone.
 
-    ``alone`` is called with each recording's place, from 0, before it is fitted alone. Raises FitError for fewer than
-    two recordings and as `fit_damping` does.
+    ``before_each`` is called with each recording's place, from 0, before it is fitted alone. Raises FitError for fewer
+    than two recordings and as `fit_damping` does.
     """
     if len(recordings) < 2:
         raise FitError(fault("trials", "there is one recording", "Give at least two"))
@@ -194,8 +203,8 @@ def fit_trials(
     joint = fit_damping(recordings, model, options=chosen, progress=progress)
     each = []
     for k, recording in enumerate(recordings):
-        if alone is not None:
-            alone(k)
+        if before_each is not None:
+            before_each(k)
         each.append(fit_damping(recording, model, options=chosen.bare()))
     return summary(each, joint)
 

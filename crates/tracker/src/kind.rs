@@ -13,7 +13,7 @@ use ::parquet::file::reader::{FileReader, SerializedFileReader};
 use crate::error::{Error, Fault, Result};
 use crate::message::{Message, Step};
 use crate::name::shell_word;
-use crate::packed::{is_packed, unpacking};
+use crate::packed::{first_part, is_packed, unpacking};
 
 /// What a file or folder is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -50,6 +50,8 @@ pub enum Kind {
     Page,
     /// A spreadsheet or a file of another program's own form.
     Spreadsheet,
+    /// Arrays in NumPy's archive, of which pydpend reads none.
+    NumpyArchive,
     /// A packed file or archive.
     Compressed,
     /// Nothing that is known here.
@@ -58,7 +60,7 @@ pub enum Kind {
 
 impl Kind {
     /// All of them.
-    pub const ALL: [Self; 18] = [
+    pub const ALL: [Self; 19] = [
         Self::Film,
         Self::Pictures,
         Self::NodeTable,
@@ -75,6 +77,7 @@ impl Kind {
         Self::Fit,
         Self::Page,
         Self::Spreadsheet,
+        Self::NumpyArchive,
         Self::Compressed,
         Self::Unknown,
     ];
@@ -98,6 +101,7 @@ impl Kind {
             Self::Fit => "fit",
             Self::Page => "page",
             Self::Spreadsheet => "spreadsheet",
+            Self::NumpyArchive => "npz",
             Self::Compressed => "compressed",
             Self::Unknown => "unknown",
         }
@@ -122,6 +126,7 @@ impl Kind {
             Self::Fit => "a damping fit",
             Self::Page => "a page for a browser",
             Self::Spreadsheet => "a spreadsheet or another program's file",
+            Self::NumpyArchive => "a NumPy archive (.npz)",
             Self::Compressed => "a packed file",
             Self::Unknown => "of no known kind",
         }
@@ -215,10 +220,19 @@ impl Kind {
             }
             Self::Fit => type_this(
                 format!("pydpend predict ANGLES --fit {file} -o predicted/"),
-                format!("pydpend.damping.stored.load_fit({name:?})"),
+                format!("pydpend.fit_folder.load_fit({name:?})"),
             ),
             Self::Page => "Open it in a browser".into(),
             Self::Spreadsheet => "Save it as CSV with a header line".into(),
+            Self::NumpyArchive => {
+                let array = numpy_array(path).unwrap_or_else(|| "NAME".to_owned());
+                let out = path.with_extension("npy").display().to_string();
+                format!(
+                    "Write its arrays as columns of a CSV with a header line, or one array as .npy in Python: \
+                     numpy.save({out:?}, numpy.load({name:?})[{array:?}])"
+                )
+                .into()
+            }
             Self::Compressed => unpacking(path)
                 .map_or_else(|| "Unpack it".to_owned(), |command| format!("Unpack it with `{command}`"))
                 .into(),
@@ -356,9 +370,20 @@ fn kind_of_magic(bytes: &[u8]) -> Option<Kind> {
     if is_packed(bytes) {
         return Some(Kind::Compressed);
     }
+    if first_part(bytes).ends_with(b".npy") {
+        return Some(Kind::NumpyArchive);
+    }
     // A zipped document, an old one, MATLAB's two forms.
     let documents: [&[u8]; 4] = [b"PK\x03\x04", b"\xd0\xcf\x11\xe0", b"MATLAB", b"\x89HDF"];
     documents.iter().any(|d| at(0, d)).then_some(Kind::Spreadsheet)
+}
+
+/// The first array in a NumPy archive, by its name; `None` where it cannot be read.
+fn numpy_array(path: &Path) -> Option<String> {
+    let mut bytes = Vec::new();
+    File::open(path).ok()?.take(BEGINNING).read_to_end(&mut bytes).ok()?;
+    let name = std::str::from_utf8(first_part(&bytes)).ok()?;
+    Some(name.strip_suffix(".npy")?.to_owned())
 }
 
 fn kind_of_text(path: &Path, bytes: &[u8]) -> Kind {
@@ -455,7 +480,7 @@ mod tests {
             bytes.extend(name.as_bytes());
             bytes
         };
-        let cases: [(&str, &[u8], Kind); 17] = [
+        let cases: [(&str, &[u8], Kind); 18] = [
             ("a.csv", b"\0\0\0\x18ftypisom", Kind::Film),
             ("b.mp4", b"time_s,phi1_rad\n0,1\n", Kind::Angles),
             ("c.csv", b"# made by hand\ntime_s;phi1_deg;phi2_deg\n", Kind::Angles),
@@ -468,7 +493,8 @@ mod tests {
             ("j.toml", b"frames = 4\n[camera]\ndepth_bits = 8\n", Kind::Scene),
             ("k.json", b"{\"schema\": 1, \"slope_v_per_rad\": 0.1}", Kind::Calibration),
             ("l.xlsx", &zip("[Content_Types].xml"), Kind::Spreadsheet),
-            ("l.npz", &zip("phi.npy"), Kind::Spreadsheet),
+            ("l.npz", &zip("phi.npy"), Kind::NumpyArchive),
+            ("l.zip", &zip("arrays/phi.npy"), Kind::NumpyArchive),
             ("l.mp4", &zip("drop.mp4"), Kind::Compressed),
             ("o.mp4", b"\x1f\x8b\x08....", Kind::Compressed),
             ("m.txt", b"Dear all,\nthe pendulum is broken.\n", Kind::Unknown),
@@ -491,6 +517,12 @@ mod tests {
         assert!(said.contains("it is a film, not an angles table. Next: `tracker track '"), "{said}");
         assert!(said.contains("my drop.mp4' -o '") && said.contains("my drop.parquet'`"), "{said}");
         assert!(misplaced(&film, &[Kind::Film]).is_none());
+        let archive = folder.path().join("run.npz");
+        let part = [&b"PK\x03\x04"[..], &[0; 22], &[7, 0, 0, 0], b"phi.npy"].concat();
+        std::fs::write(&archive, part).unwrap();
+        let said = misplaced(&archive, &[Kind::Angles]).unwrap().to_string();
+        assert!(said.contains("it is a NumPy archive (.npz), not an angles table. Write its arrays as"), "{said}");
+        assert!(said.contains("run.npy\", numpy.load(") && said.ends_with("run.npz\")[\"phi\"])"), "{said}");
         for kind in Kind::ALL {
             assert!(kind == Kind::Unknown || !kind.next(&film).is_empty(), "{kind:?}");
         }

@@ -1,6 +1,6 @@
 //! Packed files and archives, by what they begin with, and the command that unpacks each.
 //!
-//! Owns: [`is_packed`], [`unpacking`]. Must not: unpack.
+//! Owns: [`is_packed`], [`first_part`], [`unpacking`]. Must not: unpack.
 
 use std::fs::File;
 use std::io::Read;
@@ -54,13 +54,21 @@ pub fn is_packed(bytes: &[u8]) -> bool {
     form_of(bytes).is_some_and(|f| f.ending != "zip" || !is_document(bytes))
 }
 
-/// Whether a zip is a document or a table of a program's own, by the name of its first part.
-fn is_document(zip: &[u8]) -> bool {
+/// The name of a zip's first part; empty for what is no zip.
+pub fn first_part(bytes: &[u8]) -> &[u8] {
     /// Bytes before the name in a part's header, and where in it the name's length is.
     const HEADER: usize = 30;
     const LENGTH: usize = 26;
-    let length = zip.get(LENGTH..LENGTH + 2).map_or(0, |b| usize::from(u16::from_le_bytes([b[0], b[1]])));
-    let name = zip.get(HEADER..HEADER + length).unwrap_or_default();
+    if !bytes.starts_with(b"PK\x03\x04") {
+        return &[];
+    }
+    let length = bytes.get(LENGTH..LENGTH + 2).map_or(0, |b| usize::from(u16::from_le_bytes([b[0], b[1]])));
+    bytes.get(HEADER..HEADER + length).unwrap_or_default()
+}
+
+/// Whether a zip is a document or a table of a program's own, by the name of its first part.
+fn is_document(zip: &[u8]) -> bool {
+    let name = first_part(zip);
     let parts: [&[u8]; 7] =
         [b"[Content_Types].xml", b"mimetype", b"_rels/", b"docProps/", b"xl/", b"Index/", b"META-INF/"];
     parts.iter().any(|p| name.starts_with(p)) || name.ends_with(b".npy")

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import re
 
-from pydpend.run_folder import RunFile
+from pydpend.fit_folder import about_fit
+from pydpend.recording_folder import RunFile
+from pydpend.run_folder import PREDICTION
 
 
 def about(name: str) -> str:
     """What a file of a run folder is."""
     last = name.rsplit("/", 1)[-1]
-    if last.startswith("energy"):
-        return "energy of the motion and what each law takes out" + (
-            " (Fig. 19)" if last.endswith(".png") else ", J"
-        )
-    if last.startswith("residuals") and last.endswith(".csv"):
-        return "measured minus fitted angle of each link, and its standard deviation, rad"
-    return RunFile(last).words if last in list(RunFile) else ""
+    if last == PREDICTION:
+        return "each recording predicted from the others"
+    return RunFile(last).words if last in list(RunFile) else about_fit(last)
 
 
 _PART = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]*")

@@ -22,7 +22,7 @@ from pydpend.errors import PydpendError, fault
 from pydpend.output import check_kept, results_folder, write_text
 from pydpend.run_folder import RECORD
 
-RUN_SCHEMA = 4
+RUN_SCHEMA = 5
 """A folder of an older schema is done again, one of a newer is refused."""
 
 UNFINISHED = "unfinished"

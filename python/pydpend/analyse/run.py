@@ -23,7 +23,8 @@ from pydpend.documents import Table
 from pydpend.errors import OptionError, PydpendError, Setting, fault
 from pydpend.json_text import JsonResult
 from pydpend.output import keeping
-from pydpend.run_folder import FIT_FOLDER, PAGE, README, RECORD, RunFile
+from pydpend.recording_folder import RunFile
+from pydpend.run_folder import FIT_FOLDER, PAGE, README, RECORD
 
 
 @dataclass(frozen=True)

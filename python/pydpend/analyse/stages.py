@@ -7,21 +7,19 @@ write to. Every function returns one sentence for ``run.json``.
 from __future__ import annotations
 
 import importlib
-import json
 import math
 import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pydpend.analyse.folder import write_whole
 from pydpend.analyse.options import Options
 from pydpend.analyse.state import Going, Note, Tell
-from pydpend.documents import read_json
 from pydpend.errors import PydpendError
+from pydpend.fit_folder import FitFolder
 from pydpend.fit_status import FitStatus
-from pydpend.output import whole
-from pydpend.run_folder import FIT_FOLDER, RunFile
+from pydpend.recording_folder import RecordingFolder, RunFile, StoredOverlay
+from pydpend.run_folder import fit_folder, write_predictions
 
 if TYPE_CHECKING:
     from pydpend.analyse.recordings import Recording
@@ -38,19 +36,6 @@ def version() -> str:
     from pydpend import _tracker
 
     return _tracker.VERSION
-
-
-def _write_json(path: Path, value: Any) -> None:
-    write_whole(path, json.dumps(value, indent=1, allow_nan=False) + "\n")
-
-
-def _write_parquet(path: Path, columns: dict[str, Any]) -> None:
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    # A file, because pyarrow looks for addresses in names.
-    with whole(path) as new, new.open("wb") as file:
-        pq.write_table(pa.table(columns), file, use_dictionary=False)
 
 
 def _share(tell: Tell) -> Callable[[str, int, int | None], None]:
@@ -79,7 +64,7 @@ def track(r: Recording, options: Options, into: Path, tell: Tell, resume: bool) 
         fps=options.fps,
         pixel_aspect=options.pixel_aspect,
         threads=options.threads,
-        output=into / RunFile.NODES,
+        output=RecordingFolder(into).file(RunFile.NODES),
         resume=resume,
         force=True,
         progress=_share(tell),
@@ -98,24 +83,10 @@ def markers(r: Recording, here: Path, into: Path) -> str:
 
     nodes = _nodes(here, r)
     off = misfits(nodes)
-    # Columns are numbered, because a node may be called anything; their names are in markers.json.
-    columns = {"time_s": nodes.t_s} | {f"node{i}_px": off[:, i] for i in range(off.shape[1])}
-    _write_parquet(into / RunFile.RESIDUALS, columns)
-    known = np.isfinite(off)
-    rows = [
-        {
-            "node": node.name,
-            "body": node.body,
-            "seen": float(nodes.seen[:, i].mean()),
-            "residual_rms_px": float(np.sqrt(np.mean(off[known[:, i], i] ** 2)))
-            if known[:, i].any()
-            else None,
-            "residual_largest_px": float(off[known[:, i], i].max()) if known[:, i].any() else None,
-        }
-        for i, node in enumerate(nodes.rig.nodes)
-    ]
-    _write_json(into / RunFile.MARKERS, {"nodes": rows})
-    if not known.any():
+    folder = RecordingFolder(into)
+    folder.write_residuals(nodes.t_s, off)
+    folder.write_markers(nodes, off)
+    if not np.isfinite(off).any():
         return "no body shows two nodes at once, so none can be compared with its shape"
     return f"RMS distance of a marker from its body's shape {math.sqrt(np.nanmean(off**2)):.4f} px"
 
@@ -123,7 +94,7 @@ def markers(r: Recording, here: Path, into: Path) -> str:
 def _nodes(here: Path, r: Recording) -> Nodes:
     from pydpend.nodes import read_nodes
 
-    return read_nodes(here / RunFile.NODES if r.kind == "film" else r.path)
+    return RecordingFolder(here).nodes() if r.kind == "film" else read_nodes(r.path)
 
 
 def _hanging(r: Recording, options: Options, here: Path, into: Path) -> Any:
@@ -141,14 +112,15 @@ def _hanging(r: Recording, options: Options, here: Path, into: Path) -> Any:
     from pydpend.tracking import track as track_film
 
     # The same rig, so that the markers have the same names.
-    rig = into / RunFile.ZERO_RIG
+    folder = RecordingFolder(into)
+    rig = folder.file(RunFile.ZERO_RIG)
     _nodes(here, r).rig.write(rig)
     return track_film(
         path,
         rig,
         fps=options.fps,
         pixel_aspect=options.pixel_aspect,
-        output=into / RunFile.ZERO,
+        output=folder.file(RunFile.ZERO),
         progress=False,
     )
 
@@ -156,7 +128,7 @@ def _hanging(r: Recording, options: Options, here: Path, into: Path) -> Any:
 def angles(r: Recording, options: Options, here: Path, into: Path) -> str:
     """Nodes, or anyone's angles, to ``angles.parquet``."""
     from pydpend.kinematics import angles as estimate
-    from pydpend.kinematics import read_angles, write_angles
+    from pydpend.kinematics import read_angles
 
     if r.kind == "angles":
         columns = None
@@ -186,42 +158,22 @@ def angles(r: Recording, options: Options, here: Path, into: Path) -> str:
             gaps="stop",
             name=r.name,
         )
-    write_angles(found, into / RunFile.ANGLES)
-    _write_json(into / RunFile.ANGLES_ABOUT, _plain(found.meta))
+    RecordingFolder(into).write_angles(found)
     return f"{found.links} link{'s' if found.links > 1 else ''}, {found.t_s.size} instants"
 
 
-def _plain(value: Any) -> Any:
-    """JSON-like with null for what is not a number."""
-    if isinstance(value, dict):
-        return {str(k): _plain(v) for k, v in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(v) for v in value]
-    if hasattr(value, "tolist"):
-        return _plain(value.tolist())
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
-
-
 def _angles(folder: Path, found: tuple[Recording, ...]) -> list[LinkAngles]:
-    from pydpend.kinematics import read_angles
-
-    return [
-        read_angles(folder / r.name / RunFile.ANGLES, name=r.name)
-        for r in found
-        if (folder / r.name / RunFile.ANGLES).exists()
-    ]
+    folders = [(r.name, RecordingFolder(folder / r.name)) for r in found]
+    return [here.angles(name) for name, here in folders if here.file(RunFile.ANGLES).exists()]
 
 
 def encoder(r: Recording, options: Options, here: Path, into: Path) -> str:
     """Calibrates the encoder and compares the film's phi1 with it."""
     from pydpend.encoder import calibrate, compare, encoder_angles, read_calibration, read_encoder, read_holds
-    from pydpend.kinematics import read_angles
     from pydpend.plots.encoder import calibration_figure, comparison_figure
     from pydpend.plots.style import save
 
-    film = read_angles(here / RunFile.ANGLES, name=r.name)
+    film, folder = RecordingFolder(here).angles(r.name), RecordingFolder(into)
     unit: Any = options.unit
     signal = read_encoder(
         str(r.encoder),
@@ -234,20 +186,18 @@ def encoder(r: Recording, options: Options, here: Path, into: Path) -> str:
     if options.calibration is not None:
         path = Path(options.calibration)
         line = calibrate(read_holds([path])) if path.is_dir() else read_calibration(path)
-        line.write(into / RunFile.ENCODER)
-        save(calibration_figure(line), into / RunFile.CALIBRATION_FIGURE)
+        line.write(folder.file(RunFile.ENCODER))
+        save(calibration_figure(line), folder.file(RunFile.CALIBRATION_FIGURE))
     found = compare(film, encoder_angles(signal, line))
-    write_whole(into / RunFile.COMPARISON, found.to_json())
-    _write_parquet(into / RunFile.COMPARED, found.to_columns())
-    save(comparison_figure(found), into / RunFile.COMPARISON_FIGURE)
+    folder.write_comparison(found)
+    save(comparison_figure(found), folder.file(RunFile.COMPARISON_FIGURE))
     return f"RMS difference {math.degrees(found.rms_rad):.4f} deg"
 
 
 def fit(found: tuple[Recording, ...], options: Options, folder: Path, into: Path, tell: Tell) -> str:
     """Damping of all recordings together, and of each if there are several."""
     from pydpend.damping import fit_damping
-    from pydpend.damping.stored import write_fit
-    from pydpend.model import CONSTANTS, model_called
+    from pydpend.model import model_called
     from pydpend.plots.damping import save_figures
     from pydpend.trials import fit_trials
 
@@ -260,27 +210,22 @@ def fit(found: tuple[Recording, ...], options: Options, folder: Path, into: Path
             model,
             chosen,
             progress=_steps(tell),
-            alone=lambda k: tell(Going(f"recording {k + 1} alone")),
+            before_each=lambda k: tell(Going(f"recording {k + 1} alone")),
         )
         fitted = trials.joint
-        write_whole(into / RunFile.TRIALS, trials.to_json())
     else:
         fitted = fit_damping(recordings, model, options=chosen, progress=_steps(tell))
-    write_fit(fitted, into)
+    files = FitFolder(into)
+    files.write(fitted, trials)
     if not options.pinned:
-        sigmas = model.sigmas()
-        constants = {
-            n: {"value": v, "sigma": sigmas[n]}
-            for n, v in zip(CONSTANTS, model.constants().tolist(), strict=True)
-        }
-        _write_json(into / RunFile.MODEL, {"name": model.name, "constants": constants})
-    save_figures(fitted, trials, into)
+        files.write_model(model)
+    save_figures(fitted, trials, files)
     return fitted.message
 
 
 def converged(folder: Path) -> bool:
     """Whether the fit of a run came to its end."""
-    return read_json(folder / FIT_FOLDER / RunFile.FIT, PydpendError).text("status") == FitStatus.CONVERGED
+    return fit_folder(folder).fit().status is FitStatus.CONVERGED
 
 
 def _steps(tell: Tell) -> Callable[[int, int, float], None]:
@@ -289,36 +234,22 @@ def _steps(tell: Tell) -> Callable[[int, int, float], None]:
 
 def prediction(found: tuple[Recording, ...], options: Options, folder: Path, into: Path, tell: Tell) -> str:
     """Each recording predicted from a fit of the others."""
-    import numpy as np
-
-    from pydpend.damping import fit_damping
+    from pydpend.damping import Prediction, fit_damping
     from pydpend.damping.single import reduced
     from pydpend.damping.stored import StoredFit
     from pydpend.model import model_called
-    from pydpend.plots.damping import windows_columns
 
     recordings, model = _angles(folder, found), model_called(options.model)
     if options.pinned:
         recordings, model = reduced(recordings, model, True)
-    out = {}
+    out: dict[str, Prediction] = {}
     for i, one in enumerate(recordings):
         tell(Going(f"{i + 1} of {len(recordings)}"))
         others = recordings[:i] + recordings[i + 1 :]
         fitted = fit_damping(others, model, options=options.fit.bare())
         stored = StoredFit.of(fitted)
-        predicted = stored.predict(one, start_s=options.start_s, stop_s=options.stop_s)
-        out[one.name] = predicted.to_dict()
-        windows = windows_columns(predicted)
-        (into / one.name).mkdir()
-        np.savetxt(
-            into / one.name / RunFile.WINDOWS,
-            np.column_stack(list(windows.values())),
-            fmt="%.9g",
-            delimiter=",",
-            header=",".join(windows),
-            comments="",
-        )
-    _write_json(into / RunFile.PREDICTION, out)
+        out[one.name] = stored.predict(one, start_s=options.start_s, stop_s=options.stop_s)
+    write_predictions(into, out)
     return f"{len(out)} recordings predicted"
 
 
@@ -337,28 +268,21 @@ def overlay(r: Recording, here: Path, into: Path, tell: Tell) -> str:
     from pydpend.tracking import info
     from pydpend.tracking import overlay as draw
 
-    nodes = _nodes(here, r)
+    nodes, folder = _nodes(here, r), RecordingFolder(into)
     every = max(1, -(-nodes.frame.size // MOST_PICTURES))
     width = min(PAGE_WIDTH_PX, nodes.rig.image_px[0])
     drawn = draw(
         r.path,
         nodes,
-        into / RunFile.OVERLAY,
+        folder.file(RunFile.OVERLAY),
         every=every,
         width=width - width % 2,
         quality=OVERLAY_QUALITY,
         progress=_share(tell),
     )
-    film = info(into / RunFile.OVERLAY)
-    _write_json(
-        into / RunFile.OVERLAY_ABOUT,
-        {
-            "rate_hz": drawn.play_fps,
-            "every": every,
-            "size_px": [film["width"], film["height"]],
-            "times_s": drawn.t_s.tolist(),
-        },
-    )
+    film = info(folder.file(RunFile.OVERLAY))
+    size = (int(film["width"]), int(film["height"]))
+    folder.write_overlay(StoredOverlay(folder.file(RunFile.OVERLAY), drawn.t_s, drawn.play_fps, size, every))
     return f"{drawn.t_s.size} pictures, {'every frame' if every == 1 else f'one frame in {every}'}"
 
 

@@ -56,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
     check_files(args, args.output)
     run = read_run(args.run_folder)
     r = chosen(run, args.recording)
-    fit = run.fit()
+    fit = run.fit_folder.fit()
     stored = StoredFit.of(fit)
     model, angles = stored.model(), r.angles()
     start = args.start_s

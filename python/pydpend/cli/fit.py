@@ -125,16 +125,16 @@ def progress(label: str, quiet: bool) -> Callable[[int, int, float], None] | Non
 def run(args: argparse.Namespace) -> int:
     """Fits and writes. 1 when the fit did not converge."""
     from pydpend.damping import fit_damping
-    from pydpend.damping.stored import files_of_fit, write_fit
+    from pydpend.fit_folder import FitFolder
     from pydpend.model import model_called
-    from pydpend.output import check_folder, results_folder, write_text
+    from pydpend.output import check_folder, results_folder
     from pydpend.trials import fit_trials
 
     options = FitOptions(**given(args, fields(FitOptions)))
     options.check_own_prediction()
     check_folder(args.output)
-    names = files_of_fit(len(args.angles), figures=not args.no_figures, maps=options.angle_maps)
-    check_files(args, *(args.output / name for name in names))
+    folder = FitFolder(args.output)
+    check_files(args, *folder.files(len(args.angles), figures=not args.no_figures, maps=options.angle_maps))
     recordings = [read(path, args) for path in args.angles]
     model = model_called(args.model)
     chosen = options.as_programs_do()
@@ -148,13 +148,11 @@ def run(args: argparse.Namespace) -> int:
     if report is not None:
         print(file=sys.stderr)
     results_folder(args.output)
-    write_fit(fit, args.output)
-    if trials is not None:
-        write_text(args.output / "trials.json", trials.to_json())
+    folder.write(fit, trials)
     if not args.no_figures:
         from pydpend.plots.damping import save_figures
 
-        save_figures(fit, trials, args.output)
+        save_figures(fit, trials, folder)
     if args.json:
         print(fit.to_json(), end="")
     else:

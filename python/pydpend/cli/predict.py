@@ -17,6 +17,7 @@ from pydpend.cli.flags import add_fields
 from pydpend.cli.writes import check_files
 from pydpend.fit_options import FitOptions
 from pydpend.output import check_folder, results_folder, write_text
+from pydpend.tabular import write_csv
 
 HELP = "predict a recording from a fit to others"
 
@@ -35,8 +36,8 @@ def add_arguments(p: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Predicts and writes."""
     from pydpend.damping.prediction import slashed
-    from pydpend.damping.stored import load_fit
     from pydpend.errors import OptionError, Setting, fault
+    from pydpend.fit_folder import load_fit
     from pydpend.number_words import numbers
 
     check_folder(args.output)
@@ -49,15 +50,11 @@ def run(args: argparse.Namespace) -> int:
     result = stored.predict(read(args.angles, args), windows, start_s=args.start_s, stop_s=args.stop_s)
     results_folder(args.output)
     write_text(args.output / "predict.json", result.to_json())
-    links = next(iter(result.rows.values())).shape[1] - 1
-    lines = [",".join(("window_s", "start_s", *(f"phi{j + 1}_rms_deg" for j in range(links))))]
-    for window, rows in result.rows.items():
-        lines += [",".join((window, *(f"{v:.6f}" for v in row))) for row in rows]
-    write_text(args.output / "windows.csv", "\n".join(lines) + "\n")
-    from pydpend.plots.damping import windows_columns, windows_figure
+    write_csv(args.output / "windows.csv", result.to_columns())
+    from pydpend.plots.damping import windows_figure
     from pydpend.plots.style import save
 
-    save(windows_figure(windows_columns(result)), args.output / "windows.png")
+    save(windows_figure(result), args.output / "windows.png")
     if args.json:
         print(result.to_json(), end="")
     else:

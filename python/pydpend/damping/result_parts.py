@@ -91,7 +91,7 @@ class EnergyCurve(TableResult):
     def of_columns(cls, columns: Mapping[str, Floats]) -> EnergyCurve:
         """The inverse of `to_columns`."""
         first = ("time_s", "energy_j", "model_j")
-        names = tuple(name.removesuffix("_j") for name in columns if name not in first)
+        names = tuple(n.removesuffix("_j") for n in columns if n.endswith("_j") and n not in first)
         works = [columns[f"{name}_j"] for name in names]
         t = columns["time_s"]
         stacked = np.column_stack(works) if works else np.zeros((t.size, 0))
@@ -133,7 +133,7 @@ class Residuals(TableResult):
     @classmethod
     def of_columns(cls, columns: Mapping[str, Floats]) -> Residuals:
         """The inverse of `to_columns`."""
-        links = [j for j in (1, 2) if f"phi{j}_residual_rad" in columns]
+        links = [j for j in (1, 2) if {f"phi{j}_residual_rad", f"phi{j}_sigma_rad"} <= set(columns)]
         left, sigma = (
             np.column_stack([columns[f"phi{j}_{w}_rad"] for j in links]) for w in ("residual", "sigma")
         )

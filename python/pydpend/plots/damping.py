@@ -3,44 +3,33 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Protocol
+from collections.abc import Mapping
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from pydpend.coefficients import RATIOS
 from pydpend.damping import DampingFit, Maps, Prediction
-from pydpend.damping.result_parts import EnergyCurve, Estimate
-from pydpend.damping.stored import recording_suffix
+from pydpend.damping.result_parts import EnergyCurve, Estimate, Residuals
+from pydpend.fit_folder import FileOfEach, FitFile, FitFolder
 from pydpend.plots.angles import thinned
 from pydpend.plots.style import COLORS, new_figure, save, style
-from pydpend.trials import Trials
-
-Floats = NDArray[np.float64]
+from pydpend.trials import Spread, Trials
 
 
-def energy_figure(energy: Mapping[str, Floats], zoom_s: float = 2.0) -> Figure:
-    """Energy of the motion and the model's, with the first ``zoom_s`` seconds beside (Fig. 19).
-
-    ``energy``: columns ``time_s``, ``energy_j``, ``model_j`` of an energy table.
-    """
-    t = energy["time_s"]
+def energy_figure(energy: EnergyCurve, zoom_s: float = 2.0) -> Figure:
+    """Energy of the motion and the model's, with the first ``zoom_s`` seconds beside (Fig. 19)."""
+    t = energy.t_s
     with style():
         figure = new_figure(6.5, 3.0)
         whole, zoom = figure.subplots(1, 2, width_ratios=(2, 1))
         near = t <= t[0] + zoom_s
         for axes, keep in ((whole, slice(None)), (zoom, near)):
-            for name, line, label in (("energy_j", "-", "motion"), ("model_j", "--", "start - losses")):
-                axes.plot(
-                    *thinned(t[keep], 1e3 * energy[name][keep]),
-                    line,
-                    color=COLORS[int(name == "model_j")],
-                    label=label,
-                )
+            for color, values, line, label in (
+                (COLORS[0], energy.energy_j, "-", "motion"),
+                (COLORS[1], energy.model_j, "--", "start - losses"),
+            ):
+                axes.plot(*thinned(t[keep], 1e3 * values[keep]), line, color=color, label=label)
             axes.set_xlabel("time (s)")
         whole.set_ylabel("energy (mJ)")
         whole.legend()
@@ -48,22 +37,20 @@ def energy_figure(energy: Mapping[str, Floats], zoom_s: float = 2.0) -> Figure:
     return figure
 
 
-def residuals_figure(residuals: Mapping[str, Floats]) -> Figure:
+def residuals_figure(residuals: Residuals) -> Figure:
     """Measured minus fitted angle of each link over time.
 
     Between plus and minus the standard deviation that each was weighted by.
-
-    ``residuals``: columns ``time_s``, ``phi1_residual_rad``, ``phi1_sigma_rad``, ... of a residual table.
     """
-    t = residuals["time_s"]
-    links = [j for j in (1, 2) if f"phi{j}_residual_rad" in residuals]
+    t = residuals.t_s
+    links = range(1, residuals.residual_rad.shape[1] + 1)
     with style():
         figure = new_figure(6.5, 1.9 * len(links))
         for axes, j in zip(
             figure.subplots(len(links), 1, squeeze=False, sharex=True).ravel(), links, strict=True
         ):
-            left = np.degrees(residuals[f"phi{j}_residual_rad"])
-            sigma = np.degrees(residuals[f"phi{j}_sigma_rad"])
+            left = np.degrees(residuals.residual_rad[:, j - 1])
+            sigma = np.degrees(residuals.sigma_rad[:, j - 1])
             axes.plot(*thinned(t, left), color=COLORS[j - 1], lw=0.6)
             for edge in (sigma, -sigma):
                 axes.plot(*thinned(t, edge), "k--", lw=0.7)
@@ -99,47 +86,7 @@ def shares_figure(shares: Mapping[str, Mapping[str, Estimate]]) -> Figure:
     return figure
 
 
-class Spreads(Protocol):
-    """What the figure needs of a coefficient over the recordings, as `pydpend.trials.Spread` has it."""
-
-    @property
-    def values(self) -> Sequence[float] | Floats:
-        """Of each recording (R,)."""
-        ...
-
-    @property
-    def sigmas(self) -> Sequence[float] | Floats:
-        """Standard errors of the values (R,)."""
-        ...
-
-    @property
-    def mean(self) -> float:
-        """Mean over the recordings; NaN where there is none."""
-        ...
-
-    @property
-    def sigma(self) -> float:
-        """Standard error of the mean."""
-        ...
-
-    @property
-    def unit(self) -> str:
-        """Unit of all."""
-        ...
-
-
-@dataclass(frozen=True)
-class One:
-    """A coefficient of one recording alone: there is no mean."""
-
-    values: tuple[float, ...]
-    sigmas: tuple[float, ...]
-    unit: str
-    mean: float = math.nan
-    sigma: float = math.nan
-
-
-def coefficients_figure(coefficients: Mapping[str, Spreads]) -> Figure:
+def coefficients_figure(coefficients: Mapping[str, Spread]) -> Figure:
     """Each coefficient over the recordings with its errors, and the mean with its own, if it is a number (Fig. 20)."""
     columns = min(3, max(1, len(coefficients)))
     rows = -(-len(coefficients) // columns) or 1
@@ -165,27 +112,16 @@ def coefficients_figure(coefficients: Mapping[str, Spreads]) -> Figure:
     return figure
 
 
-def windows_columns(prediction: Prediction) -> dict[str, Floats]:
-    """The windows of a prediction as columns: length and start in s, RMS of each link in degrees."""
-    rows = [(w, *r) for w, found in prediction.rows.items() for r in found]
-    links = next((found.shape[1] - 1 for found in prediction.rows.values()), 2)
-    table = np.array(rows, dtype=np.float64).reshape(-1, 2 + links)
-    names = ("window_s", "start_s", "phi1_rms_deg", "phi2_rms_deg")[: 2 + links]
-    return dict(zip(names, table.T, strict=True))
-
-
-def windows_figure(windows: Mapping[str, Floats]) -> Figure:
-    """RMS of each window over the recording, per window length; columns as in `windows_columns`."""
-    lengths = np.unique(windows["window_s"])
+def windows_figure(prediction: Prediction) -> Figure:
+    """RMS of each window over the recording, per window length."""
     with style():
-        figure = new_figure(6.5, 1.8 * max(1, lengths.size))
-        grid = figure.subplots(max(1, lengths.size), 1, squeeze=False, sharex=True).ravel()
-        for axes, length in zip(grid, lengths, strict=False):
-            here = windows["window_s"] == length
-            for j, name in enumerate(n for n in ("phi1_rms_deg", "phi2_rms_deg") if n in windows):
-                rms = windows[name][here]
-                axes.plot(windows["start_s"][here], rms, ".", color=COLORS[j], label=f"phi{j + 1}")
-            axes.set_ylabel(f"RMS in {length:g} s (deg)")
+        count = max(1, len(prediction.rows))
+        figure = new_figure(6.5, 1.8 * count)
+        grid = figure.subplots(count, 1, squeeze=False, sharex=True).ravel()
+        for axes, (length, rows) in zip(grid, prediction.rows.items(), strict=False):
+            for j in range(rows.shape[1] - 1):
+                axes.plot(rows[:, 0], rows[:, j + 1], ".", color=COLORS[j], label=f"phi{j + 1}")
+            axes.set_ylabel(f"RMS in {length} s (deg)")
             axes.set_ylim(bottom=0)
         grid[0].legend()
         grid[-1].set_xlabel("start of the window (s)")
@@ -205,17 +141,12 @@ def maps_figure(maps: Maps) -> Figure:
     return figure
 
 
-def energy_columns(curve: EnergyCurve) -> dict[str, Floats]:
-    """An energy curve as the columns of its table."""
-    return {"time_s": curve.t_s, "energy_j": curve.energy_j, "model_j": curve.model_j}
-
-
-def save_figures(fit: DampingFit, trials: Trials | None, folder: Path) -> None:
-    """Writes every figure that the fit has something for as PNG into a folder."""
+def save_figures(fit: DampingFit, trials: Trials | None, folder: FitFolder) -> None:
+    """Writes every figure that the fit has something for as PNG into its folder."""
     for k, curve in enumerate(fit.energy):
-        save(energy_figure(energy_columns(curve)), folder / f"energy{recording_suffix(fit, k)}.png")
-    save(shares_figure(fit.shares), folder / "shares.png")
+        save(energy_figure(curve), folder.file_of(FileOfEach.ENERGY_FIGURE, k, len(fit.inputs)))
+    save(shares_figure(fit.shares), folder.file(FitFile.SHARES_FIGURE))
     if fit.maps is not None:
-        save(maps_figure(Maps.from_dict(fit.maps)), folder / "maps.png")
+        save(maps_figure(Maps.from_dict(fit.maps)), folder.file(FitFile.MAPS_FIGURE))
     if trials is not None:
-        save(coefficients_figure(trials.spreads), folder / "trials.png")
+        save(coefficients_figure(trials.spreads), folder.file(FitFile.TRIALS_FIGURE))

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Protocol
-
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from pydpend.encoder.calibration import Calibration
+from pydpend.encoder import Calibration, Comparison
 from pydpend.plots.angles import thinned
 from pydpend.plots.style import COLORS, new_figure, plain, style
 
@@ -69,62 +67,8 @@ def calibration_figure(calibration: Calibration) -> Figure:
         return figure
 
 
-class Compared(Protocol):
-    """What the figure needs of a `Comparison`."""
-
-    @property
-    def link(self) -> int:
-        """The video's link, from 0."""
-        ...
-
-    @property
-    def t_s(self) -> Floats:
-        """Video time (n,), s."""
-        ...
-
-    @property
-    def video_rad(self) -> Floats:
-        """The video's angles (n,), rad."""
-        ...
-
-    @property
-    def encoder_rad(self) -> Floats:
-        """The encoder's angles (n,), rad."""
-        ...
-
-    @property
-    def video_sigma_rad(self) -> Floats:
-        """Standard uncertainties of the video's angles (n,), rad."""
-        ...
-
-    @property
-    def residual_rad(self) -> Floats:
-        """Video minus encoder (n,), rad."""
-        ...
-
-    @property
-    def gain(self) -> float:
-        """Gain of the encoder."""
-        ...
-
-    @property
-    def encoder_sigma_rad(self) -> float:
-        """Standard uncertainty of a reading, rad."""
-        ...
-
-    @property
-    def rms_rad(self) -> float:
-        """Root mean square of the residual, rad."""
-        ...
-
-    @property
-    def offset_rad(self) -> float:
-        """Offset of the encoder, rad."""
-        ...
-
-
 def comparison_figure(
-    found: Compared,
+    found: Comparison,
     zooms: tuple[tuple[float, float], tuple[float, float]] | None = None,
     label: str | None = None,
 ) -> Figure:

@@ -8,12 +8,12 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from pydpend.damping.stored import load_fit
+from pydpend.damping import Maps
 from pydpend.encoder import read_calibration
 from pydpend.errors import PydpendError, Setting, fault, listed
+from pydpend.fit_folder import FitFile
 from pydpend.plots.angles import angles_figure
 from pydpend.plots.damping import (
-    One,
     coefficients_figure,
     energy_figure,
     maps_figure,
@@ -23,15 +23,9 @@ from pydpend.plots.damping import (
 )
 from pydpend.plots.encoder import calibration_figure, comparison_figure
 from pydpend.plots.nodes import nodes_figure
-from pydpend.run_folder import (
-    AGAIN,
-    FIT_FOLDER,
-    Floats,
-    RunFile,
-    StoredRecording,
-    StoredRun,
-    read_run,
-)
+from pydpend.recording_folder import AGAIN, RunFile
+from pydpend.run_folder import StoredRecording, StoredRun, read_run
+from pydpend.trials import alone
 
 
 class FigureError(PydpendError):
@@ -56,54 +50,57 @@ def _comparison(run: StoredRun, r: StoredRecording) -> Figure:
 
 
 def _energy(run: StoredRun, r: StoredRecording) -> Figure:
-    return energy_figure(_there(r.energy(), r, "energy"))
+    curve = r.energy()
+    if curve is None:
+        raise _no_table(r, "energy")
+    return energy_figure(curve)
 
 
 def _residuals(run: StoredRun, r: StoredRecording) -> Figure:
-    return residuals_figure(_there(r.residuals(), r, "residuals"))
+    left = r.residuals()
+    if left is None:
+        raise _no_table(r, "residuals")
+    return residuals_figure(left)
 
 
-def _there(table: dict[str, Floats] | None, r: StoredRecording, name: str) -> dict[str, Floats]:
-    if table is None:
-        raise FigureError(fault(str(r.run), f"it has no table of {name} of {r.label}", AGAIN))
-    return table
+def _no_table(r: StoredRecording, name: str) -> FigureError:
+    return FigureError(fault(str(r.run), f"it has no table of {name} of {r.label}", AGAIN))
 
 
 def _shares(run: StoredRun, r: StoredRecording) -> Figure:
-    return shares_figure(run.fit().shares)
+    return shares_figure(run.fit_folder.fit().shares)
 
 
 def _coefficients(run: StoredRun, r: StoredRecording) -> Figure:
-    trials = run.trials()
-    if trials is not None:
-        return coefficients_figure(trials.spreads)
-    each = run.fit().coefficients
-    return coefficients_figure({name: One((e.value,), (e.sigma,), e.unit) for name, e in each.items()})
+    trials = run.fit_folder.trials()
+    return coefficients_figure(alone(run.fit_folder.fit()) if trials is None else trials.spreads)
 
 
 def _prediction(run: StoredRun, r: StoredRecording) -> Figure:
-    return windows_figure(r.windows())
+    found = run.predictions().get(r.name)
+    if found is None:
+        raise FigureError(fault(str(r.run), f"it has no prediction of {r.label}", AGAIN))
+    return windows_figure(found)
 
 
 def _maps(run: StoredRun, r: StoredRecording) -> Figure:
-    maps = load_fit(run.path / FIT_FOLDER).maps
+    maps = run.fit_folder.fit().maps
     if maps is None:
         raise FigureError(fault("maps", f"the fit of {run.path} was made without angle maps", AGAIN))
-    return maps_figure(maps)
+    return maps_figure(Maps.from_dict(maps))
 
 
 @dataclass(frozen=True)
 class Drawing:
     """A figure: what it shows, how it is drawn, and the file without which there is none.
 
-    ``each``: one for each recording. ``of_fit``: the file is the fit's.
+    ``each``: one for each recording.
     """
 
     about: str
     draw: Callable[[StoredRun, StoredRecording], Figure]
-    needs: RunFile
+    needs: RunFile | FitFile
     each: bool = True
-    of_fit: bool = False
 
 
 DRAWINGS = {
@@ -117,24 +114,17 @@ DRAWINGS = {
         "calibration line of the encoder and its residuals (Fig. 10)", _calibration, RunFile.ENCODER
     ),
     "comparison": Drawing("film and encoder, two zooms, residuals (Fig. 15)", _comparison, RunFile.COMPARED),
-    "residuals": Drawing("measured minus fitted angles over time", _residuals, RunFile.FIT, of_fit=True),
-    "energy": Drawing(
-        "energy of the motion and the model's, with a zoom (Fig. 19)", _energy, RunFile.FIT, of_fit=True
-    ),
+    "residuals": Drawing("measured minus fitted angles over time", _residuals, FitFile.FIT),
+    "energy": Drawing("energy of the motion and the model's, with a zoom (Fig. 19)", _energy, FitFile.FIT),
     "coefficients": Drawing(
         "coefficients with their errors, over the recordings (Fig. 20)",
         _coefficients,
-        RunFile.FIT,
+        FitFile.FIT,
         each=False,
-        of_fit=True,
     ),
-    "shares": Drawing(
-        "where the energy goes, by law and by joint", _shares, RunFile.FIT, each=False, of_fit=True
-    ),
+    "shares": Drawing("where the energy goes, by law and by joint", _shares, FitFile.FIT, each=False),
     "prediction": Drawing("error of each predicted window over time", _prediction, RunFile.WINDOWS),
-    "maps": Drawing(
-        "angle-dependent bias of the tracking", _maps, RunFile.MAPS_FIGURE, each=False, of_fit=True
-    ),
+    "maps": Drawing("angle-dependent bias of the tracking", _maps, FitFile.MAPS_FIGURE, each=False),
 }
 """Every figure of a run folder."""
 
@@ -163,7 +153,7 @@ def available(run: StoredRun, r: StoredRecording) -> list[str]:
 
 
 def _file(run: StoredRun, r: StoredRecording, d: Drawing) -> Path:
-    return run.file(d.needs) if d.of_fit else r.file(d.needs)
+    return run.fit_folder.file(d.needs) if isinstance(d.needs, FitFile) else r.file(d.needs)
 
 
 def figure_of(name: str, run_folder: str | Path, recording: str | None = None) -> Figure:

@@ -15,12 +15,12 @@ from pydpend.run_folder import FIT_FOLDER, StoredRun, read_run
 def report_page(folder: str | Path) -> Page:
     """The report of a run folder (`pydpend.analyse`)."""
     run = read_run(folder)
-    fit = run.fit() if FIT_FOLDER in run.stages else None
+    fit = run.fit_folder.fit() if FIT_FOLDER in run.stages else None
     predictions = run.predictions()
     warnings = [f"{run.title(name)}: {why}" for name, why in run.not_done.items()]
     answer: list[Block] = []
     if fit is not None:
-        answer = [Heading("Damping"), *damping.answer(fit, predictions, run.scale())]
+        answer = [Heading("Damping"), *damping.answer(fit, predictions, run.fit_folder.scale())]
     read: list[recording.Part] = []
     parts: list[Section] = []
     for r in run.recordings:

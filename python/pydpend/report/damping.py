@@ -8,8 +8,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from pydpend.coefficients import RATIO_UNITS, WORDS
-from pydpend.damping import DampingFit
+from pydpend.damping import DampingFit, EnergyCurve, Prediction, Residuals
 from pydpend.errors import Setting
+from pydpend.fit_folder import StoredScale
 from pydpend.fit_status import FitStatus, Verdict
 from pydpend.json_text import number
 from pydpend.plots.damping import coefficients_figure, shares_figure
@@ -28,7 +29,8 @@ from pydpend.report.page import (
     band,
 )
 from pydpend.report.words import between, digits, listed, quantity, sentence, signed, with_sigma, with_squares
-from pydpend.run_folder import Floats, StoredPrediction, StoredRun, StoredScale, StoredTrials
+from pydpend.run_folder import StoredRun
+from pydpend.trials import Trials
 
 ZOOM_S = 2.0
 """The first seconds of the energy stand alone too (Fig. 19)."""
@@ -101,9 +103,7 @@ def _left(fit: DampingFit) -> str:
     )
 
 
-def answer(
-    fit: DampingFit, predictions: Mapping[str, StoredPrediction], scale: StoredScale | None
-) -> list[Block]:
+def answer(fit: DampingFit, predictions: Mapping[str, Prediction], scale: StoredScale | None) -> list[Block]:
     """Where the energy goes, how well the model does, and the coefficients with their uncertainties."""
     intervals = fit.intervals
     links = links_of(fit)
@@ -148,7 +148,7 @@ def _energy_sentence(fit: DampingFit) -> str:
     return said + "."
 
 
-def _trust(fit: DampingFit, predictions: Mapping[str, StoredPrediction]) -> list[str]:
+def _trust(fit: DampingFit, predictions: Mapping[str, Prediction]) -> list[str]:
     """How well the model describes the angles, and how well it predicts angles that it has not seen."""
     out = []
     if fit.within_noise:
@@ -190,22 +190,19 @@ def _scale(scale: StoredScale | None, links: int) -> str:
     )
 
 
-def _residuals(columns: Mapping[str, Floats], group: str, title: str) -> list[Block]:
+def _residuals(left: Residuals, group: str, title: str) -> list[Block]:
     """What the fitted motion leaves of each angle, with the standard deviation it was weighted by."""
-    c = {k: v if k == "time_s" else np.degrees(v) for k, v in columns.items()}
     out: list[Block] = []
-    for j in (1, 2):
-        if f"phi{j}_residual_rad" not in c:
-            continue
-        left, sigma = c[f"phi{j}_residual_rad"], c[f"phi{j}_sigma_rad"]
-        rms = np.sqrt(np.nanmean(left**2))
+    both = zip(np.degrees(left.residual_rad.T), np.degrees(left.sigma_rad.T), strict=True)
+    for j, (off, sigma) in enumerate(both, 1):
+        rms = np.sqrt(np.nanmean(off**2))
         out.append(
             Chart(
                 f"{group}-left{j}",
                 f"phi{j}{title}, measured minus fitted: RMS {digits(rms)} deg",
                 group,
-                c["time_s"],
-                (Series(f"difference of phi{j} (deg)", left, j - 1), *band(sigma)),
+                left.t_s,
+                (Series(f"difference of phi{j} (deg)", off, j - 1), *band(sigma)),
                 y_label="difference (deg)",
                 height=180,
             )
@@ -213,10 +210,9 @@ def _residuals(columns: Mapping[str, Floats], group: str, title: str) -> list[Bl
     return out
 
 
-def _energy(c: Mapping[str, Floats], group: str, title: str) -> list[Block]:
-    t, energy, model = c["time_s"], c["energy_j"], c["model_j"]
+def _energy(curve: EnergyCurve, group: str, title: str) -> list[Block]:
+    t, energy, model = curve.t_s, curve.energy_j, curve.model_j
     near = t <= t[0] + ZOOM_S
-    laws = [n for n in c if n.endswith("_j") and n not in ("energy_j", "model_j")]
     return [
         Chart(
             f"{group}-energy",
@@ -256,13 +252,13 @@ def _energy(c: Mapping[str, Floats], group: str, title: str) -> list[Block]:
             f"Energy{title}, taken out by each law",
             group,
             t,
-            tuple(Series(n.removesuffix("_j"), c[n], i % 6, dashed=i >= 6) for i, n in enumerate(laws)),
+            tuple(Series(n, curve.works_j[:, i], i % 6, dashed=i >= 6) for i, n in enumerate(curve.names)),
             y_label="energy (J)",
         ),
     ]
 
 
-def sections(run: StoredRun, fit: DampingFit, predictions: Mapping[str, StoredPrediction]) -> list[Section]:
+def sections(run: StoredRun, fit: DampingFit, predictions: Mapping[str, Prediction]) -> list[Section]:
     """Energy, identifiability, trials and prediction."""
     blocks: list[Block] = [Text(sentence(fit.message))]
     blocks += [Listing(tuple(sentence(n) for n in fit.notes))] if fit.notes else []
@@ -279,11 +275,11 @@ def sections(run: StoredRun, fit: DampingFit, predictions: Mapping[str, StoredPr
             blocks.append(Reset(f"e{k}"))
     out = [Section("damping", "Damping", (*blocks, *_constants(fit), *_ten(fit)))]
     out.append(Section("identifiability", "What the data can tell", tuple(_told(fit))))
-    trials = run.trials()
+    trials = run.fit_folder.trials()
     if len(names) > 1 and trials is not None:
         out.append(Section("trials", "The recordings beside each other", tuple(_trials(trials, names))))
     if predictions:
-        out.append(Section("prediction", "Prediction", tuple(_prediction(run, predictions))))
+        out.append(Section("prediction", "Prediction", tuple(_prediction(predictions))))
     return out
 
 
@@ -369,7 +365,7 @@ def _told(fit: DampingFit) -> list[Block]:
     return blocks
 
 
-def _trials(trials: StoredTrials, names: list[str]) -> list[Block]:
+def _trials(trials: Trials, names: list[str]) -> list[Block]:
     rows = tuple(
         (
             f"{name}/psi" if name in RATIO_UNITS else name,
@@ -392,7 +388,7 @@ def _trials(trials: StoredTrials, names: list[str]) -> list[Block]:
     ]
 
 
-def _prediction(run: StoredRun, predictions: Mapping[str, StoredPrediction]) -> list[Block]:
+def _prediction(predictions: Mapping[str, Prediction]) -> list[Block]:
     blocks: list[Block] = [
         Text(
             "Each recording predicted from a fit of the others. In a window only the state at its start is fitted to "
@@ -400,9 +396,8 @@ def _prediction(run: StoredRun, predictions: Mapping[str, StoredPrediction]) -> 
             "whatever the model: compare its median."
         )
     ]
-    windows = {r.name: r.windows for r in run.recordings}
     for k, (name, p) in enumerate(predictions.items()):
-        links = max(len(w.rms_deg) for w in p.in_window.values())
+        links = max((len(w.rms_deg) for w in p.in_window.values()), default=0)
         rows = tuple(
             (
                 kind,
@@ -426,28 +421,23 @@ def _prediction(run: StoredRun, predictions: Mapping[str, StoredPrediction]) -> 
                 rows,
                 numbers=frozenset(range(2, 2 * links + 3)),
             ),
-            *_windows(windows[name](), f"w{k}"),
+            *_windows(p, f"w{k}"),
         ]
     return blocks
 
 
-def _windows(c: Mapping[str, Floats], group: str) -> list[Block]:
+def _windows(found: Prediction, group: str) -> list[Block]:
     """The error of each window over the recording, a chart for each length."""
     out: list[Block] = []
-    for n, length in enumerate(np.unique(c["window_s"])):
-        here = c["window_s"] == length
-        rms = tuple(
-            Series(f"phi{j} (deg)", c[f"phi{j}_rms_deg"][here], j - 1, points=True)
-            for j in (1, 2)
-            if f"phi{j}_rms_deg" in c
-        )
-        title = f"RMS error of each window of {length:g} s"
+    for n, (length, rows) in enumerate(found.rows.items()):
+        rms = tuple(Series(f"phi{j} (deg)", rows[:, j], j - 1, points=True) for j in range(1, rows.shape[1]))
+        title = f"RMS error of each window of {length} s"
         out.append(
             Chart(
                 f"{group}-{n}",
                 title,
                 group,
-                c["start_s"][here],
+                rows[:, 0],
                 rms,
                 "start of the window (s)",
                 "RMS (deg)",

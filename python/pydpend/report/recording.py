@@ -9,10 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pydpend.encoder import Comparison
 from pydpend.kinematics import LinkAngles
 from pydpend.nodes import Nodes
 from pydpend.plots.encoder import calibration_figure
 from pydpend.plots.style import inline_svg
+from pydpend.recording_folder import StoredOverlay
 from pydpend.report.page import (
     Block,
     Chart,
@@ -27,7 +29,7 @@ from pydpend.report.page import (
     band,
 )
 from pydpend.report.words import digits, with_sigma
-from pydpend.run_folder import StoredComparison, StoredOverlay, StoredRecording
+from pydpend.run_folder import StoredRecording
 
 MOST_PLACES = 6
 """Curves of places in one chart."""
@@ -44,7 +46,7 @@ class Part:
     angles: LinkAngles | None = None
     meta: dict[str, Any] = field(default_factory=dict)
     film: StoredOverlay | None = None
-    comparison: StoredComparison | None = None
+    comparison: Comparison | None = None
     calibration: str | None = None
     warnings: list[str] = field(default_factory=list)
     answer: list[tuple[str, str]] = field(default_factory=list)
@@ -205,12 +207,12 @@ class Part:
                 with_sigma(math.degrees(c.offset_rad), math.degrees(c.offset_sigma_rad)),
             ),
         ]
-        if c.clocks_given:
+        if c.sync.given:
             rows.append(("delay (ms)", with_sigma(1e3 * c.delay_s, 1e3 * c.delay_sigma_s)))
         else:
             rows += [
-                ("clock offset (s)", with_sigma(c.clock_offset_s, c.clock_offset_sigma_s)),
-                ("clock drift (ppm)", with_sigma(1e6 * c.drift, 1e6 * c.drift_sigma)),
+                ("clock offset (s)", with_sigma(c.sync.offset_s, c.sync.offset_sigma_s)),
+                ("clock drift (ppm)", with_sigma(1e6 * c.sync.drift, 1e6 * c.sync.drift_sigma)),
             ]
         names = {"encoder": "encoder's noise", "video": "film's noise", "unexplained": "neither"}
         rows += [
@@ -229,8 +231,7 @@ class Part:
             Series("encoder (deg)", np.degrees(c.encoder_rad), 1),
             Series("film (deg)", np.degrees(c.video_rad), 0),
         )
-        stated = math.degrees(math.hypot(*c.stated_sigma_rad)) if c.stated_sigma_rad else math.nan
-        sigma = np.full(c.t_s.size, stated)
+        sigma = np.full(c.t_s.size, math.degrees(c.stated_sigma_rad))
         blocks += [
             Chart(f"{id_}-both", "Film and encoder, phi1", id_, c.t_s, both, y_label="phi1 (deg)"),
             Chart(
