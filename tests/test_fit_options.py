@@ -103,3 +103,21 @@ def test_options_and_keywords_are_the_same_to_a_fit() -> None:
     assert one.coefficients == two.coefficients
     three = dp.fit_damping(angles, model, options=given, laws="mu_v1")
     assert set(three.coefficients) == {"mu_v1"}
+
+
+@pytest.mark.parametrize(
+    ("keyword", "advice"),
+    [
+        ("law", "Did you mean laws?"),
+        ("start", "Did you mean start_s?"),
+        ("angle_map", "Did you mean angle_maps?"),
+        ("Clock", "Did you mean clock?"),
+        ("ten", "Known are method, laws, ratios, "),
+    ],
+)
+def test_a_keyword_that_is_none_is_named_with_the_nearest(keyword: str, advice: str) -> None:
+    angles = measured(released(3, 4.0, 250.0), 3, 0.05)
+    with pytest.raises(FitOptionError) as caught:
+        dp.fit_damping(angles, dp.derived("A"), **{keyword: True})  # type: ignore[arg-type]
+    assert str(caught.value).startswith(f"{keyword}: it is no option of a damping fit. {advice}")
+    assert "\n" not in str(caught.value)

@@ -22,7 +22,8 @@ from tests.test_columns import HEAD, read
 @pytest.mark.parametrize(
     ("first", "step", "what"),
     [
-        (1714564800.0, 0.002, "since 1970"),
+        (9e8, 0.002, "since 1970"),
+        (5e9, 0.002, "since 1970"),
         (1714564800000.0, 2.0, "since 1970"),
         (1714564800000000.0, 2000.0, "since 1970"),
         (20240501120000.0, 1.0, "a date as 20240501120000"),
@@ -44,6 +45,43 @@ def test_stamps_written_as_numbers_are_not_taken_for_seconds(
     pq.write_table(pa.table({"time_s": times, "voltage_v": np.zeros(50)}), tmp_path / "t.parquet")
     with pytest.raises(EncoderError, match=f"row 0, column time_s: the time .* may be .*{what}"):
         read_encoder(tmp_path / "t.parquet")
+
+
+@pytest.mark.parametrize(
+    ("column", "unit_s"), [("time_s", 1.0), ("time_ms", 1e-3), ("t (us)", 1e-6), ("time [s]", 1.0)]
+)
+def test_seconds_since_1970_are_counted_from_the_first(tmp_path: Path, column: str, unit_s: float) -> None:
+    """A float64 holds such a time to 0.24 us; in us it is scaled, which rounds once more."""
+    times = 1714564800.25 + 0.002 * np.arange(50)
+    path = tmp_path / "t.csv"
+    rows = "".join(f"{t / unit_s!r},0.65\n" for t in times.tolist())
+    path.write_text(f"{column},voltage_v\n{rows}")
+    signal = read_encoder(path, time_column=column)
+    np.testing.assert_allclose(signal.t_s, 0.002 * np.arange(50), atol=5e-7)
+    assert signal.t_s[0] == 0.0
+    note = "its times are s since 1970; they are counted in s from the first, 2024-05-01T12:00:00.250000 UTC"
+    assert signal.notes[0] == note
+    if unit_s == 1.0:
+        path.write_text(f"{column},phi1_rad\n{rows}")
+        angles = read_angles(path, columns={"time_s": column})
+        np.testing.assert_array_equal(angles.t_s, signal.t_s)
+        assert angles.meta["notes"] == [note]
+
+
+def test_seconds_since_1970_need_a_unit(tmp_path: Path) -> None:
+    """A clock's ticks may be as large: under a name without a unit they are not told apart."""
+    path = tmp_path / "t.csv"
+    rows = "".join(f"{1714564800 + 2 * k},0.65\n" for k in range(50))
+    path.write_text("tick,voltage_v\n" + rows)
+    with pytest.raises(EncoderError, match=r"line 2, column tick: .* since 1970 in a column time_s"):
+        read_encoder(path, time_column="tick")
+    path.write_text("tick,phi1_rad\n" + rows)
+    with pytest.raises(AnglesError, match="since 1970 in a column time_s"):
+        read_angles(path, columns={"time_s": "tick"})
+    mixed = "time_s,voltage_v\n0.0,0.65\n1714564800.0,0.65\n"
+    path.write_text(mixed)
+    with pytest.raises(EncoderError, match="line 3, column time_s: the time 1714564800 s may be"):
+        read_encoder(path)
 
 
 def test_seconds_since_midnight_are_seconds(tmp_path: Path) -> None:

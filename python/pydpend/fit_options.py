@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields, replace
+from difflib import get_close_matches
 from typing import Any, Self, TypedDict
 
 from pydpend.coefficients import FREE, FULL, JOINT_OF, PAPER, check_once, coefficients
@@ -157,11 +158,17 @@ class FitOptions:
         Raises
         ------
         FitOptionError
-            For a value that is not known, or an option of the other method.
+            For a keyword or a value that is not known, or an option of the other method.
         """
         for old, new in OLD_NAMES.items():
             if old in keywords:
                 raise FitOptionError(fault(old, f"the option is called {new} now", "Rename it"))
+        known = [field.name for field in fields(FitOptions)]
+        for name in keywords:
+            if name not in known:
+                near = get_close_matches(name.lower(), known, 1, 0.6)
+                advice = f"Did you mean {near[0]}?" if near else f"Known are {listed(known, 'and')}"
+                raise FitOptionError(fault(name, "it is no option of a damping fit", advice))
         given = {name: value for name, value in keywords.items() if value is not None}
         return FitOptions(**given) if options is None else replace(options.fit, **given)
 

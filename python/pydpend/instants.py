@@ -31,10 +31,19 @@ _TWO_PARTS = re.compile(r"[+-]?\d{1,4}:\d\d(?:[.,]\d+)?")
 
 _LONGEST_S = 1e8
 """Three years: no recording is as long, and stamps (s since 1970, 20240501120000) are above."""
+_SINCE_1970_S = (946_684_800.0, 4_102_444_800.0)
+"""Seconds since 1970 of the years 2000 to 2100: the clock of a computer, in a column that is in s."""
 _SERIAL_DAYS = (3e4, 6e4)
 """Days since 1900, as spreadsheets store them, of the years 1982 to 2064."""
 _SERIAL_SPAN_DAYS = 0.1
 """A recording of days as numbers spans less, 2.4 hours; seconds that span less are no swing."""
+
+
+STAMP_ADVICE = (
+    "Write the times in s from the first, as dates (2024-05-01T12:00:00.250) "
+    "or as s since 1970 in a column time_s"
+)
+"""What to do about stamps that are written as numbers."""
 
 
 class NotInstants(ValueError):
@@ -65,6 +74,18 @@ def stamp_in(t_s: Floats) -> tuple[int, str] | None:
     ):
         return 0, "days since 1900 as spreadsheets store them"
     return None
+
+
+def since_1970(t_s: Floats) -> tuple[Floats, str] | None:
+    """Times (T,) that all are s since 1970, as s from the first one, and that one as a date; ``None`` for others.
+
+    Only for times that are known to be in s: counts of a clock in ms may be as large.
+    """
+    low, high = _SINCE_1970_S
+    if t_s.size == 0 or not np.all((t_s >= low) & (t_s <= high)):
+        return None
+    first = np.datetime64(round(float(t_s[0]) * 1e6), "us")
+    return t_s - t_s[0], f"{first} UTC"
 
 
 def seconds_of_text(fields: Sequence[str]) -> tuple[Floats, str]:

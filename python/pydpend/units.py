@@ -61,6 +61,12 @@ def unit_called(text: str) -> UnitOf | None:
     return None if bare == "MV" else _KNOWN.get(bare.lower())
 
 
+def is_of_time(column: str, stated: str = "") -> bool:
+    """Whether a column's name, or the unit ``stated`` for it, says in what unit of time it is."""
+    unit = unit_called(stated) if stated else unit_at_end(column)[1]
+    return unit is not None and unit.quantity == "time"
+
+
 def unit_at_end(name: str) -> tuple[str, UnitOf | None]:
     """How a column's name spells its unit, "" if it names none, and that unit, ``None`` if it is not known.
 

@@ -149,6 +149,15 @@ impl Kind {
                     format!("pydpend.analyse.analyse({options}, 'run')"),
                 )
             }
+            Self::Film | Self::Pictures if wanted.contains(&Self::Angles) => {
+                let stem = shell_word(path.with_extension("").display().to_string().trim_end_matches('/'));
+                let (nodes, angles) = (joined(&stem, ".parquet"), joined(&stem, "-angles.parquet"));
+                let then = Step {
+                    command: format!("pydpend angles {nodes} -o {angles}").into(),
+                    call: "dp.angles(nodes)".into(),
+                };
+                Some(self.next(path) + ", then " + Message::from(then) + ", and give what that makes")
+            }
             Self::Encoder if wanted.contains(&Self::Calibration) => step(
                 format!("pydpend calibrate {file} -o encoder.json"),
                 format!("dp.calibrate(dp.read_holds([{name:?}]))"),

@@ -14,10 +14,11 @@ from pydpend.columns import Columns, read_columns
 from pydpend.documents import unreadable
 from pydpend.encoder.scales import Unit, in_base, in_seconds
 from pydpend.errors import EncoderError, Setting, fault
-from pydpend.instants import seconds_of_numpy, stamp_in
+from pydpend.instants import STAMP_ADVICE, seconds_of_numpy, since_1970, stamp_in
 from pydpend.kinds import expect
 from pydpend.output import AnyPath, path_of
 from pydpend.tabular import TableResult
+from pydpend.units import is_of_time
 
 Floats = NDArray[np.float64]
 
@@ -103,7 +104,8 @@ def read_encoder(
 
     Units are those of the row under the header or at the end of a column's name (``time_ms``, ``U [mV]``,
     ``phi1 (deg)``): s, ms, us, ns, min, h; V, mV; rad, mrad, deg, turns. Times without one are s; values without one
-    are `unit`'s, else V. Times given as dates become seconds from the first.
+    are `unit`'s, else V. Times given as dates, or as s since 1970 in a column that states its unit, become seconds from
+    the first.
 
     Parameters
     ----------
@@ -177,6 +179,10 @@ def read_encoder(
         stated = table.units.get(label, "")
         if when in table.values and rate_hz is None and not table.has_instants:
             t = in_seconds(t, str(path), when, table.units.get(when, ""))
+            stamped = since_1970(t) if is_of_time(when, table.units.get(when, "")) else None
+            if stamped is not None:
+                t, first = stamped
+                notes.append(f"its times are s since 1970; they are counted in s from the first, {first}")
     value, base = in_base(value, str(path), label, stated, unit)
     return _checked(path, t, value, label, when, base, table, notes)
 
@@ -260,7 +266,7 @@ def _checked(
             fault(
                 str(path),
                 f"the time {t[stamp[0]]:.14g} s may be {stamp[1]}",
-                "Write the times in s from the first, or as dates (2024-05-01T12:00:00.250)",
+                STAMP_ADVICE,
                 place=place(stamp[0], when),
             )
         )

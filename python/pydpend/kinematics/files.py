@@ -20,11 +20,11 @@ from pydpend.arrays import read_npy
 from pydpend.columns import Columns, read_columns
 from pydpend.documents import parse_json, read_text
 from pydpend.errors import AnglesError, Setting, fault
-from pydpend.instants import stamp_in
+from pydpend.instants import STAMP_ADVICE, since_1970, stamp_in
 from pydpend.kinds import expect
 from pydpend.kinematics.table import Floats, LinkAngles, check_table
 from pydpend.output import AnyPath, path_of, whole, write_text
-from pydpend.units import unit_at_end, unit_called
+from pydpend.units import is_of_time, unit_at_end, unit_called
 
 META_KEY = "pydpend_angles"
 """Key of the JSON that :func:`write_angles` puts into a Parquet file's metadata."""
@@ -62,7 +62,8 @@ def read_angles(
     Returns
     -------
     LinkAngles
-        Angles, rad, counter-clockwise positive, zero hanging down.
+        Angles, rad, counter-clockwise positive, zero hanging down. Times that are dates or s since 1970 are counted
+        from the first; ``meta["notes"]`` says so of the latter.
 
     Raises
     ------
@@ -73,6 +74,7 @@ def read_angles(
     # What a folder lacks is told below.
     expect(path, ("angles", "tables") if path.is_dir() else ("angles",), AnglesError)
     label = name if name is not None else (path.name if path.is_dir() else path.stem)
+    meta: dict[str, Any]
     if path.is_dir():
         if columns:
             raise AnglesError(
@@ -82,6 +84,9 @@ def read_angles(
         frame, meta, table = None, {"source": str(path), "form": "published npy"}, None
     else:
         t, phi, sigma, frame, meta, table = _read_table(path, dict(columns or {}))
+        t, notes = _from_first(t, table, dict(columns or {}).get("time_s", "time_s"))
+        if notes:
+            meta = meta | {"notes": [*meta.get("notes", ()), *notes]}
     hanging = np.broadcast_to(np.asarray(hanging_rad, dtype=np.float64), (phi.shape[1],))
     phi = (phi - hanging) * (-1.0 if clockwise else 1.0)
     if unwrap:
@@ -101,11 +106,20 @@ def read_angles(
             fault(
                 str(path),
                 f"the time {t[stamp[0]]:.14g} s may be {stamp[1]}",
-                "Write the times in s from the first, or as dates (2024-05-01T12:00:00.250)",
+                STAMP_ADVICE,
                 place=place(stamp[0], "time_s"),
             )
         )
     return LinkAngles(t, phi, sigma, frame, meta, label)
+
+
+def _from_first(t: Floats, table: Columns, column: str) -> tuple[Floats, list[str]]:
+    """Times of a column that are s since 1970 as s from the first, and a note on that; others as they are."""
+    known = not table.has_instants and is_of_time(column, table.units.get(column, ""))
+    stamped = since_1970(t) if known else None
+    if stamped is None:
+        return t, []
+    return stamped[0], [f"its times are s since 1970; they are counted in s from the first, {stamped[1]}"]
 
 
 _TableParts = tuple[Floats, Floats, Floats, "NDArray[np.int64] | None", dict[str, Any], Columns]
