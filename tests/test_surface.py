@@ -37,6 +37,11 @@ from tests.made_results import (
     trials,
 )
 
+
+def signal() -> EncoderSignal:
+    return EncoderSignal(np.arange(5.0), np.ones(5))
+
+
 RESULTS: dict[str, Callable[[], Any]] = {
     "Nodes": some_nodes,
     "LinkAngles": motion,
@@ -61,6 +66,16 @@ def test_a_result_is_one_line_and_a_small_table(kind: str) -> None:
 
 
 @pytest.mark.parametrize(
+    "made", [comparison, prediction, trials, calibration, lambda: comparison().sync, signal]
+)
+def test_other_results_are_one_line(made: Callable[[], Any]) -> None:
+    line = repr(made())
+    assert line.startswith(f"<{type(made()).__name__}")
+    assert "\n" not in line
+    assert len(line) < 160
+
+
+@pytest.mark.parametrize(
     ("made", "rows", "column"),
     [
         (motion, 1001, "phi2_rad"),
@@ -68,7 +83,7 @@ def test_a_result_is_one_line_and_a_small_table(kind: str) -> None:
         (simulation, 10, "tau_c1_j"),
         (comparison, 1001, "residual_rad"),
         (fit, 6, "sigma"),
-        (lambda: EncoderSignal(np.arange(5.0), np.ones(5)), 5, "voltage_v"),
+        (signal, 5, "voltage_v"),
         (lambda: EncoderSignal(np.arange(5.0), np.ones(5), "rad"), 5, "phi1_rad"),
         (calibration, 4, "residual_v"),
         (prediction, 8, "phi2_rms_deg"),

@@ -68,7 +68,7 @@ class Spread:
         return cls(values, sigmas, *numbers, *chances, table.text("unit"))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Trials(JsonResult, TableResult):
     """Fits of several recordings of one pendulum.
 
@@ -92,6 +92,10 @@ class Trials(JsonResult, TableResult):
     joint: DampingFit
     spreads: dict[str, Spread]
     message: str
+
+    def __repr__(self) -> str:
+        """A line for people."""
+        return f"<Trials of {len(self.each)} recordings, {len(self.spreads)} quantities: {self.message}>"
 
     def to_dict(self) -> dict[str, Any]:
         """The trials as plain values: ``trials.json``.

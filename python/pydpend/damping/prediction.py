@@ -76,7 +76,7 @@ class Window:
         return cls(rms, median, table.whole("n"))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Prediction(JsonResult, TableResult):
     """How well a fit predicts one recording that it has not seen.
 
@@ -112,6 +112,11 @@ class Prediction(JsonResult, TableResult):
     zeros_rad: tuple[float, float]
     rows: dict[str, Floats]
     message: str
+
+    def __repr__(self) -> str:
+        """A line for people."""
+        errors = ", ".join(f"{slashed(w.rms_deg)} deg in {k} s" for k, w in self.in_window.items())
+        return f"<Prediction {self.name}: RMS {errors}>"
 
     def to_dict(self) -> dict[str, Any]:
         """The prediction as plain values: ``predict.json``.

@@ -44,7 +44,7 @@ LEAST_DOF = 3
 """With fewer degrees of freedom the holds' own noise says how well the line is known, not their scatter."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Calibration(JsonResult, TableResult):
     """The line between an encoder's volts and its angle, ``V = offset_v + slope_v_per_rad * phi`` (Fig. 10).
 
@@ -95,6 +95,13 @@ class Calibration(JsonResult, TableResult):
     range_v: tuple[float, float] = RANGE_V
     wraps: bool = False
     notes: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        """A line for people."""
+        turn = self.slope_v_per_rad * 2 * np.pi
+        return (
+            f"<Calibration: {len(self.holds)} holds, {turn:.6g} V per turn, linearity {self.linearity:.1e}>"
+        )
 
     @property
     def sigma(self) -> tuple[float, float]:

@@ -30,7 +30,7 @@ SAME_RAD = 1e-7
 video's angle is a thousand times more."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Comparison(JsonResult, TableResult):
     """The encoder's n readings on the video's clock, and how far the video is from them (Section 6, Fig. 15).
 
@@ -123,6 +123,12 @@ class Comparison(JsonResult, TableResult):
     notes: tuple[str, ...]
     left_out: int
     """How many of the video's angles and the encoder's readings were left out, by the regression too."""
+
+    def __repr__(self) -> str:
+        """A line for people."""
+        rms = float(np.degrees(self.rms_rad))
+        names = f"{self.name} against {self.encoder_name}"
+        return f"<Comparison {names}: {self.n} readings, RMS {rms:.4g} deg, gain {self.gain:.6f}>"
 
     @property
     def shares(self) -> dict[str, float]:

@@ -26,7 +26,7 @@ TIME_COLUMN = "time_s"
 KNOWN_COLUMNS = ("voltage_v", "phi1_rad", "phi1_deg")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class EncoderSignal(TableResult):
     """What an encoder recorded: T readings over time.
 
@@ -57,6 +57,11 @@ class EncoderSignal(TableResult):
     name: str = "encoder"
     notes: tuple[str, ...] = ()
     left_out: int = 0
+
+    def __repr__(self) -> str:
+        """A line for people."""
+        span = f"{self.t_s[0]:g} to {self.t_s[-1]:g} s"
+        return f"<EncoderSignal {self.name}: {self.t_s.size} readings in {self.unit}, {span}>"
 
     def __post_init__(self) -> None:
         t = seconds_of_numpy(np.asarray(self.t_s))

@@ -43,7 +43,7 @@ ALIKE = 1.05
 """Fits whose residuals differ by less than this factor explain the readings equally well."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Synchronisation(JsonResult):
     """The encoder's clock on the video's, with gain and zero of its angles.
 
@@ -95,6 +95,11 @@ class Synchronisation(JsonResult):
     correlation_samples: float
     given: bool = False
     rival_offset_s: float | None = None
+
+    def __repr__(self) -> str:
+        """A line for people."""
+        offset = f"{self.offset_s:.6g} +- {self.offset_sigma_s:.1g} s"
+        return f"<Synchronisation: offset {offset}, drift {1e6 * self.drift:.3g} ppm, gain {self.gain:.6f}>"
 
     @property
     def offset_sigma_s(self) -> float:
