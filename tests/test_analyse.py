@@ -277,7 +277,7 @@ def test_whatever_a_fit_can_be_told_an_analysis_can() -> None:
     ("wrong", "words"),
     [
         ({"ratios": "loose"}, "ratios: 'loose' is not known. Give free or fixed"),
-        ({"free": "tilt,wind"}, "free: 'wind' is not known. Give added_inertia, tilt, offset1 or offset2"),
+        ({"free": "tilt,wind"}, "free: 'wind' is not known. Give offset1, offset2, added_inertia or tilt"),
         ({"ten_coefficients": True}, "give method='energy' and laws='paper'"),
         (
             {"method": "energy", "intervals": "profile"},

@@ -99,6 +99,7 @@ def test_names_of_a_run_s_files_stand_in_one_place() -> None:
         "trials.json": {"fit_folder.py", "trials.py"},
         "encoder.json": {"recording_folder.py", "calibration.py"},
         "windows.csv": {"recording_folder.py", "predict.py"},
+        "residuals.parquet": {"recording_folder.py", "compare.py"},
     }
     wrong = []
     for path in sorted((ROOT / "python" / "pydpend").rglob("*.py")):

@@ -75,11 +75,6 @@ class Digests:
         return self.of(path) if path.exists() else name
 
 
-def write_whole(path: Path, text: str) -> None:
-    """Writes a file so that it is there whole or not at all."""
-    write_text(path, text)
-
-
 def _sha256(path: Path) -> str:
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
@@ -168,7 +163,7 @@ class RunFolder:
         }
         text = json.dumps(content, indent=1)
         try:
-            write_whole(self.path / RECORD, text + "\n")
+            write_text(self.path / RECORD, text + "\n")
         except OSError as error:
             raise RunFolderError(fault(str(self.path), f"cannot be written ({error.strerror})")) from None
 

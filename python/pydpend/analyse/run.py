@@ -15,14 +15,14 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from pydpend.analyse import provenance, stages
-from pydpend.analyse.folder import UNFINISHED, Digests, RunFolder, RunFolderError, digest, write_whole
+from pydpend.analyse.folder import UNFINISHED, Digests, RunFolder, RunFolderError, digest
 from pydpend.analyse.options import Options, check_files
 from pydpend.analyse.recordings import Recording, check_options, recordings
 from pydpend.analyse.state import Progress, RunState, StageResult, StageState, Started, Tell
 from pydpend.documents import Table
 from pydpend.errors import OptionError, PydpendError, Setting, fault
 from pydpend.json_text import JsonResult
-from pydpend.output import keeping
+from pydpend.output import keeping, write_text
 from pydpend.recording_folder import RunFile
 from pydpend.run_folder import FIT_FOLDER, PAGE, README, RECORD
 
@@ -285,7 +285,7 @@ def _analyse(run: RunFolder, todo: list[Stage], options: Options, progress: Prog
     tell(of, of, "Report", Started())
     begun = time.monotonic()
     stages.report(path)
-    write_whole(path / README, provenance.readme(run))
+    write_text(path / README, provenance.readme(run))
     seconds = {name: float(done["seconds"]) for name, done in run.stages.items()}
     seconds["report"] = round(time.monotonic() - begun, 2)
     tell(of, of, "Report", StageResult(StageState.DONE))
