@@ -530,7 +530,10 @@ mod tests {
         let part = [&b"PK\x03\x04"[..], &[0; 22], &[7, 0, 0, 0], b"phi.npy"].concat();
         std::fs::write(&archive, part).unwrap();
         let said = misplaced(&archive, &[Kind::Angles]).unwrap().to_string();
-        assert!(said.contains("it is a NumPy archive (.npz), not an angles table. Write its arrays as"), "{said}");
+        assert!(
+            said.contains("it is a NumPy archive (.npz), not an angles table. Write its arrays as"),
+            "{said}"
+        );
         assert!(said.contains("run.npy\", numpy.load(") && said.ends_with("run.npz\")[\"phi\"])"), "{said}");
         for kind in Kind::ALL {
             assert!(kind == Kind::Unknown || !kind.next(&film).is_empty(), "{kind:?}");
