@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 PYTHON ?= python3
 PY := .venv/bin/python
-EXTENSION := python/pydpend/_tracker.abi3.so
+EXTENSION := python/pydpend/_native.abi3.so
 CARGO_FLAGS := --release --workspace --locked
 
 .PHONY: help demo screenshot test build check format bench validate wheel fixtures clean
@@ -30,8 +30,8 @@ help:
 # Always the whole workspace: one choice of features, so that nothing is built twice.
 build: .make/system .make/venv
 	@cargo build $(CARGO_FLAGS)
-	@cmp -s target/release/lib_tracker.so $(EXTENSION) || \
-	    { cp target/release/lib_tracker.so $(EXTENSION).new && mv $(EXTENSION).new $(EXTENSION); }
+	@cmp -s target/release/lib_native.so $(EXTENSION) || \
+	    { cp target/release/lib_native.so $(EXTENSION).new && mv $(EXTENSION).new $(EXTENSION); }
 
 demo: build
 	@$(PY) tools/demo.py
@@ -49,7 +49,7 @@ check: build
 	.venv/bin/ruff check .
 	.venv/bin/ruff format --check .
 	.venv/bin/mypy
-	MYPYPATH=python .venv/bin/stubtest pydpend._tracker
+	MYPYPATH=python .venv/bin/stubtest pydpend._native
 
 # Long: the eight scenes by twenty seeds, real motion filmed, then the estimators' sweeps.
 validate: build

@@ -20,7 +20,7 @@ GROUPS: tuple[tuple[str, ...], ...] = (
         "errors",
         "crossing",
         "_typing",
-        "_tracker",
+        "_native",
         "kinds",
         "json_text",
         "tabular",
@@ -88,13 +88,13 @@ def assert_right(graph: Graph, groups: tuple[tuple[str, ...], ...]) -> None:
         assert room in rank, f"{room} has no place in the flow: give it one"
         for other, *_ in needed:
             assert rank.get(other, -1) <= rank[room], f"{room} may not use {other}, to its right"
-    gone = set(rank) - {room for (room, *_) in rooms(graph)} - {"_tracker"}
+    gone = set(rank) - {room for (room, *_) in rooms(graph)} - {"_native"}
     assert not gone, f"{sorted(gone)} have a place and are not there"
 
 
 def test_python_arrows_go_right() -> None:
     graph = python_graph()
-    assert {n for n in top_modules() if n not in ("_tracker", "py")} == {m[0] for m in graph if m} - {
+    assert {n for n in top_modules() if n not in ("_native", "py")} == {m[0] for m in graph if m} - {
         "__main__"
     }
     graph.pop(("__main__",), None)

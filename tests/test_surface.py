@@ -16,7 +16,7 @@ import polars as pl
 import pyarrow as pa
 import pydpend as dp
 import pytest
-from pydpend import _tracker
+from pydpend import _native
 from pydpend.encoder import EncoderSignal
 from pydpend.json_text import JsonResult
 from pydpend.tabular import TableResult
@@ -160,7 +160,7 @@ def test_a_text_that_is_no_result_is_one_line(kind: str) -> None:
 def test_every_json_result_goes_there_and_back() -> None:
     """A class that comes later is tried above too."""
     for module in pkgutil.walk_packages(dp.__path__, "pydpend."):
-        if not module.name.endswith(("__main__", "_tracker")):
+        if not module.name.endswith(("__main__", "_native")):
             importlib.import_module(module.name)
     assert {cls.__name__ for cls in JsonResult.__subclasses__()} == set(JSON)
 
@@ -176,14 +176,14 @@ def test_no_function_hides_a_module() -> None:
 
 
 def test_the_version_is_the_compiled_half_s() -> None:
-    assert dp.__version__ == _tracker.VERSION
+    assert dp.__version__ == _native.VERSION
 
 
 def test_results_that_hold_arrays_are_compared_by_identity() -> None:
     """A dataclass's own comparison asks arrays for one truth value."""
     wrong = []
     for module in pkgutil.walk_packages(dp.__path__, "pydpend."):
-        if module.name.endswith(("__main__", "_tracker")):
+        if module.name.endswith(("__main__", "_native")):
             continue
         for name, cls in inspect.getmembers(importlib.import_module(module.name), inspect.isclass):
             if cls.__module__ != module.name or not dataclasses.is_dataclass(cls):

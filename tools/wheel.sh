@@ -20,7 +20,7 @@ import pydpend as dp
 
 package = Path(dp.__file__).parent
 assert Path(sys.prefix) in package.parents, f"imported from {package}"
-assert (package / "py.typed").is_file() and (package / "_tracker.pyi").is_file()
+assert (package / "py.typed").is_file() and (package / "_native.pyi").is_file()
 nodes = dp.track(sys.argv[1], output="t.parquet", frames=(0, 2000), progress=False)
 assert nodes.complete and len(nodes) == 2000 and nodes.seen.any()
 film = dp.overlay(sys.argv[1], nodes, "t.mp4", every=50, width=320, progress=False)

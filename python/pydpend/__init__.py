@@ -6,7 +6,7 @@ hanging down, unwrapped over turns.
 
 from __future__ import annotations
 
-from pydpend import _tracker
+from pydpend import _native
 from pydpend.damping import DampingFit, Prediction, fit_damping
 from pydpend.encoder import (
     Calibration,
@@ -49,7 +49,7 @@ from pydpend.scoring import Score, score
 from pydpend.simulation import Simulation, simulate, simulate_many
 from pydpend.tracking import OverlayFilm, Setup, info, overlay, setup, track
 
-__version__: str = _tracker.VERSION
+__version__: str = _native.VERSION
 
 __all__ = [
     "AnglesError",

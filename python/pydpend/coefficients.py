@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from pydpend import _tracker
+from pydpend import _native
 from pydpend.errors import FitOptionError, Setting, fault
 from pydpend.model import LAW_TABLE, UNITS, Model, constants
 
@@ -30,7 +30,7 @@ JOINT_OF = {name: law.joint for name, law in LAW_TABLE.items()}
 TERMS = tuple(LAW_TABLE)
 """Columns of the compiled half's powers."""
 
-_RATIOS = _tracker.ratios()
+_RATIOS = _native.ratios()
 
 RATIOS = tuple(ratio.name for ratio in _RATIOS)
 """Constants whose ratio to psi free motion determines; psi itself is a common factor that it does not."""

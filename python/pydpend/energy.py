@@ -14,7 +14,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from pydpend import _tracker
+from pydpend import _native
 from pydpend.coefficients import TERMS, coefficients, parameters
 from pydpend.errors import FitError, Setting, fault
 from pydpend.fit_status import FitStatus
@@ -111,7 +111,7 @@ def energy_profile(
     state = np.ascontiguousarray(np.column_stack([states.phi_rad, states.w_rad_s]))
     a = np.ascontiguousarray(states.a_rad_s2)
     constants = parameters(model)
-    powers = _tracker.unit_powers(constants, state, a)
+    powers = _native.unit_powers(constants, state, a)
     excess = (0.0, 0.0)
     if sigma_a_rad_s2 is not None:
         excess = _rectified(powers, state, constants, sigma_a_rad_s2)

@@ -23,7 +23,7 @@ import pyarrow as pa
 from numpy.typing import ArrayLike, NDArray
 from pyarrow import csv, parquet
 
-from pydpend import _tracker
+from pydpend import _native
 from pydpend.columns import PARQUET_FAULTS
 from pydpend.errors import FILM_TRUTH, FilmError, fault
 from pydpend.output import AnyPath
@@ -123,16 +123,16 @@ class Film:
             if value is not None
         }
         if isinstance(scene, Mapping):
-            self._film = _tracker.Film.from_json(json.dumps({**scene, **changes}), moving)
+            self._film = _native.Film.from_json(json.dumps({**scene, **changes}), moving)
             return
         if scene in PRESETS:
-            self._film = _tracker.Film.preset(str(scene), seed or 0)
+            self._film = _native.Film.preset(str(scene), seed or 0)
         else:
             self._reads = [os.fsdecode(scene)]
             # A motion that is given here may stand for a scene that is not complete without one.
-            self._film = _tracker.Film.read(os.fsdecode(scene), moving)
+            self._film = _native.Film.read(os.fsdecode(scene), moving)
         if changes or (moving is not None and scene in PRESETS):
-            self._film = _tracker.Film.from_json(json.dumps({**self.scene, **changes}), moving)
+            self._film = _native.Film.from_json(json.dumps({**self.scene, **changes}), moving)
 
     @property
     def scene(self) -> dict[str, Any]:

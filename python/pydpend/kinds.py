@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from typing import Literal, TypeAlias
 
-from pydpend import _tracker
+from pydpend import _native
 from pydpend.errors import Message, PydpendError, Setting
 
 Kind: TypeAlias = Literal[
@@ -34,7 +34,7 @@ Kind: TypeAlias = Literal[
 
 def kind_of(path: str | os.PathLike[str]) -> Kind:
     """What a file or folder is; ``unknown`` where nobody can tell, or there is none."""
-    kind: Kind = _tracker.kind_of(os.fspath(path))
+    kind: Kind = _native.kind_of(os.fspath(path))
     return kind
 
 
@@ -48,6 +48,6 @@ def expect(
 
     ``setting``: the option that names the file.
     """
-    said: Message | None = _tracker.misplaced(os.fspath(path), list(wanted))
+    said: Message | None = _native.misplaced(os.fspath(path), list(wanted))
     if said is not None:
         raise error(said if setting is None else Setting(setting, subject=True) + ": " + said)

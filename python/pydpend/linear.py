@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from pydpend import _tracker
+from pydpend import _native
 from pydpend.errors import SimulationError, fault
 from pydpend.model import Damping, Model, parameters
 from pydpend.tabular import TableResult, by_link
@@ -143,11 +143,11 @@ def poincare(
     if not (np.isfinite(duration_s) and duration_s > 0):
         raise SimulationError(fault("poincare", f"duration {duration_s} s", "It must be positive"))
     try:
-        rows = _tracker.poincare_section(
+        rows = _native.poincare_section(
             parameters(model, damping),
             [float(x) for x in np.asarray(state, dtype=np.float64).ravel()],
             duration_s,
-            _tracker.IntegratorSettings(tolerance=tolerance),
+            _native.IntegratorSettings(tolerance=tolerance),
             link=link - 1,
             angle_rad=angle_rad,
             direction=float(direction),
@@ -221,7 +221,7 @@ def lyapunov(
             fault("lyapunov", f"{counted} intervals", "duration_s / interval_s must be at least 40")
         )
     try:
-        growth = _tracker.tangent_growth(
+        growth = _native.tangent_growth(
             parameters(model, damping),
             [float(x) for x in np.asarray(state, dtype=np.float64).ravel()],
             interval_s,

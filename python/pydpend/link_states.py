@@ -13,7 +13,7 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from pydpend import _tracker
+from pydpend import _native
 from pydpend.errors import AnglesError, fault
 from pydpend.tabular import TableResult, by_link, html_table
 
@@ -157,8 +157,8 @@ def states(
     for k in range(links):
         y = np.ascontiguousarray(phi[:, k])
         s, given = _sigmas(y, sigma[:, k], k)
-        factor, knots, log_q = _tracker.learn_noise(t, y, s, order, scale_sigma or not given, stretch_s)
-        x, p, _, calibration = _tracker.smooth_angles(
+        factor, knots, log_q = _native.learn_noise(t, y, s, order, scale_sigma or not given, stretch_s)
+        x, p, _, calibration = _native.smooth_angles(
             t, y, s, order, factor, knots, log_q, np.ascontiguousarray(white[:, k])
         )
         c = np.asarray(calibration)

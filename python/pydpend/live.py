@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pydpend import _tracker
+from pydpend import _native
 from pydpend._typing import Centroid, PixelAspect, Polarity
 from pydpend.crossing import Found
 from pydpend.errors import ArgumentError, fault
@@ -103,7 +103,7 @@ def detect(
     """
     area = (min_area_px, max_area_px)
     return _detections(
-        _tracker.detect(image, (threshold, polarity, centroid), area, depth_bits, aspect_text(pixel_aspect))
+        _native.detect(image, (threshold, polarity, centroid), area, depth_bits, aspect_text(pixel_aspect))
     )
 
 
@@ -170,7 +170,7 @@ class Tracker:
     ) -> None:
         self.rig = rig if isinstance(rig, Rig) else Rig.read(rig)
         self._next = 0
-        self._live = _tracker.LiveTracker(self.rig.to_json(), (threshold, polarity, centroid), depth_bits)
+        self._live = _native.LiveTracker(self.rig.to_json(), (threshold, polarity, centroid), depth_bits)
 
     def learn(self, images: Iterable[NDArray[Any]]) -> None:
         """Learns thresholds and noise from some images of the scene; else the first image tracked is all there is.

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pydpend import _tracker
+from pydpend import _native
 from pydpend.crossing import Columns, HeldColumns
 from pydpend.errors import ArgumentError, fault
 from pydpend.output import AnyPath
@@ -122,7 +122,7 @@ class Rig:
         RigError
             Naming the line or key at fault.
         """
-        return Rig.from_json(_tracker.read_rig(os.fsdecode(path)))
+        return Rig.from_json(_native.read_rig(os.fsdecode(path)))
 
     @staticmethod
     def from_json(text: str) -> Rig:
@@ -143,7 +143,7 @@ class Rig:
         RigError
             Naming what is wrong.
         """
-        _tracker.rig_toml(text)  # refuses what is no rig
+        _native.rig_toml(text)  # refuses what is no rig
         return _rig(json.loads(text))
 
     def to_dict(self) -> dict[str, Any]:
@@ -192,7 +192,7 @@ class Rig:
         RigError
             If the rig is wrong in itself.
         """
-        return _tracker.rig_toml(self.to_json())
+        return _native.rig_toml(self.to_json())
 
     def write(self, path: AnyPath) -> None:
         """Writes a rig file.
@@ -207,7 +207,7 @@ class Rig:
         RigError
             If the rig is wrong in itself or the file cannot be written.
         """
-        _tracker.write_rig(os.fsdecode(path), self.to_json())
+        _native.write_rig(os.fsdecode(path), self.to_json())
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -342,7 +342,7 @@ class Nodes:
             If ``meta["damage"]`` is not that of a table.
         """
         damage = self.meta.get("damage")
-        return None if damage is None else _tracker.damage_words(json.dumps(damage))
+        return None if damage is None else _native.damage_words(json.dumps(damage))
 
     def check(self) -> None:
         """Checks the table's invariants: shapes, increasing frames and times, places exactly where seen.
@@ -354,7 +354,7 @@ class Nodes:
         ArgumentError
             If an array has the wrong type or shape.
         """
-        _tracker.check_table(self._columns(), self._meta_json())
+        _native.check_table(self._columns(), self._meta_json())
 
     def write(self, path: AnyPath, *, safe_csv: bool = False) -> None:
         """Writes the table, Parquet or CSV (with its `.json`) by the ending, replacing what is there.
@@ -374,7 +374,7 @@ class Nodes:
         ArgumentError
             If an array has the wrong type or shape.
         """
-        _tracker.write_table(os.fsdecode(path), self._columns(), self._meta_json(), safe_csv)
+        _native.write_table(os.fsdecode(path), self._columns(), self._meta_json(), safe_csv)
 
     def to_dataframe(self) -> pd.DataFrame:
         """The table as pandas has it; pandas must be installed.
@@ -404,7 +404,7 @@ class Nodes:
 
         `polars.from_arrow(nodes)` gives the same as one column of structs, as of every such stream.
         """
-        reader = _tracker.arrow_reader(self._columns(), self.rig.to_json())
+        reader = _native.arrow_reader(self._columns(), self.rig.to_json())
         return reader.__arrow_c_stream__(requested_schema)
 
     def _columns(self) -> HeldColumns:
@@ -473,4 +473,4 @@ def read_nodes(path: AnyPath) -> Nodes:
     RigError
         If the rig in it is wrong.
     """
-    return nodes_of(_tracker.read_table(os.fsdecode(path)))
+    return nodes_of(_native.read_table(os.fsdecode(path)))

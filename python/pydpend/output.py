@@ -15,7 +15,7 @@ from contextvars import ContextVar
 from pathlib import Path
 from typing import TypeAlias
 
-from pydpend._tracker import check_outputs
+from pydpend._native import check_outputs
 from pydpend.errors import ArgumentError, fault
 
 AnyPath: TypeAlias = str | bytes | os.PathLike[str] | os.PathLike[bytes]

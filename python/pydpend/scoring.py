@@ -7,7 +7,7 @@ import os
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from pydpend import _tracker
+from pydpend import _native
 from pydpend.documents import Table
 from pydpend.errors import TableError
 from pydpend.filming import Film, StrPath
@@ -136,7 +136,7 @@ def score(nodes: Nodes | StrPath, truth: Film | StrPath, limit_px: float = 2.0) 
     """
     table = nodes if isinstance(nodes, Nodes) else read_nodes(nodes)
     found: dict[str, Any] = json.loads(
-        _tracker.score_places(
+        _native.score_places(
             [node.name for node in table.rig.nodes],
             table.frame,
             table.xy_px,

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from pydpend import _tracker
+from pydpend import _native
 from pydpend.errors import SimulationError, fault
 from pydpend.model import FORCES, LAW_TABLE, Damping, Model, parameters
 from pydpend.tabular import TableResult, by_link, html_table
@@ -172,9 +172,9 @@ def simulate(
         For a state that is not finite, times that do not increase, or a tolerance that is not reached.
     """
     t = np.atleast_1d(np.asarray(t_s, dtype=np.float64))
-    how = _tracker.IntegratorSettings(tolerance=tolerance, width_rad_s=smooth_width_rad_s, pinned=pinned)
-    run: _tracker.SimulatedMotion = _call(
-        _tracker.simulate_motion, parameters(model, damping), _state(state).tolist(), t, how
+    how = _native.IntegratorSettings(tolerance=tolerance, width_rad_s=smooth_width_rad_s, pinned=pinned)
+    run: _native.SimulatedMotion = _call(
+        _native.simulate_motion, parameters(model, damping), _state(state).tolist(), t, how
     )
     energy = run.energy
     works = run.works[:, [name in LAWS for name in LAW_TABLE]]
@@ -283,8 +283,8 @@ def simulate_many(
         parameters(models[i if len(models) > 1 else 0], dampings[i if len(dampings) > 1 else 0])
         for i in range(count)
     ]
-    how = _tracker.IntegratorSettings(tolerance=tolerance, width_rad_s=smooth_width_rad_s, pinned=pinned)
-    rows, energy, rest = _call(_tracker.simulate_ensemble, pairs, x, t, how)
+    how = _native.IntegratorSettings(tolerance=tolerance, width_rad_s=smooth_width_rad_s, pinned=pinned)
+    rows, energy, rest = _call(_native.simulate_ensemble, pairs, x, t, how)
     cube = rows.reshape(len(x), len(t), 4)
     return Ensemble(t, cube[:, :, :2], cube[:, :, 2:], energy.reshape(len(x), len(t)), rest)
 

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from pydpend import _tracker
+from pydpend import _native
 from pydpend._typing import Centroid, Decoder, Interlaced, PixelAspect, Polarity, Progress
 from pydpend.errors import ArgumentError, fault
 from pydpend.live import aspect_text
@@ -65,7 +65,7 @@ def _count(name: str, value: int) -> int:
 def _rig(rig: Rig | Path | None) -> str | None:
     if rig is None:
         return None
-    return rig.to_json() if isinstance(rig, Rig) else _tracker.read_rig(os.fsdecode(rig))
+    return rig.to_json() if isinstance(rig, Rig) else _native.read_rig(os.fsdecode(rig))
 
 
 def _files(rig: Rig | Path | None) -> list[str]:
@@ -194,7 +194,7 @@ def track(
     existing = "resume" if resume else "replace" if force else "refuse"
     callback, close = _callback(progress)
     try:
-        columns, warnings, stopped = _tracker.track(
+        columns, warnings, stopped = _native.track(
             os.fsdecode(path),
             _rig(rig),
             _frames(frames),
@@ -284,7 +284,7 @@ def setup(
     """
     callback, close = _callback(progress)
     try:
-        text, warnings, drawn = _tracker.setup(
+        text, warnings, drawn = _native.setup(
             os.fsdecode(path),
             _frames(frames),
             (threshold, polarity, "weighted"),
@@ -392,7 +392,7 @@ def overlay(
         nodes = read_nodes(nodes)
     callback, close = _callback(progress)
     try:
-        frame, t_s = _tracker.overlay_film(
+        frame, t_s = _native.overlay_film(
             os.fsdecode(recording),
             nodes._columns(),
             nodes._meta_json(),
@@ -447,5 +447,5 @@ def info(
         If an argument makes no sense.
     """
     opened = (fps, decoder, "as-frames", allow_protocol, 0, aspect_text(pixel_aspect))
-    known: dict[str, Any] = json.loads(_tracker.info(os.fsdecode(path), opened))
+    known: dict[str, Any] = json.loads(_native.info(os.fsdecode(path), opened))
     return known

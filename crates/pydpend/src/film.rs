@@ -26,7 +26,7 @@ type TruthArrays<'py> = (
 );
 
 /// A scene ready to be filmed.
-#[pyclass(frozen, name = "Film", module = "pydpend._tracker")]
+#[pyclass(frozen, name = "Film", module = "pydpend._native")]
 pub struct PyFilm {
     film: Film,
 }

@@ -4,7 +4,7 @@ use dynamics::{RATIOS, TERMS};
 use pyo3::prelude::*;
 
 /// One row of `dynamics::TERMS`.
-#[pyclass(frozen, get_all, name = "Law", module = "pydpend._tracker")]
+#[pyclass(frozen, get_all, name = "Law", module = "pydpend._native")]
 pub struct PyLaw {
     name: &'static str,
     unit: &'static str,
@@ -19,7 +19,7 @@ pub struct PyLaw {
 }
 
 /// One row of `dynamics::RATIOS`.
-#[pyclass(frozen, get_all, name = "Ratio", module = "pydpend._tracker")]
+#[pyclass(frozen, get_all, name = "Ratio", module = "pydpend._native")]
 pub struct PyRatio {
     name: &'static str,
     unit: &'static str,

@@ -1,4 +1,4 @@
-//! Python module `pydpend._tracker`: converts arguments, releases the GIL, maps errors. No algorithm.
+//! Python module `pydpend._native`: converts arguments, releases the GIL, maps errors. No algorithm.
 //!
 //! Each area has its file and is registered by one line in the module below; `python/pydpend` wraps it all.
 
@@ -21,7 +21,7 @@ use pyo3::prelude::*;
 
 /// The compiled half of pydpend; private.
 #[pymodule]
-mod _tracker {
+mod _native {
     #[pymodule_export]
     use super::film::{PyFilm, score_places};
     #[pymodule_export]

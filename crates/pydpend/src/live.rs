@@ -59,7 +59,7 @@ type Row<'py> = (
 );
 
 /// Follows the markers of a rig, image by image.
-#[pyclass(module = "pydpend._tracker")]
+#[pyclass(module = "pydpend._native")]
 pub struct LiveTracker {
     rig: Rig,
     settings: DetectSettings,

@@ -123,7 +123,7 @@ impl Segments<'_> {
 }
 
 /// What a fit is asked for. See `pydpend.damping.shooting.solve` for each.
-#[pyclass(frozen, module = "pydpend._tracker")]
+#[pyclass(frozen, module = "pydpend._native")]
 pub struct ShootingSettings(Settings);
 
 #[pymethods]
@@ -159,7 +159,7 @@ impl ShootingSettings {
 }
 
 /// A fit: K segments, R recordings, G shared parameters. See `dynamics::shooting::Fit` for each.
-#[pyclass(frozen, get_all, module = "pydpend._tracker")]
+#[pyclass(frozen, get_all, module = "pydpend._native")]
 pub struct ShootingFit {
     parameters: HashMap<&'static str, f64>,
     clock_scale: f64,

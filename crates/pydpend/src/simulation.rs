@@ -16,7 +16,7 @@ use pyo3::prelude::*;
 use crate::dynamics::parameters;
 
 /// How a motion is integrated.
-#[pyclass(frozen, module = "pydpend._tracker")]
+#[pyclass(frozen, module = "pydpend._native")]
 pub struct IntegratorSettings(Settings);
 
 #[pymethods]
@@ -48,7 +48,7 @@ fn table<'py>(py: Python<'py>, flat: &[f64], columns: usize) -> PyResult<Bound<'
 }
 
 /// One motion at T samples, with E events.
-#[pyclass(frozen, get_all, module = "pydpend._tracker")]
+#[pyclass(frozen, get_all, module = "pydpend._native")]
 pub struct SimulatedMotion {
     state: Py<PyArray2<f64>>,
     a: Py<PyArray2<f64>>,

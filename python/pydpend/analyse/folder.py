@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from pydpend._tracker import fingerprint, recording_files
+from pydpend._native import fingerprint, recording_files
 from pydpend.analyse.contents import made_by
 from pydpend.documents import Table, read_json
 from pydpend.errors import PydpendError, fault

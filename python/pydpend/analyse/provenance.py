@@ -30,9 +30,9 @@ def inputs(options: Options, digests: Digests) -> list[dict[str, str]]:
 
 def versions() -> dict[str, str]:
     """Of pydpend, Python and the libraries that compute."""
-    from pydpend import _tracker
+    from pydpend import _native
 
-    found = {"pydpend": _tracker.VERSION, "python": platform.python_version()}
+    found = {"pydpend": _native.VERSION, "python": platform.python_version()}
     for name in ("numpy", "scipy", "pyarrow", "matplotlib", "npTDMS"):
         try:
             found[name] = version(name)

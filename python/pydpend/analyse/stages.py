@@ -33,9 +33,9 @@ class DoesNotApply(PydpendError):
 
 def version() -> str:
     """The program's version."""
-    from pydpend import _tracker
+    from pydpend import _native
 
-    return _tracker.VERSION
+    return _native.VERSION
 
 
 def _share(tell: Tell) -> Callable[[str, int, int | None], None]:

@@ -38,9 +38,9 @@ COMMANDS: tuple[str, ...] = (
 
 
 def _version() -> str:
-    from pydpend import _tracker
+    from pydpend import _native
 
-    return _tracker.VERSION
+    return _native.VERSION
 
 
 def _number(word: str) -> float:
@@ -146,11 +146,11 @@ def _look_up_numpy() -> None:
     try:
         import numpy as np
 
-        from pydpend import _tracker
+        from pydpend import _native
         from pydpend.coefficients import parameters
         from pydpend.model import derived
 
-        _tracker.unit_powers(parameters(derived("A")), np.zeros((0, 4)), np.zeros((0, 2)))
+        _native.unit_powers(parameters(derived("A")), np.zeros((0, 4)), np.zeros((0, 2)))
     finally:
         signal.pthread_sigmask(signal.SIG_UNBLOCK, held)
 

@@ -35,7 +35,7 @@ def read_by(args: argparse.Namespace) -> Iterator[Path]:
 
 
 def _files(path: Path) -> Iterator[Path]:
-    from pydpend._tracker import recording_files
+    from pydpend._native import recording_files
 
     yield path
     if path.is_file():

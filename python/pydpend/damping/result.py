@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pydpend import _tracker
+from pydpend import _native
 from pydpend.coefficients import FULL, RATIOS, unit
 from pydpend.damping.result_parts import (
     SHORT_S,
@@ -184,7 +184,7 @@ class DampingFit(JsonResult, TableResult):
             "terms": {t.name: t.to_dict() for t in self.terms},
             "intervals": {name: i.to_dict() for name, i in self.intervals.items()},
             "inputs": list(self.inputs),
-            "version": _tracker.VERSION,
+            "version": _native.VERSION,
             "chi2_slack": self.chi2_slack,
             "slack": self.slack,
             "iterations": self.iterations,

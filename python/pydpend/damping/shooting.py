@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pydpend import _tracker
+from pydpend import _native
 from pydpend.damping.result_parts import Residuals
 from pydpend.errors import FitError, fault
 from pydpend.fit_status import FitStatus
@@ -165,7 +165,7 @@ def cut(
 
     Also the parameters found on the way: the fit of pieces, loosely tied.
     """
-    rows, times, states = _tracker.shooting_segments(tracks, spans, length_s, chained)
+    rows, times, states = _native.shooting_segments(tracks, spans, length_s, chained)
     good: NDArray[np.bool_] = np.asarray(np.isfinite(states).all(axis=1))
     good &= np.abs(states[:, 2:]).max(axis=1, initial=0.0) < FASTEST_RAD_S
     for k, (r, first, last, _) in enumerate(rows.tolist()):
@@ -200,7 +200,7 @@ def solve(
 ) -> Solution:
     """Runs the fit. Raises FitError when there is nothing to fit or the motion is not determined."""
     try:
-        settings = _tracker.ShootingSettings(
+        settings = _native.ShootingSettings(
             free=list(free),
             bounded=list(bounded),
             clock=clock,
@@ -211,7 +211,7 @@ def solve(
             max_iterations=max_iterations,
         )
         starts = [(float(a), float(b)) for a, b in np.asarray(zeros_rad, dtype=np.float64)]
-        out = _tracker.shooting_fit(
+        out = _native.shooting_fit(
             tracks, segments, parameters, starts, settings, clock_scale=clock_scale, progress=progress
         )
     except ValueError as problem:
@@ -304,7 +304,7 @@ def trace(
     tracks: Sequence[Track], segments: Segments, parameters: dict[str, float], clock_scale: float = 1.0
 ) -> Trace:
     """Follows each segment from its state."""
-    index, state, power = _tracker.shooting_trace(tracks, segments, parameters, clock_scale)
+    index, state, power = _native.shooting_trace(tracks, segments, parameters, clock_scale)
     return Trace(index[:, 0], index[:, 1], index[:, 2], state, power)
 
 

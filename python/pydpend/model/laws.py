@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, fields
 
-from pydpend._tracker import Law, laws
+from pydpend._native import Law, laws
 from pydpend.errors import ModelError, fault
 from pydpend.model.pendulum import Model
 
@@ -101,5 +101,5 @@ def constants(model: Model) -> dict[str, float]:
 
 
 def parameters(model: Model, damping: Damping) -> dict[str, float]:
-    """The model and its damping under the names that the compiled half knows (`_tracker.simulate_motion`)."""
+    """The model and its damping under the names that the compiled half knows (`_native.simulate_motion`)."""
     return constants(model) | {f.name: float(getattr(damping, f.name)) for f in fields(damping)}
