@@ -5,6 +5,7 @@ mod film;
 
 mod aspect;
 mod cine;
+mod coded_damage;
 mod cut;
 mod cut_out;
 mod damage;

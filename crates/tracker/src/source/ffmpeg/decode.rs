@@ -7,13 +7,14 @@ use std::ptr;
 use ffmpeg_next::ffi;
 
 use super::demux::{Demuxer, Packet};
+use super::watch::{Fate, Watch};
 use super::{codec_name, message};
 use crate::error::{Error, Fault, Result};
 use crate::source::cores;
 
-/// Codecs whose decoders keep silent about damage.
-const STRICT: [ffi::AVCodecID; 6] = [
-    ffi::AVCodecID::AV_CODEC_ID_H264,
+/// Codecs whose decoders keep silent about damage. H.264's says by its messages what it fills in, which [`Watch`] hears; told to
+/// stop, its threads would keep good pictures too.
+const STRICT: [ffi::AVCodecID; 5] = [
     ffi::AVCodecID::AV_CODEC_ID_HEVC,
     ffi::AVCodecID::AV_CODEC_ID_FFV1,
     ffi::AVCodecID::AV_CODEC_ID_PNG,
@@ -24,6 +25,7 @@ const STRICT: [ffi::AVCodecID; 6] = [
 /// An open decoder of one stream.
 pub(super) struct Decoder {
     context: *mut ffi::AVCodecContext,
+    watch: Watch,
 }
 
 // SAFETY: the context is owned by this value alone; libavcodec allows use from any one thread at a time.
@@ -58,7 +60,7 @@ impl Decoder {
         if context.is_null() {
             return Err(Error::Source(Fault::new(name, "out of memory")));
         }
-        let decoder = Self { context };
+        let decoder = Self { context, watch: Watch::new(parameters.codec_id) };
         // SAFETY: the context is allocated and not yet open; parameters and stream live during the calls.
         let code = unsafe {
             let code = ffi::avcodec_parameters_to_context(context, parameters);
@@ -73,6 +75,7 @@ impl Decoder {
             }
             // Cropping is exact to the pixel only with unaligned planes; we read bytes, so any place will do.
             (*context).flags |= ffi::AV_CODEC_FLAG_UNALIGNED as i32;
+            decoder.watch.prepare(&mut *context);
             if code < 0 { code } else { ffi::avcodec_open2(context, codec, ptr::null_mut()) }
         };
         if code < 0 {
@@ -88,11 +91,20 @@ impl Decoder {
         Ok(decoder)
     }
 
-    /// Gives a packet to the decoder, or with `None` says that there are no more. A failure shows later, as a
-    /// picture that does not come.
-    pub(super) fn send(&mut self, packet: Option<&Packet>) {
+    /// Gives a packet and its number, from 1, to the decoder, or with `None` says that there are no more. A failure shows
+    /// later, in [`fate`](Self::fate) or as a picture that does not come.
+    pub(super) fn send(&mut self, packet: Option<(&Packet, u64)>) {
+        if let Some((_, number)) = packet {
+            // SAFETY: the context is open, and no other reference to it exists here.
+            self.watch.next(number, unsafe { &mut *self.context });
+        }
         // SAFETY: the context is open; a null packet starts draining.
-        unsafe { ffi::avcodec_send_packet(self.context, packet.map_or(ptr::null(), Packet::as_ptr)) };
+        unsafe { ffi::avcodec_send_packet(self.context, packet.map_or(ptr::null(), |(p, _)| p.as_ptr())) };
+    }
+
+    /// What became of packet `number`; to be asked when its picture or that of a later packet is out.
+    pub(super) fn fate(&self, number: u64) -> Fate {
+        self.watch.fate(number)
     }
 
     /// Takes the next picture.
@@ -106,6 +118,11 @@ impl Decoder {
             c if c == ffi::AVERROR(libc_eagain()) => Received::Hungry,
             _ => Received::Damaged,
         })
+    }
+
+    /// Whether the decoder wrote the last block of packet `number`'s picture.
+    pub(super) fn is_written(&self, number: u64, picture: &Picture) -> bool {
+        picture.buffer(0).is_none_or(|buffer| self.watch.is_written(number, buffer))
     }
 
     /// Forgets everything, after a seek.
@@ -151,9 +168,16 @@ impl Picture {
         unsafe { &*self.0 }
     }
 
-    /// Whether the decoder itself says that the pixels are not those that were filmed.
+    /// Whether the picture is marked as one whose pixels are not those that were filmed.
     pub(super) fn is_damaged(&self) -> bool {
         self.get().decode_error_flags != 0 || self.get().flags & ffi::AV_FRAME_FLAG_CORRUPT != 0
+    }
+
+    /// All bytes of the buffer that holds a plane.
+    fn buffer(&self, plane: usize) -> Option<&[u8]> {
+        let (_, start, end) = self.range(plane)?;
+        // SAFETY: the buffer lives as long as `self`, and the decoder does not write into a picture it gave.
+        Some(unsafe { std::slice::from_raw_parts(start as *const u8, end - start) })
     }
 
     /// Where plane `plane` may be read: its first row's address, and its buffer's first and past-last ones.

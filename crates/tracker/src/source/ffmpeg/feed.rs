@@ -75,10 +75,6 @@ pub(super) struct Feed {
     failed: Option<String>,
     at_end: bool,
     ends_broken: bool,
-    /// What comes now is predicted from something that is lost or damaged.
-    suspect: bool,
-    /// The key frame that ended that; pictures shown before it may still be predicted from what was lost.
-    below: Option<i64>,
 }
 
 impl Feed {
@@ -106,8 +102,6 @@ impl Feed {
             failed: None,
             at_end: false,
             ends_broken: false,
-            suspect: false,
-            below: None,
         };
         for _ in 0..first {
             feed.read()?;
@@ -156,7 +150,7 @@ impl Feed {
             return Ok(FieldOrder::said(parameters.field_order));
         }
         let mut decoder = Decoder::open(&self.demuxer, name, 1)?;
-        for packet in self.ahead().map(Some).chain([None]) {
+        for packet in self.ahead().zip(1..).map(Some).chain([None]) {
             decoder.send(packet);
             if let Received::Picture(picture) = decoder.receive()? {
                 return Ok(FieldOrder::of(picture.get()));
@@ -198,24 +192,6 @@ impl Feed {
             }
         }
         Ok(Some(given))
-    }
-
-    /// Whether a packet's picture is not to be believed: it is damaged, or predicted from what is lost or damaged.
-    /// `key` is what the packet's picture is known by.
-    pub(super) fn judge(&mut self, given: &Given, key: i64, intra_only: bool) -> bool {
-        if intra_only {
-            return given.is_damaged;
-        }
-        if given.packet.has(ffi::AV_PKT_FLAG_KEY) {
-            if self.suspect {
-                self.below = Some(key);
-            }
-            self.suspect = false;
-        } else {
-            self.suspect |= given.after_loss;
-        }
-        self.suspect |= given.is_damaged;
-        self.suspect || self.below.is_some_and(|below| key < below)
     }
 
     /// Whether the length that the container declares is that of its pictures: FLV gives the last one's time, ASF adds the

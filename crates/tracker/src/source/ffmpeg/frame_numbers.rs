@@ -7,6 +7,8 @@ use std::collections::BTreeMap;
 
 use ffmpeg_next::ffi;
 
+use super::units::Units;
+
 /// Types of units: a part of a picture, of one that predicts from none before it, and the two sets of parameters.
 const SLICE: u8 = 1;
 const FRESH_SLICE: u8 = 5;
@@ -29,8 +31,7 @@ struct Sequence {
 /// Follows the frame numbers of a stream's packets.
 #[derive(Debug)]
 pub(super) struct FrameNumbers {
-    /// Bytes of the length before each unit; 0 where marks part them.
-    length_bytes: usize,
+    units: Units,
     sequences: BTreeMap<u32, Sequence>,
     /// The sequence set of each picture set.
     pictures: BTreeMap<u32, u32>,
@@ -44,11 +45,10 @@ impl FrameNumbers {
         if codec != ffi::AVCodecID::AV_CODEC_ID_H264 {
             return None;
         }
-        let mut numbers =
-            Self { length_bytes: 0, sequences: BTreeMap::new(), pictures: BTreeMap::new(), last: None };
-        if parameters.first() == Some(&1) {
+        let units = Units::of(codec, parameters)?;
+        let mut numbers = Self { units, sequences: BTreeMap::new(), pictures: BTreeMap::new(), last: None };
+        if units.have_lengths() {
             // ISO/IEC 14496-15, 5.3.3.1: after six bytes sequence sets, a number, and picture sets.
-            numbers.length_bytes = usize::from(parameters.get(4)? & 3) + 1;
             let mut at = 5;
             for mask in [0x1F, 0xFF] {
                 let count = *parameters.get(at)? & mask;
@@ -60,7 +60,7 @@ impl FrameNumbers {
                 }
             }
         } else {
-            numbers.units(parameters).into_iter().for_each(|unit| numbers.set(unit));
+            units.split(parameters).into_iter().for_each(|unit| numbers.set(unit));
         }
         Some(numbers)
     }
@@ -68,7 +68,7 @@ impl FrameNumbers {
     /// Whether a packet's picture follows that of the packet before it with no reference picture between them;
     /// `None` where nothing tells.
     pub(super) fn follows(&mut self, packet: &[u8]) -> Option<bool> {
-        for unit in self.units(packet) {
+        for unit in self.units.split(packet) {
             match unit.first()? & 0x1F {
                 SEQUENCE | PICTURE => self.set(unit),
                 FRESH_SLICE => {
@@ -109,27 +109,6 @@ impl FrameNumbers {
             }
             _ => {}
         }
-    }
-
-    /// The units in a packet.
-    fn units<'a>(&self, packet: &'a [u8]) -> Vec<&'a [u8]> {
-        let mut units = Vec::new();
-        let mut rest = packet;
-        if self.length_bytes == 0 {
-            let mark = |bytes: &[u8]| bytes.windows(3).position(|w| w == [0, 0, 1]);
-            while let Some(at) = mark(rest) {
-                rest = &rest[at + 3..];
-                units.push(&rest[..mark(rest).unwrap_or(rest.len())]);
-            }
-            return units;
-        }
-        while let Some((length, unit)) = rest.split_at_checked(self.length_bytes) {
-            let length = length.iter().fold(0, |sum, b| sum << 8 | usize::from(*b));
-            let Some((unit, after)) = unit.split_at_checked(length) else { break };
-            units.push(unit);
-            rest = after;
-        }
-        units
     }
 }
 

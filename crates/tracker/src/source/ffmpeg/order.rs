@@ -12,10 +12,8 @@ pub(super) struct Sent {
     pub key: i64,
     /// Byte offset in the file.
     pub byte: Option<u64>,
-    /// Whether decoding can start with it.
-    pub key_frame: bool,
-    /// It is damaged, or predicted from one that is damaged or lost.
-    pub suspect: bool,
+    /// Its number in decoding order, from 1.
+    pub number: u64,
 }
 
 /// What a picture's arrival tells.
@@ -80,7 +78,7 @@ mod tests {
     use super::*;
 
     fn packet(key: i64) -> Sent {
-        Sent { key, byte: None, key_frame: key == 0, suspect: false }
+        Sent { key, byte: None, number: 0 }
     }
 
     #[test]

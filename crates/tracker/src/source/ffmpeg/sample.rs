@@ -9,6 +9,7 @@ use super::demux::{Demuxer, Packet, Read};
 use super::fields::{self, FieldOrder};
 use super::layout::Layout;
 use super::source::{FfmpegSource, Shared};
+use super::watch::Fate;
 use crate::error::{Error, Fault, Result};
 use crate::frame::{Bytes, Frame, SourceInfo};
 use crate::source::orientation::Orientation;
@@ -169,6 +170,9 @@ struct Sampler<'a> {
     demuxer: Demuxer,
     decoder: Decoder,
     packet: Packet,
+    /// Packets given to the decoder, and time stamps of those from the place where it decodes.
+    given: u64,
+    stamps: Vec<i64>,
 }
 
 impl<'a> Sampler<'a> {
@@ -179,7 +183,7 @@ impl<'a> Sampler<'a> {
             None => Demuxer::open(from.url, name, from.protocols)?,
         };
         let decoder = Decoder::open(&demuxer, name, from.threads)?;
-        Ok(Self { from, demuxer, decoder, packet: Packet::new(name)? })
+        Ok(Self { from, demuxer, decoder, packet: Packet::new(name)?, given: 0, stamps: Vec::new() })
     }
 
     /// Decodes at each place the frame there and `each` that follow.
@@ -201,6 +205,7 @@ impl<'a> Sampler<'a> {
     fn take_here(&mut self, key: bool, each: usize) -> Result<Taken> {
         let mut taken = Taken::default();
         let (mut seen, mut draining, mut failures) = (0usize, false, 0usize);
+        self.stamps.clear();
         while (key && taken.key.is_none() || taken.later.len() < each) && failures < 64 {
             match self.decoder.receive()? {
                 Received::Picture(picture) => {
@@ -226,7 +231,9 @@ impl<'a> Sampler<'a> {
                 Received::Hungry => match self.demuxer.read(&mut self.packet) {
                     Read::Packet => {
                         if !self.packet.has(ffi::AV_PKT_FLAG_CORRUPT) {
-                            self.decoder.send(Some(&self.packet));
+                            self.given += 1;
+                            self.stamps.push(self.packet.get().pts);
+                            self.decoder.send(Some((&self.packet, self.given)));
                         }
                     }
                     Read::End | Read::Failed(_) => {
@@ -239,11 +246,20 @@ impl<'a> Sampler<'a> {
         Ok(taken)
     }
 
+    /// Whether nothing was damaged in the packets up to the picture's own.
+    fn is_whole(&self, picture: &Picture) -> bool {
+        let own = self.stamps.iter().rposition(|stamp| *stamp == picture.get().pts);
+        let first = self.given - self.stamps.len() as u64 + 1;
+        let up_to = own.map_or(self.given, |own| first + own as u64);
+        (first..=up_to).all(|number| self.decoder.fate(number) != Fate::Damaged)
+    }
+
     /// The picture as a frame; `None` if it is damaged or not like the others.
     fn frame(&self, picture: Picture) -> Option<Frame> {
         let From { info, layout, orientation, .. } = self.from;
         let (w, h) = (picture.get().width.unsigned_abs(), picture.get().height.unsigned_abs());
         if picture.is_damaged()
+            || !self.is_whole(&picture)
             || !layout.is_of(&picture)
             || orientation.size(w, h) != (info.width, info.height)
         {

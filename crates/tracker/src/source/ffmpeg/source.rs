@@ -9,13 +9,16 @@ use ffmpeg_next::ffi;
 
 use super::decode::{Decoder, Picture, Received};
 use super::demux::{Demuxer, Packet};
+use super::dependence::Dependence;
 use super::describe::{describe, step, stream_base};
 use super::feed::{Feed, Given};
 use super::fields::{self, FieldOrder};
 use super::layout::Layout;
 use super::lost::Lost;
 use super::order::{Order, Sent};
+use super::reach::{Reach, References};
 use super::stamps::{Stamps, Survey, display_times};
+use super::watch::Fate;
 use crate::error::{Error, Fault, Place, Result};
 use crate::frame::{Bytes, Ending, Frame, FrameSource, SourceInfo};
 use crate::gaps::Gaps;
@@ -53,8 +56,12 @@ pub struct FfmpegSource {
     pub(super) step: i64,
     pub(super) order: Order,
     pub(super) intra_only: bool,
-    /// A frame is damaged and those that follow are predicted from it.
-    pub(super) tainted: bool,
+    references: References,
+    dependence: Dependence,
+    /// Number of the packet given last, in decoding order.
+    number: u64,
+    /// Packets, in decoding order, of which it is known what became of them.
+    settled: u64,
     pub(super) draining: bool,
     pub(super) finished: bool,
     pub(super) failures: usize,
@@ -115,6 +122,7 @@ impl FfmpegSource {
 
         let counts_frames = options.fps.is_some() || demuxer.is_untimed();
         let step = step(&demuxer).round() as i64;
+        let references = References::of(parameters.codec_id, demuxer.codec_bytes());
         let feed = Feed::new(demuxer, name, can_reopen, if intra_only { 1 } else { 6 })?;
         if let Some(order) = feed.field_order(name)? {
             match options.interlaced {
@@ -153,7 +161,10 @@ impl FfmpegSource {
             step,
             order: Order::new(if unstamped && !intra_only { REORDER } else { 0 }),
             intra_only,
-            tainted: false,
+            references,
+            dependence: Dependence::new(intra_only),
+            number: 0,
+            settled: 0,
             draining: false,
             finished: false,
             failures: 0,
@@ -194,7 +205,9 @@ impl FfmpegSource {
         for slot in std::mem::take(&mut given.lost) {
             let key = self.stamps.key(&slot, self.packets as i64);
             self.packets += 1;
-            self.order.sent(Sent { key, byte: None, key_frame: false, suspect: true });
+            let number = self.dependence.coded(key, false, Reach::All);
+            self.dependence.damaged(number);
+            self.order.sent(Sent { key, byte: None, number });
         }
         let is_after_gap = self.is_after_gap()?;
         let fields = *given.packet.get();
@@ -217,11 +230,18 @@ impl FfmpegSource {
             }
             given.after_loss |= is_after_gap && !given.goes_on;
             self.note_hidden(&given, key);
-            let suspect = self.feed.judge(&given, key, self.intra_only);
+            let is_key_frame = given.packet.has(ffi::AV_PKT_FLAG_KEY);
+            let reach = self.references.reach(given.packet.bytes());
+            self.number = self.dependence.coded(key, is_key_frame, reach);
+            if given.after_loss {
+                self.dependence.lost_before(self.number);
+            }
+            if given.is_damaged {
+                self.dependence.damaged(self.number);
+            }
             // What an edit list hides is decoded, because others are predicted from it, but gives no picture.
             if !given.packet.has(ffi::AV_PKT_FLAG_DISCARD) {
-                let key_frame = given.packet.has(ffi::AV_PKT_FLAG_KEY);
-                self.order.sent(Sent { key, byte, key_frame, suspect });
+                self.order.sent(Sent { key, byte, number: self.number });
                 self.last_byte = byte.map(|b| b + u64::try_from(fields.size).unwrap_or(0)).or(self.last_byte);
             }
         }
@@ -229,7 +249,7 @@ impl FfmpegSource {
         self.last_is_cut = given.is_cut;
         // A packet that is known to be cut would give a picture with made-up pixels.
         if !given.packet.has(ffi::AV_PKT_FLAG_CORRUPT) {
-            self.decoder.send(Some(&given.packet));
+            self.decoder.send(Some((&given.packet, self.number)));
         }
         Ok(())
     }
@@ -340,22 +360,28 @@ impl FfmpegSource {
         let key = picture.get().pts;
         let arrival = self.order.arrived(key);
         for lost in arrival.lost {
-            self.tainted |= !self.intra_only;
+            self.dependence.damaged(lost.number);
             self.hold(lost);
         }
-        let damaged = picture.is_damaged();
-        if damaged {
-            self.tainted |= !self.intra_only;
-        } else if arrival.own.is_some_and(|p| p.key_frame) {
-            self.tainted = false;
+        // A second picture of one packet, or one without a packet, is as good as what came last.
+        let number = arrival.own.map_or(self.settled, |own| own.number);
+        if picture.is_damaged() || !self.decoder.is_written(number, &picture) {
+            self.dependence.damaged(number);
         }
+        // The decoder is through with all packets up to this picture's.
+        for number in self.settled + 1..=number {
+            if self.decoder.fate(number) != Fate::Whole {
+                self.dependence.damaged(number);
+            }
+        }
+        self.settled = self.settled.max(number);
+        let is_whole = self.dependence.is_whole(number, key);
         let byte = arrival.own.and_then(|p| p.byte);
-        let suspect = arrival.own.is_some_and(|p| p.suspect);
         let fits = self.layout.is_of(&picture) && {
             let (w, h) = (picture.get().width.unsigned_abs(), picture.get().height.unsigned_abs());
             self.orientation.size(w, h) == (self.info.width, self.info.height)
         };
-        let (colour, plane) = if damaged || suspect || self.tainted || !fits {
+        let (colour, plane) = if !is_whole || !fits {
             (None, None)
         } else {
             let colour = if self.colour { self.layout.colour(&picture, self.orientation) } else { None };
