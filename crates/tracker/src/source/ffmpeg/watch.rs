@@ -74,6 +74,7 @@ impl Watch {
         OPEN.lock().unwrap_or_else(PoisonError::into_inner).push(watch.range());
         // SAFETY: `heard` takes what FFmpeg calls it with; only the type of its last argument, which differs from machine
         // to machine and is not used, is another: a list of arguments is handed over as one pointer on all of them.
+        #[expect(clippy::missing_transmute_annotations, reason = "the type differs from machine to machine")]
         unsafe {
             ffi::av_log_set_callback(Some(std::mem::transmute::<*const (), _>(heard as *const ())));
         }
