@@ -32,7 +32,7 @@ GROUPS: tuple[tuple[str, ...], ...] = (
         "arrays",
         "series",
     ),
-    ("nodes", "live", "tracking", "filming", "scoring", "exporting", "components", "bearings"),
+    ("nodes", "live", "wanted", "tracking", "filming", "scoring", "exporting", "components", "bearings"),
     ("coefficients", "model", "fit_options", "fit_status", "information"),
     ("kinematics",),
     ("encoder",),
@@ -55,7 +55,7 @@ def top_modules() -> list[str]:
 RUST_GROUPS: dict[str, tuple[tuple[str, ...], ...]] = {
     "tracker": (
         ("message", "name", "csv_text", "error", "stop", "output", "packed", "kind"),
-        ("pixel_aspect", "gaps", "frame", "gray", "observation", "timing", "peak_level", "rig"),
+        ("pixel_aspect", "gaps", "frame", "gray", "observation", "timing", "peak_level", "rig", "wanted"),
         ("source",),
         ("detect",),
         ("table", "store"),

@@ -272,7 +272,7 @@ def test_a_setting_that_a_command_has_not_is_named_with_one_that_has(
     commands = _parsers()[1]
     with speaking(CommandLine(commands, "plot")):
         assert str(Message.of(Setting("unwrap", True))).startswith("--unwrap (of `pydpend ")
-        assert str(Message.of(Setting("threshold"))) == "--threshold (of `tracker track`)"
+        assert str(Message.of(Setting("decoder"))) == "--decoder (of `tracker track`)"
         assert (
             str("Leave " + Setting("prediction", False) + ".")
             == "Leave --no-prediction (of `pydpend analyse`)."

@@ -20,6 +20,7 @@ from pydpend.crossing import (
     OpenArguments,
     Row,
     SegmentArrays,
+    WantedArguments,
 )
 from pydpend.errors import Message
 from pydpend.kinds import Kind
@@ -77,6 +78,7 @@ def track(
     frames: Frames,
     detect: DetectArguments,
     open: OpenArguments,
+    wanted: WantedArguments,
     output: str | None,
     existing: str,
     safe_csv: bool,
@@ -90,6 +92,7 @@ def setup(
     frames: Frames,
     detect: DetectArguments,
     open: OpenArguments,
+    wanted: WantedArguments,
     output: str | None,
     picture: str | None,
     replace: bool,

@@ -22,6 +22,7 @@ from pydpend.live import aspect_text
 from pydpend.nodes import Nodes, Rig, nodes_of, read_nodes
 from pydpend.output import AnyPath
 from pydpend.tabular import TableResult
+from pydpend.wanted import Numbers, Pairs, Places, Region, wanted_arguments
 
 Path: TypeAlias = AnyPath
 
@@ -120,6 +121,11 @@ def track(
     force: bool = False,
     resume: bool = False,
     safe_csv: bool = False,
+    marker: Places | None = None,
+    markers: int | None = None,
+    also: Numbers = (),
+    same: Pairs = (),
+    region: Region | None = None,
     threshold: float | None = None,
     polarity: Polarity = "auto",
     centroid: Centroid = "weighted",
@@ -153,6 +159,17 @@ def track(
         Whether to go on where an earlier run for `output` stopped.
     safe_csv : bool
         Whether names in a CSV are marked for spreadsheets, see `Nodes.write`.
+    marker : tuple, str or sequence of these, optional
+        Places of what is to be followed: (x, y) or (x, y, frame), px and from 0, or ``"x,y@frame"``; a node for each,
+        in that order. Without a frame it is the first.
+    markers : int, optional
+        How many markers there are.
+    also : int or sequence of int
+        Numbers of the picture of `setup` that are to be followed too.
+    same : tuple of str or sequence of these
+        Pairs of nodes that are one marker, which keeps the first name.
+    region : tuple of float, shape (4,), optional
+        Where markers are looked for: first and last column and row, px.
     threshold : float, optional
         Level that parts markers from what is around them, in the recording's units; learned from it if not given.
     polarity : {"auto", "bright", "dark"}
@@ -200,6 +217,7 @@ def track(
             _frames(frames),
             (threshold, polarity, centroid),
             (fps, decoder, interlaced, allow_protocol, _threads(threads), aspect_text(pixel_aspect)),
+            wanted_arguments(marker, markers, also, same, region),
             None if output is None else os.fsdecode(output),
             existing,
             safe_csv,
@@ -244,6 +262,11 @@ def setup(
     frames: tuple[int, int | None] | range | None = None,
     threads: int | None = None,
     progress: Progress = None,
+    marker: Places | None = None,
+    markers: int | None = None,
+    also: Numbers = (),
+    same: Pairs = (),
+    region: Region | None = None,
     threshold: float | None = None,
     polarity: Polarity = "auto",
     decoder: Decoder = "auto",
@@ -263,7 +286,9 @@ def setup(
         An image file to write, for example .png: the reference picture with all that was found.
     force : bool
         Whether to replace `output` and `picture` if they are there already.
-    fps, frames, threads, progress, threshold, polarity, decoder, interlaced, allow_protocol, pixel_aspect : optional
+    fps, frames, threads, progress, marker, markers, also, same, region, threshold, polarity : optional
+        As in `track`; the rig keeps what was said of what to follow.
+    decoder, interlaced, allow_protocol, pixel_aspect : optional
         As in `track`.
 
     Returns
@@ -281,6 +306,11 @@ def setup(
         If `picture` is there already, is the recording, or cannot be written.
     KeyboardInterrupt
         On Ctrl-C, within two seconds; nothing is written then.
+
+    Notes
+    -----
+    Where it is not clear what is to be followed, the exception's ``picture`` shows what was found, each with its number
+    and its path, and its ``candidates`` say a line of each; the file `picture` is then that picture.
     """
     callback, close = _callback(progress)
     try:
@@ -289,6 +319,7 @@ def setup(
             _frames(frames),
             (threshold, polarity, "weighted"),
             (fps, decoder, interlaced, allow_protocol, _threads(threads), aspect_text(pixel_aspect)),
+            wanted_arguments(marker, markers, also, same, region),
             None if output is None else os.fsdecode(output),
             None if picture is None else os.fsdecode(picture),
             force,

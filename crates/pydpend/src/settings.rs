@@ -6,8 +6,9 @@ use pyo3::prelude::*;
 use tracker::csv_text::Cells;
 use tracker::detect::{Centroid, DetectSettings, Polarity, Threshold};
 use tracker::pixel_aspect::PixelAspect;
-use tracker::rig::Rig;
+use tracker::rig::{Region, Rig};
 use tracker::source::{Decoder, Interlaced, OpenOptions};
+use tracker::wanted::Wanted;
 
 use crate::errors::{argument, raise};
 
@@ -44,6 +45,30 @@ pub fn detect_settings(py: Python<'_>, given: &DetectArguments) -> PyResult<Dete
         )?,
         ..DetectSettings::default()
     })
+}
+
+/// What is to be followed: places that were pointed at, how many markers there are, numbers of the picture, pairs of nodes that
+/// are one, and the region in px.
+pub type WantedArguments =
+    (Vec<String>, Option<usize>, Vec<usize>, Vec<(String, String)>, Option<(f64, f64, f64, f64)>);
+
+/// What is to be followed, and the region.
+pub fn wanted(py: Python<'_>, given: &WantedArguments) -> PyResult<(Wanted, Option<Region>)> {
+    let (marker, markers, also, same, region) = given.clone();
+    let place = |text: String| {
+        text.parse().map_err(|why: String| {
+            argument(py, "marker", format!("{text:?} cannot be"), &format!("It is {why}"))
+        })
+    };
+    if let Some((x0, y0, x1, y1)) = region
+        && ![x0, y0, x1, y1].iter().all(|v| v.is_finite())
+    {
+        return Err(argument(py, "region", "it is not finite", "Give first and last column and row in px"));
+    }
+    let marker = marker.into_iter().map(place).collect::<PyResult<Vec<_>>>()?;
+    let same = same.into_iter().map(|(a, b)| [a, b]).collect();
+    let region = region.map(|(x0, y0, x1, y1)| Region::Rectangle([x0, y0, x1, y1]));
+    Ok((Wanted { marker, markers, also, same }, region))
 }
 
 /// How a recording is read: rate or `None`, decoder, how interlaced film is read, whether addresses may be opened,

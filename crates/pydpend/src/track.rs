@@ -1,10 +1,11 @@
 //! Whole recordings: `track`, `setup`, `overlay`, `info`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use numpy::{IntoPyArray, PyArray1, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use serde_json::json;
+use tracker::detect::DetectSettings;
 use tracker::error::Error;
 use tracker::message::Message;
 use tracker::name::text;
@@ -16,7 +17,9 @@ use tracker::table::{Fingerprint, SourceFacts};
 
 use crate::errors::{argument, raise, to_python};
 use crate::rig::rig_json;
-use crate::settings::{DetectArguments, OpenArguments, cells, detect_settings, open_options, rig};
+use crate::settings::{
+    DetectArguments, OpenArguments, WantedArguments, cells, detect_settings, open_options, rig, wanted,
+};
 use crate::tables::{Columns, Held, columns, table_of};
 use crate::watch::Watch;
 
@@ -30,12 +33,15 @@ fn settings(
     frames: Frames,
     detect: &DetectArguments,
     open: &OpenArguments,
+    given: &WantedArguments,
 ) -> PyResult<RunSettings> {
+    let (wanted, region) = wanted(py, given)?;
     Ok(RunSettings {
         input: text(&input),
         rig: rig(py, rig_text)?,
         frames: frames.map(|(start, end)| start..end.unwrap_or(u64::MAX)),
-        detect: detect_settings(py, detect)?,
+        detect: DetectSettings { region, ..detect_settings(py, detect)? },
+        wanted,
         threads: open.4,
         open: open_options(py, open)?,
         ..RunSettings::default()
@@ -59,13 +65,14 @@ pub fn track<'py>(
     frames: Frames,
     detect: DetectArguments,
     open: OpenArguments,
+    wanted: WantedArguments,
     output: Option<PathBuf>,
     existing: &str,
     safe_csv: bool,
     reads: Vec<PathBuf>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<(Columns<'py>, Messages<'py>, Option<PyErr>)> {
-    let mut settings = settings(py, input, rig, frames, &detect, &open)?;
+    let mut settings = settings(py, input, rig, frames, &detect, &open, &wanted)?;
     settings.output = output;
     settings.collect = true;
     settings.cells = cells(safe_csv);
@@ -91,6 +98,21 @@ pub fn track<'py>(
 /// A rig as JSON, warnings, and the reference picture with the rig drawn, (H, W, 3).
 type Found<'py> = (String, Messages<'py>, Bound<'py, PyArray3<u8>>);
 
+/// Lines, samples red, green, blue, rows and columns.
+type Unclear = (Vec<String>, Vec<u8>, [usize; 2]);
+
+/// What was found where it is not clear what is meant: a line of each, and the picture, which is also written if a file is given.
+/// Nothing where nothing was found or the picture cannot be drawn: the reason for it is the error that is raised.
+fn drawn(settings: &RunSettings, file: Option<&Path>, watch: &mut Watch) -> Option<Unclear> {
+    let found = watch.candidates.take().filter(|c| !c.all.is_empty())?;
+    let picture = tracker::setup::picture_of(settings, &found, watch).ok()?;
+    if let Some(path) = file {
+        overlay::save(&picture, path).ok()?;
+    }
+    let lines = found.all.iter().map(|c| c.line()).collect();
+    Some((lines, overlay::rgb(&picture).ok()?, overlay::size(&picture)))
+}
+
 /// Finds the rig of a recording; rig and picture are also written if files are given.
 #[pyfunction]
 #[expect(clippy::too_many_arguments, reason = "the options of one call of Python's")]
@@ -100,17 +122,23 @@ pub fn setup<'py>(
     frames: Frames,
     detect: DetectArguments,
     open: OpenArguments,
+    wanted: WantedArguments,
     output: Option<PathBuf>,
     picture: Option<PathBuf>,
     replace: bool,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Found<'py>> {
-    let settings = settings(py, input, None, frames, &detect, &open)?;
+    let settings = settings(py, input, None, frames, &detect, &open, &wanted)?;
     let mut watch = Watch::new(progress);
+    let mut unclear = None;
     let outcome = py.detach(|| {
         let outputs: Vec<PathBuf> = output.iter().chain(&picture).cloned().collect();
         output::check(&outputs, &source::files(&settings.input)?, replace).map_err(Error::Rig)?;
-        let found = tracker::setup::find(&settings, &mut watch)?;
+        let found = tracker::setup::find(&settings, &mut watch);
+        if let Err(Error::Detect(_) | Error::Rig(_)) = &found {
+            unclear = drawn(&settings, picture.as_deref(), &mut watch);
+        }
+        let found = found?;
         if let Some(path) = &picture {
             overlay::save(&found.picture, path)?;
         }
@@ -124,7 +152,13 @@ pub fn setup<'py>(
             overlay::size(&found.picture),
         ))
     });
-    let (rig, warnings, samples, [h, w]) = watch.done(py, outcome)?;
+    let outcome = watch.done(py, outcome);
+    if let (Err(error), Some((lines, samples, [h, w]))) = (&outcome, unclear) {
+        let exception = error.value(py);
+        exception.setattr("candidates", lines)?;
+        exception.setattr("picture", samples.into_pyarray(py).reshape([h, w, 3])?)?;
+    }
+    let (rig, warnings, samples, [h, w]) = outcome?;
     let picture = samples.into_pyarray(py).reshape([h, w, 3])?;
     Ok((rig, messages(py, &warnings)?, picture))
 }

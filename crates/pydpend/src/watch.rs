@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use pyo3::prelude::*;
 use tracker::error::Error;
-use tracker::pipeline::{Observer, Stage};
+use tracker::pipeline::{Candidates, Observer, Stage};
 
 use crate::errors::raise;
 
@@ -24,12 +24,14 @@ pub struct Watch {
     called: Instant,
     /// When and by what the run was stopped.
     stopped: Option<(Instant, PyErr)>,
+    /// What was found of what moves, if anything was looked for.
+    pub candidates: Option<Candidates>,
 }
 
 impl Watch {
     pub fn new(callback: Option<Py<PyAny>>) -> Self {
         let (stage, called) = (Stage::Open, Instant::now());
-        Self { callback, stage, total: None, done: 0, called, stopped: None }
+        Self { callback, stage, total: None, done: 0, called, stopped: None, candidates: None }
     }
 
     /// The exception that stopped the run, if one did.
@@ -72,6 +74,10 @@ impl Observer for Watch {
             self.call();
         }
         (self.stage, self.total, self.done) = (stage, total, 0);
+    }
+
+    fn candidates(&mut self, found: Candidates) {
+        self.candidates = Some(found);
     }
 
     fn progress(&mut self, done: u64) {

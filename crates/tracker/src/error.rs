@@ -136,9 +136,9 @@ pub enum Error {
 }
 
 impl Error {
-    /// The same error with more of what was wrong.
+    /// The same error with more of what was wrong, and with what to do about that, if there is something.
     #[must_use]
-    pub fn and_also(mut self, more: &str) -> Self {
+    pub fn and_also(mut self, more: &str, advice: Message) -> Self {
         if let Self::Source(f)
         | Self::Detect(f)
         | Self::Rig(f)
@@ -147,6 +147,9 @@ impl Error {
         | Self::Argument(f) = &mut self
         {
             f.problem = f.problem.clone() + format!("; {more}");
+            if !advice.is_empty() {
+                f.advice = advice;
+            }
         }
         self
     }

@@ -40,3 +40,4 @@ pub mod synth;
 pub mod table;
 pub mod timing;
 pub mod track;
+pub mod wanted;

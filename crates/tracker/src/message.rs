@@ -14,6 +14,8 @@ use std::ops::Add;
 pub enum Setting {
     /// Network addresses and devices are opened too; a switch.
     AllowProtocol,
+    /// Numbers of the picture that are followed too.
+    Also,
     /// Bits per pixel of a film that is made.
     Bits,
     /// Codec of a film that is made.
@@ -32,6 +34,10 @@ pub enum Setting {
     GrayOnly,
     /// How interlaced film is read.
     Interlaced,
+    /// A place of a marker.
+    Marker,
+    /// How many markers there are.
+    Markers,
     /// The largest area of a marker.
     MaxAreaPx,
     /// The smallest area of a marker.
@@ -48,10 +54,14 @@ pub enum Setting {
     Polarity,
     /// Quality of a film that is written.
     Quality,
+    /// The part of the picture in which markers are looked for.
+    Region,
     /// An earlier run is gone on with; a switch.
     Resume,
     /// Nodes, bodies and joints.
     Rig,
+    /// Two nodes that are one marker.
+    Same,
     /// How many threads.
     Threads,
     /// What is bright enough to be a marker.
@@ -64,8 +74,9 @@ pub enum Setting {
 
 impl Setting {
     /// All of them.
-    pub const ALL: [Self; 24] = [
+    pub const ALL: [Self; 29] = [
         Self::AllowProtocol,
+        Self::Also,
         Self::Bits,
         Self::Codec,
         Self::Decoder,
@@ -75,6 +86,8 @@ impl Setting {
         Self::Frames,
         Self::GrayOnly,
         Self::Interlaced,
+        Self::Marker,
+        Self::Markers,
         Self::MaxAreaPx,
         Self::MinAreaPx,
         Self::Output,
@@ -83,8 +96,10 @@ impl Setting {
         Self::PlayFps,
         Self::Polarity,
         Self::Quality,
+        Self::Region,
         Self::Resume,
         Self::Rig,
+        Self::Same,
         Self::Threads,
         Self::Threshold,
         Self::Width,
@@ -95,6 +110,7 @@ impl Setting {
     pub fn name(self) -> &'static str {
         match self {
             Self::AllowProtocol => "allow_protocol",
+            Self::Also => "also",
             Self::Bits => "bits",
             Self::Codec => "codec",
             Self::Decoder => "decoder",
@@ -104,6 +120,8 @@ impl Setting {
             Self::Frames => "frames",
             Self::GrayOnly => "gray_only",
             Self::Interlaced => "interlaced",
+            Self::Marker => "marker",
+            Self::Markers => "markers",
             Self::MaxAreaPx => "max_area_px",
             Self::MinAreaPx => "min_area_px",
             Self::Output => "output",
@@ -112,8 +130,10 @@ impl Setting {
             Self::PlayFps => "play_fps",
             Self::Polarity => "polarity",
             Self::Quality => "quality",
+            Self::Region => "region",
             Self::Resume => "resume",
             Self::Rig => "rig",
+            Self::Same => "same",
             Self::Threads => "threads",
             Self::Threshold => "threshold",
             Self::Width => "width",

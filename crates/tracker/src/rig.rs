@@ -12,6 +12,7 @@ use crate::message::SETUP;
 use crate::name::text;
 use crate::output;
 use crate::pixel_aspect::PixelAspect;
+use crate::wanted::Wanted;
 
 /// Version of the rig file's form; a file with a higher one is refused.
 pub const RIG_SCHEMA: u32 = 1;
@@ -62,6 +63,23 @@ pub enum Region {
     Polygon(Vec<[f64; 2]>),
 }
 
+impl Region {
+    /// Whether a place is in it, px.
+    pub fn contains(&self, [x, y]: [f64; 2]) -> bool {
+        match self {
+            Self::Rectangle([x0, y0, x1, y1]) => (*x0..=*x1).contains(&x) && (*y0..=*y1).contains(&y),
+            // A ray to the right crosses the border an odd number of times.
+            Self::Polygon(corners) => {
+                let next = corners.iter().cycle().skip(1);
+                let crosses = |(a, b): (&[f64; 2], &[f64; 2])| {
+                    (a[1] > y) != (b[1] > y) && x < a[0] + (y - a[1]) / (b[1] - a[1]) * (b[0] - a[0])
+                };
+                corners.iter().zip(next).filter(|&pair| crosses(pair)).count() % 2 == 1
+            }
+        }
+    }
+}
+
 /// OpenCV's pinhole model with distortion, applied to centres, not to images.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -93,6 +111,9 @@ pub struct Rig {
     /// The lens; `None` is none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lens: Option<Lens>,
+    /// What was said of what to follow; a run with this rig follows the same.
+    #[serde(default, skip_serializing_if = "Wanted::is_default")]
+    pub wanted: Wanted,
     /// Bodies, from the pivot outwards.
     #[serde(rename = "body", default)]
     pub bodies: Vec<Body>,

@@ -12,8 +12,10 @@ use crate::error::{Error, Fault, Place, Result};
 use crate::frame::Frame;
 use crate::message::Message;
 use crate::overlay;
-use crate::pipeline::{self, Existing, Observer, RunSettings};
+use crate::pipeline::{self, Candidates, Existing, Observer, RunSettings, Stage};
+use crate::pixel_aspect::PixelAspect;
 use crate::rig::Rig;
+use crate::source::OpenOptions;
 use crate::table::RunEnding;
 
 /// What a recording shows.
@@ -40,6 +42,8 @@ pub fn find(settings: &RunSettings, observer: &mut dyn Observer) -> Result<Setup
             Fault::new("input", "standard input cannot be read again for the picture").advice("Give a file"),
         ));
     }
+    let mut observer = Hears { inner: observer, candidates: Candidates::default() };
+    let observer = &mut observer;
     let settings = RunSettings {
         output: None,
         existing: Existing::Refuse,
@@ -62,7 +66,7 @@ pub fn find(settings: &RunSettings, observer: &mut dyn Observer) -> Result<Setup
             .extend(advise(&rig, &table.rows, summary.meta.source.rate_hz).into_iter().map(Message::from));
     }
     let index = rig.reference_frame.unwrap_or(0);
-    let (frame, detections) = frame_at(&settings, index, !summary.moving, observer)?;
+    let (frame, detections, _) = frame_at(&settings, index, !summary.moving, observer)?;
     let saturated = detections.iter().filter(|d| d.flags.has(Flags::SATURATED)).count();
     if saturated > 0 {
         warnings.push(format!(
@@ -71,8 +75,48 @@ pub fn find(settings: &RunSettings, observer: &mut dyn Observer) -> Result<Setup
             detections.len()
         ).into());
     }
-    let picture = overlay::still(&frame, &rig, &detections)?;
+    let others = observer.candidates.all.iter().filter(|c| !c.followed).cloned().collect::<Vec<_>>();
+    warnings.extend(others.iter().map(|c| format!("also moving, number {}", c.line()).into()));
+    let picture = overlay::still(&frame, &rig, &detections, &others)?;
     Ok(Setup { rig, warnings, ending: summary.meta.ending, picture })
+}
+
+/// The picture of what was found where it is not clear what is meant: each with its number and its path.
+///
+/// # Errors
+/// Those of reading and of drawing; [`Error::Interrupted`] if the observer asks to stop.
+pub fn picture_of(settings: &RunSettings, found: &Candidates, observer: &mut dyn Observer) -> Result<Mat> {
+    let (frame, _, aspect) = frame_at(settings, found.frame, false, observer)?;
+    overlay::candidates(&frame, aspect, &found.all)
+}
+
+/// Hears of what else moves.
+struct Hears<'a> {
+    inner: &'a mut dyn Observer,
+    candidates: Candidates,
+}
+
+impl Observer for Hears<'_> {
+    fn stage(&mut self, stage: Stage, total: Option<u64>) {
+        self.inner.stage(stage, total);
+    }
+
+    fn candidates(&mut self, found: Candidates) {
+        self.inner.candidates(found.clone());
+        self.candidates = found;
+    }
+
+    fn progress(&mut self, done: u64) {
+        self.inner.progress(done);
+    }
+
+    fn interrupted(&mut self) -> bool {
+        self.inner.interrupted()
+    }
+
+    fn abandoned(&mut self) -> bool {
+        self.inner.abandoned()
+    }
 }
 
 /// A frame of a recording and, if that is wanted, what is detected in it.
@@ -81,9 +125,11 @@ fn frame_at(
     index: u64,
     detects: bool,
     observer: &mut dyn Observer,
-) -> Result<(Frame, Vec<Detection>)> {
+) -> Result<(Frame, Vec<Detection>, PixelAspect)> {
     let RunSettings { input, open, detect, threads, .. } = settings;
-    let mut source = pipeline::open(input, open, observer)?;
+    // Detection looks at brightness alone, with and without the colours of the picture.
+    let open = OpenOptions { colour: true, ..open.clone() };
+    let mut source = pipeline::open(input, &open, observer)?;
     let detect = DetectSettings { pixel_aspect: source.info().pixel_aspect, ..detect.clone() };
     let mut detector = None;
     if detects {
@@ -101,7 +147,7 @@ fn frame_at(
             if let Some(detector) = &mut detector {
                 detector.detect(&frame, &mut detections)?;
             }
-            return Ok((frame, detections));
+            return Ok((frame, detections, detect.pixel_aspect));
         }
     }
     Err(Error::Source(Fault::new(input, "it ends before this frame").at(Place::Frame(index))))

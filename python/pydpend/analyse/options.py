@@ -35,6 +35,20 @@ class Options(FitOptions):
         Frames per second of recorded time, where a film does not know.
     pixel_aspect : str, optional
         Width to height of a film's pixels, e.g. ``16:15``, instead of what the film says.
+    marker : tuple of str
+        Place of a marker in a film, ``X,Y`` or ``X,Y@FRAME`` in px; once for each that is to be followed.
+    markers : int, optional
+        How many markers a film shows.
+    also : str, optional
+        Numbers of the picture of ``tracker setup`` that are to be followed too, with commas.
+    same : tuple of str
+        Two nodes of a film that are one marker, ``n1=n2``; once for each pair.
+    region : str, optional
+        Part of a film's picture in which markers are looked for, ``X0,Y0,X1,Y1`` in px.
+    threshold : float, optional
+        Threshold of markers in a film's units; learned if not given.
+    polarity : str
+        Whether a film's markers are brighter or darker than what is around them.
     encoder : str, optional
         Encoder file of the first recording: time_s and voltage_v (or an angle) as CSV, TDMS or NumPy.
     column : str, optional
@@ -85,6 +99,13 @@ class Options(FitOptions):
     rig: str | None = None
     fps: float | None = None
     pixel_aspect: str | None = None
+    marker: tuple[str, ...] = ()
+    markers: int | None = None
+    also: str | None = None
+    same: tuple[str, ...] = ()
+    region: str | None = None
+    threshold: float | None = None
+    polarity: str = option("auto", choices=("auto", "bright", "dark"))
     encoder: str | None = None
     column: str | None = None
     time_column: str | None = None
@@ -136,6 +157,19 @@ class Options(FitOptions):
                         "Name the file with " + Setting("encoder"),
                     )
                 )
+
+    def of_markers(self) -> dict[str, Any]:
+        """What was said of the markers of films, as `pydpend.track` takes it.
+
+        Returns
+        -------
+        dict of str to object
+            Keywords and their values; nothing where nothing was said.
+        """
+        names = ("marker", "markers", "also", "same", "region", "threshold", "polarity")
+        plain = Options()
+        said = {name: getattr(self, name) for name in names}
+        return {name: value for name, value in said.items() if value != getattr(plain, name)}
 
     def joint_fit(self, several: bool) -> FitOptions:
         """The options of the fit to all recordings.

@@ -79,6 +79,13 @@ def recordings(options: Options, digests: Digests) -> tuple[Recording, ...]:
 
 APPLIES: Mapping[str, tuple[str, ...]] = {
     "rig": ("film",),
+    "marker": ("film",),
+    "markers": ("film",),
+    "also": ("film",),
+    "same": ("film",),
+    "region": ("film",),
+    "threshold": ("film",),
+    "polarity": ("film",),
     "zero": ("film", "nodes"),
     "estimator": ("film", "nodes"),
     "bodies": ("film", "nodes"),

@@ -63,6 +63,7 @@ def track(r: Recording, options: Options, into: Path, tell: Tell, resume: bool) 
         options.rig,
         fps=options.fps,
         pixel_aspect=options.pixel_aspect,
+        **options.of_markers(),
         threads=options.threads,
         output=RecordingFolder(into).file(RunFile.NODES),
         resume=resume,

@@ -20,16 +20,24 @@ def add_fields(p: argparse.ArgumentParser, options: type, fields: Iterable[Field
             action = argparse.BooleanOptionalAction
             p.add_argument(flag_of(f.name), dest=f.name, action=action, default=None, help=text)
         else:
+            adds = "append" if kind == "texts" else "store"
             number = {"number": float, "whole": int}.get(kind, str)
             choices = choices_of(f) or None
             unit = "S" if f.name.endswith("_s") else None
-            told = text if f.default in (None, "") else f"{text} (default {f.default})"
+            told = text if f.default in (None, "", ()) else f"{text} (default {f.default})"
             p.add_argument(
-                flag_of(f.name), dest=f.name, type=number, choices=choices, metavar=unit, help=told
+                flag_of(f.name),
+                dest=f.name,
+                type=number,
+                choices=choices,
+                metavar=unit,
+                help=told,
+                action=action,
             )
 
 
 def given(args: argparse.Namespace, fields: Iterable[Field[Any]]) -> dict[str, Any]:
     """The options of these fields that the command line gives."""
     values = {f.name: getattr(args, f.name) for f in fields}
-    return {name: value for name, value in values.items() if value is not None}
+    told = {name: value for name, value in values.items() if value is not None}
+    return {name: tuple(value) if isinstance(value, list) else value for name, value in told.items()}

@@ -199,6 +199,7 @@ pub fn arrange(
         reference_frame,
         region: None,
         lens: None,
+        wanted: Default::default(),
         bodies: names.iter().map(|name| Body { name: name.clone() }).collect(),
         nodes: Vec::new(),
         joints: Vec::new(),

@@ -9,7 +9,7 @@ use super::arrange::Found;
 use super::sample::Sample;
 use super::{arrange, bodies, lone, sample};
 use crate::error::{Error, Fault, Result};
-use crate::message::{Message, SETUP, Setting};
+use crate::message::{Message, Setting};
 use crate::pixel_aspect::PixelAspect;
 use crate::rig::Rig;
 use crate::rigid::body::Link;
@@ -58,7 +58,7 @@ pub fn discover(store: &DetectionStore, image_px: [u32; 2], stop: &Stop) -> Resu
     if found.is_empty() {
         return Err(Error::Rig(
             Fault::new("recording", "no marker can be followed")
-                .advice("Look at the picture of " + SETUP + ", or give a rig with " + Setting::Rig),
+                .advice("Point at each with " + Setting::Marker + ", or give a rig with " + Setting::Rig),
         ));
     }
     if let Some((a, b)) = bodies::alike(&links, stop)? {

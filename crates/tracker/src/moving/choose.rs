@@ -1,23 +1,20 @@
 //! Chooses what to look for by what it explains: every way of looking competes, and within each every look.
 //!
-//! Owns: [`follow`], [`Followed`]. Must not: say which marker is wanted where nothing decides: the confidence tells.
+//! Owns: [`survey`], [`Survey`], [`strongest`]. Must not: say which marker is wanted where nothing decides: the confidence tells.
 
 use rayon::prelude::*;
 
-use super::backdrop::Backdrop;
-use super::centre::refine;
-use super::ground::{self, Ground, spread};
+use super::ground::spread;
+use super::marker::{Marker, compact};
 use super::model::Model;
 use super::picture::Film;
-use super::response::{Direction, Response, octaves, response, responses};
-use super::rest::extend;
-use super::spot::{Spot, spots};
-use super::track::{Track, extent, join, join_lone, quality, tracks};
+use super::response::{response, responses};
+use super::search::{Against, Search};
+use super::spot::Spot;
+use super::track::{Track, extent, linked, quality};
 use super::tracklet::{link, median};
 use crate::error::Result;
 
-/// A recording of fewer pictures has no tracklet that can be judged.
-const LEAST_PICTURES: usize = 6;
 /// Bursts of consecutive pictures in which every model is tried, and their length.
 const BURSTS: usize = 5;
 const BURST_PICTURES: usize = 20;
@@ -34,54 +31,24 @@ const LOOK: [f64; 2] = [0.9, 0.75];
 const LEAST_QUALITY: f64 = 0.2;
 /// Part of the best track's weight from which on another of its look is an answer.
 const ANSWER_PART: f64 = 0.12;
+/// The same for what is offered beside the answers: of another look, and looked at in another way.
+const OTHER_LOOK_PART: f64 = 0.3;
+const OTHER_MODEL_PART: f64 = 0.5;
+/// Pictures of which the one that shows most is taken, and places in it.
+const STRONGEST_PICTURES: usize = 15;
+const STRONGEST: usize = 9;
+/// Two tracks this near to each other, in radii, are one marker.
+const SAME_RADII: f64 = 1.2;
 
-/// What was followed.
-#[derive(Debug, Clone)]
-pub struct Followed {
-    /// How it was looked at.
-    pub model: Model,
-    /// The tracks that answer.
-    pub tracks: Vec<Track>,
-    /// Radius of the markers, px.
-    pub radius_px: f64,
-    /// Part of what looks like them that they explain, times how compact they are: 0 to 1.
+/// What moves in a recording.
+#[derive(Debug, Clone, Default)]
+pub struct Survey {
+    /// All that moves smoothly, the likeliest markers first.
+    pub markers: Vec<Marker>,
+    /// How many of them, from the first on, are of the likeliest look: they answer.
+    pub answers: usize,
+    /// Part of what looks like them that the answers explain, times how compact they are: 0 to 1.
     pub confidence: f64,
-    /// Other markers that move.
-    pub others: Vec<Track>,
-}
-
-struct Grounds {
-    directions: Vec<Direction>,
-    /// By octave, then direction.
-    grounds: Vec<Vec<Ground>>,
-}
-
-impl Grounds {
-    fn learn(film: &dyn Film, directions: Vec<Direction>, count: usize) -> Result<Self> {
-        let n = film.count();
-        let pictures = spread(n, ground::PICTURES.min(n));
-        let samples: Vec<Vec<Response>> =
-            pictures.par_iter().map(|&i| Ok(responses(&film.read(i)?, count))).collect::<Result<_>>()?;
-        let grounds = (0..count)
-            .map(|l| {
-                let octave: Vec<Response> = samples.iter().map(|s| s[l].clone()).collect();
-                directions.iter().map(|&d| Ground::learn(&octave, d, l)).collect()
-            })
-            .collect();
-        Ok(Self { directions, grounds })
-    }
-
-    fn of(&self, m: &Model) -> &Ground {
-        let d = self.directions.iter().position(|d| *d == m.direction).unwrap_or(0);
-        &self.grounds[m.octave][d]
-    }
-
-    fn spots(&self, r: &Response, m: &Model, limit: f32) -> Vec<Spot> {
-        let along = r.along(m.direction);
-        let ground = self.of(m);
-        let out = ground.standing_out(&along, m.sign);
-        spots(&out, &along, Some(ground), (r.width, r.height), m.octave, (limit, MOST_SPOTS))
-    }
 }
 
 struct Candidate {
@@ -92,18 +59,13 @@ struct Candidate {
 }
 
 /// Tries every model on bursts; the best first.
-fn candidates(film: &dyn Film, grounds: &Grounds, count: usize, width: f64) -> Result<Vec<Candidate>> {
+fn candidates(search: &Search) -> Result<Vec<Candidate>> {
+    let film = search.film;
     let n = film.count();
     let length = BURST_PICTURES.min(n);
     let bursts = BURSTS.min((n / length).max(1));
     let starts = spread(n - length + 1, bursts);
-    let models: Vec<Model> = grounds
-        .directions
-        .iter()
-        .flat_map(|&direction| {
-            (0..count).flat_map(move |octave| [1.0, -1.0].map(|sign| Model { direction, sign, octave }))
-        })
-        .collect();
+    let models = search.models();
     // By burst, picture, model.
     let found: Vec<Vec<Vec<Vec<Spot>>>> = starts
         .iter()
@@ -112,8 +74,12 @@ fn candidates(film: &dyn Film, grounds: &Grounds, count: usize, width: f64) -> R
                 .into_par_iter()
                 .map(|i| {
                     film.heed()?;
-                    let all = responses(&film.read(i)?, count);
-                    Ok(models.iter().map(|m| grounds.spots(&all[m.octave], m, FIRST_LIMIT)).collect())
+                    let picture = film.read(i)?;
+                    let all = responses(&picture, search.count);
+                    let spots = |m: &Model| {
+                        search.spots(&picture, &all[m.octave], m, Against::Ground, (FIRST_LIMIT, MOST_SPOTS))
+                    };
+                    Ok(models.iter().map(spots).collect())
                 })
                 .collect::<Result<_>>()
         })
@@ -128,7 +94,7 @@ fn candidates(film: &dyn Film, grounds: &Grounds, count: usize, width: f64) -> R
             for (burst, &first) in found.iter().zip(&starts) {
                 let pictures: Vec<Vec<Spot>> = burst.iter().map(|p| p[k].clone()).collect();
                 all += pictures.iter().map(Vec::len).sum::<usize>();
-                for t in link(&pictures, radius, width, first).iter().filter(|t| t.spots.len() >= 6) {
+                for t in link(&pictures, radius, search.width, first).iter().filter(|t| t.spots.len() >= 6) {
                     if extent(t.spots.iter()) < (0.3 * radius).max(2.0) {
                         standing += t.spots.len();
                         continue;
@@ -178,11 +144,6 @@ fn alike(a: &[f64; 2], b: &[f64; 2], limit: [f64; 2]) -> bool {
     (a[0] - b[0]).abs() < limit[0] && (a[1] - b[1]).abs() < limit[1]
 }
 
-fn linked(pictures: &[Vec<Spot>], radius: f64, width: f64) -> Vec<Track> {
-    let chains = join_lone(join(link(pictures, radius, width, 0), radius), radius);
-    tracks(chains, radius, pictures.len())
-}
-
 /// One model over the whole recording: every look competes by what it explains of all that looks like it.
 fn run(film: &dyn Film, model: Model, pictures: Vec<Vec<Spot>>, width: f64) -> Result<Run> {
     let radius = model.radius_px();
@@ -228,41 +189,20 @@ fn run(film: &dyn Film, model: Model, pictures: Vec<Vec<Spot>>, width: f64) -> R
         if chosen.contains(&k) { group.push(t) } else { others.push(t) }
     }
     group.sort_by(|a, b| b.weight().total_cmp(&a.weight()));
-    let compact: Vec<f64> = group
-        .par_iter()
-        .take(4)
-        .map(|t| {
-            let c = refine(film, &mut t.clone(), &model, 24, None, None)?;
-            Ok(c.found * (-(c.radius_px / radius).ln().powi(2) / 0.5).exp())
-        })
-        .collect::<Result<_>>()?;
+    let compact: Vec<f64> =
+        group.par_iter().take(4).map(|t| Ok(compact(film, t, &model)?.1)).collect::<Result<_>>()?;
     let compact = compact.iter().sum::<f64>() / compact.len().max(1) as f64;
     Ok(Run { model, pictures, group, others, purity, compact, score: score * (0.2 + 0.8 * compact) })
 }
 
-/// Whether two tracks are one marker: near each other where both are seen.
-fn same_marker(a: &Track, b: &Track, within_px: f64) -> bool {
-    let places: std::collections::HashMap<usize, (f64, f64)> =
-        a.spots().map(|(k, s)| (k, (s.x, s.y))).collect();
-    let mut apart: Vec<f64> =
-        b.spots().filter_map(|(k, s)| places.get(&k).map(|p| (p.0 - s.x).hypot(p.1 - s.y))).collect();
-    apart.len() as f64 > 0.3 * a.count.min(b.count) as f64 && median(&mut apart) < within_px
-}
-
-/// Follows what moves through a recording. `None` where nothing moves smoothly.
+/// What moves in a recording, with what is likeliest meant. Places are those of the filter alone; [`super::finish`] refines them.
 ///
 /// # Errors
 /// Those of the film; [`crate::error::Error::Interrupted`] once the work is to stop.
-pub fn follow(film: &dyn Film) -> Result<Option<Followed>> {
-    if film.count() < LEAST_PICTURES {
-        return Ok(None);
-    }
-    let first = film.read(0)?;
-    let (width, count) = (first.width as f64, octaves(first.width, first.height));
-    let directions = if first.chroma.is_some() { Direction::ALL.to_vec() } else { vec![Direction::LUMA] };
-    let grounds = Grounds::learn(film, directions, count)?;
-    let candidates = candidates(film, &grounds, count, width)?;
-    let Some(best) = candidates.first().map(|c| c.score) else { return Ok(None) };
+pub fn survey(search: &Search) -> Result<Survey> {
+    let film = search.film;
+    let candidates = candidates(search)?;
+    let Some(best) = candidates.first().map(|c| c.score) else { return Ok(Survey::default()) };
     let finalists: Vec<&Candidate> =
         candidates.iter().take(FINALISTS).filter(|c| c.score >= FINALIST_PART * best).collect();
     let found: Vec<Vec<Vec<Spot>>> = (0..film.count())
@@ -270,26 +210,57 @@ pub fn follow(film: &dyn Film) -> Result<Option<Followed>> {
         .map(|i| {
             film.heed()?;
             let picture = film.read(i)?;
-            let spots =
-                |c: &&Candidate| grounds.spots(&response(&picture, c.model.octave), &c.model, c.limit);
+            let spots = |c: &&Candidate| {
+                let response = response(&picture, c.model.octave);
+                search.spots(&picture, &response, &c.model, Against::Ground, (c.limit, MOST_SPOTS))
+            };
             Ok(finalists.iter().map(spots).collect())
         })
         .collect::<Result<_>>()?;
     let mut runs: Vec<Run> = finalists
         .par_iter()
         .enumerate()
-        .map(|(k, c)| run(film, c.model, found.iter().map(|p| p[k].clone()).collect(), width))
+        .map(|(k, c)| run(film, c.model, found.iter().map(|p| p[k].clone()).collect(), search.width))
         .collect::<Result<_>>()?;
     runs.sort_by(|a, b| b.score.total_cmp(&a.score));
     let mut runs = runs.into_iter();
-    let Some(winner) = runs.next() else { return Ok(None) };
-    let (model, radius) = (winner.model, winner.model.radius_px());
+    let Some(winner) = runs.next() else { return Ok(Survey::default()) };
+    let (model, confidence) = (winner.model, winner.purity * winner.compact);
+    let (keep, others, heaviest) = answers(winner, search.width);
+    let marker = |t: Track, model: Model| Marker::of(film, t, model);
+    let mut markers: Vec<Marker> = keep.into_iter().map(|t| marker(t, model)).collect::<Result<_>>()?;
+    let answers = markers.len();
+    // Markers of one look have one radius.
+    let radius_px = median(&mut markers.iter().map(|m| m.radius_px).collect::<Vec<_>>());
+    markers.iter_mut().for_each(|m| m.radius_px = radius_px);
+    // The one that is seen first is first.
+    markers.sort_by_key(|m| m.track.spots().next().map(|(k, _)| k));
+    for t in others {
+        markers.push(marker(t, model)?);
+    }
+    for r in runs {
+        for t in r.group.into_iter().chain(r.others).filter(|t| t.weight() >= OTHER_MODEL_PART * heaviest) {
+            let within = SAME_RADII * r.model.radius_px().max(model.radius_px());
+            let new = Marker { track: t, model: r.model, radius_px: r.model.radius_px() };
+            if !markers.iter().any(|o| o.is_same(&new, within)) {
+                markers.push(marker(new.track, r.model)?);
+            }
+        }
+    }
+    markers[answers..].sort_by(|a, b| b.track.weight().total_cmp(&a.track.weight()));
+    Ok(Survey { markers, answers, confidence })
+}
+
+/// Of a run the tracks that answer, others that move, and the weight of the heaviest of all.
+fn answers(winner: Run, width: f64) -> (Vec<Track>, Vec<Track>, f64) {
+    let radius = winner.model.radius_px();
     let heaviest = winner.group.iter().map(Track::weight).fold(0.0, f64::max);
     let mut keep: Vec<Track> =
         winner.group.into_iter().filter(|t| t.weight() > ANSWER_PART * heaviest).collect();
-    let mut others: Vec<Track> = winner.others.into_iter().filter(|t| t.weight() > 0.3 * heaviest).collect();
+    let mut others: Vec<Track> =
+        winner.others.into_iter().filter(|t| t.weight() > OTHER_LOOK_PART * heaviest).collect();
     if keep.is_empty() {
-        return Ok(None);
+        return (keep, others, heaviest);
     }
     // Once more with nothing but spots of the look that was learned.
     let look = [0, 1].map(|c| median(&mut keep.iter().map(|t| t.look[c]).collect::<Vec<_>>()));
@@ -308,29 +279,44 @@ pub fn follow(film: &dyn Film) -> Result<Option<Followed>> {
         keep = group;
         others.extend(rest);
     }
-    for r in runs {
-        for t in r.group.into_iter().chain(r.others) {
-            let within = 1.2 * r.model.radius_px().max(radius);
-            if t.weight() >= 0.5 * heaviest && !keep.iter().chain(&others).any(|o| same_marker(o, &t, within))
-            {
-                others.push(t);
+    (keep, others, heaviest)
+}
+
+/// What stands out most in the picture in which most does, strongest first: for recordings in which nothing moves smoothly.
+///
+/// # Errors
+/// Those of the film; [`crate::error::Error::Interrupted`] once the work is to stop.
+pub fn strongest(search: &Search) -> Result<(usize, Vec<(Model, Spot)>)> {
+    let models = search.models();
+    let n = search.film.count();
+    let mut best: (f64, usize, Vec<(Model, Spot)>) = (0.0, 0, Vec::new());
+    for i in spread(n, STRONGEST_PICTURES.min(n)) {
+        search.film.heed()?;
+        let picture = search.film.read(i)?;
+        let all = responses(&picture, search.count);
+        let mut found: Vec<(Model, Spot)> = models
+            .par_iter()
+            .flat_map_iter(|m| {
+                let limit = (FIRST_LIMIT, MOST_SPOTS);
+                let spots = search.spots(&picture, &all[m.octave], m, Against::Ground, limit);
+                spots.into_iter().map(|s| (*m, s))
+            })
+            .collect();
+        found.sort_by(|a, b| b.1.snr.total_cmp(&a.1.snr));
+        let mut apart: Vec<(Model, Spot)> = Vec::new();
+        for (m, s) in found {
+            let near =
+                |(n, o): &(Model, Spot)| (o.x - s.x).hypot(o.y - s.y) < m.radius_px().max(n.radius_px());
+            if apart.len() < STRONGEST && !apart.iter().any(near) {
+                apart.push((m, s));
             }
         }
+        let sum = apart.iter().map(|(_, s)| s.snr).sum();
+        if sum > best.0 {
+            best = (sum, i, apart);
+        }
     }
-    let radii: Vec<f64> = keep
-        .par_iter()
-        .map(|t| Ok(refine(film, &mut t.clone(), &model, 24, None, None)?.radius_px))
-        .collect::<Result<_>>()?;
-    let radius_px = median(&mut radii.clone());
-    let backdrop = Backdrop::learn(film, &model)?;
-    let final_places =
-        |t: &mut Track| refine(film, t, &model, usize::MAX, Some(radius_px), Some(&backdrop)).map(|_| ());
-    // Twice: what comes to rest is looked for from places that the ground does not pull.
-    keep.iter_mut().try_for_each(final_places)?;
-    extend(film, &mut keep, &model)?;
-    keep.iter_mut().try_for_each(final_places)?;
-    keep.iter_mut().for_each(|t| t.settle(radius_px));
-    Ok(Some(Followed { model, tracks: keep, radius_px, confidence: winner.purity * winner.compact, others }))
+    Ok((best.1, best.2))
 }
 
 /// The look whose tracks have the greatest weight, and the rest.

@@ -80,6 +80,11 @@ impl Ground {
             .collect()
     }
 
+    /// What stands out now from what is around it, new or not, in units of the noise.
+    pub fn against_noise(&self, response: &[f32], sign: f32) -> Vec<f32> {
+        response.iter().zip(&self.inverse_noise).map(|(&l, &i)| sign * l * i).collect()
+    }
+
     /// Noise of a place, grey levels.
     pub fn noise(&self, i: usize) -> f32 {
         1.0 / self.inverse_noise[i]

@@ -1,21 +1,26 @@
 //! Follows what moves, whatever it looks like: for recordings in which no markers stand out from the ground.
 //!
-//! Owns: [`follow`], [`Followed`], [`Film`], [`Picture`]. Must not: decode, know of bodies, or name a marker that only may be the
-//! wanted one ([`Followed::confidence`] tells).
+//! Owns: [`survey`], [`follow_clicks`], [`finish`], [`Marker`], [`Film`], [`Picture`]. Must not: decode, know of bodies, or name a
+//! marker that only may be the wanted one ([`Survey::confidence`] tells).
 //!
 //! Every picture is looked at by one filter (`response`: centre minus surround) in octaves, colour directions and both signs;
-//! `ground` takes away what stands still, `spot` finds the maxima, `tracklet` links them, `track` joins over gaps, `choose` lets
-//! every way of looking compete by what it explains, `centre` refines the places and `rest` follows what comes to rest.
+//! `ground` takes away what stands still, `spot` finds the maxima, `search` does both, `tracklet` links them, `track` joins over
+//! gaps, `choose` lets every way of looking compete by what it explains and `click` by how a track holds through a place that
+//! was pointed at; `centre` refines the places, `rest` follows what comes to rest, and `marker` does both.
 
 mod backdrop;
 mod centre;
 mod choose;
+mod click;
 mod ground;
+mod limits;
+mod marker;
 mod model;
 mod own_colour;
 mod picture;
 mod response;
 mod rest;
+mod search;
 mod spot;
 #[cfg(test)]
 mod tests;
@@ -24,10 +29,14 @@ mod tracklet;
 mod window;
 mod work;
 
-pub use choose::{Followed, follow};
+pub use choose::{Survey, strongest, survey};
+pub use click::{Click, Missed, follow_clicks};
+pub use limits::Limits;
+pub use marker::{Marker, finish};
 pub use model::Model;
 pub use picture::{Film, Picture};
 pub use response::Direction;
+pub use search::Search;
 pub use spot::Spot;
 pub use track::Track;
 pub use tracklet::{End, Tracklet};

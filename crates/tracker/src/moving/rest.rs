@@ -41,37 +41,35 @@ fn around(film: &dyn Film, picture: usize, model: &Model, at: [f64; 2], radius_p
     Ok(found)
 }
 
-/// Continues tracks at both ends of each piece.
-pub fn extend(film: &dyn Film, tracks: &mut [Track], model: &Model) -> Result<()> {
+/// Continues a track at both ends of each piece.
+pub fn extend(film: &dyn Film, track: &mut Track, model: &Model) -> Result<()> {
     let radius = model.radius_px();
-    for track in tracks.iter_mut() {
-        let mut occupied: HashSet<usize> = track.spots().map(|(k, _)| k).collect();
-        let mut strengths = Vec::new();
-        for t in &track.pieces {
-            for quarter in 1..4 {
-                let i = (t.spots.len() * quarter / 4).min(t.spots.len() - 1);
-                let s = &t.spots[i];
-                let found = around(film, t.first + i, model, [s.x, s.y], radius)?;
-                strengths.push(found.iter().map(|s| s.peak).fold(0.0, f64::max));
+    let mut occupied: HashSet<usize> = track.spots().map(|(k, _)| k).collect();
+    let mut strengths = Vec::new();
+    for t in &track.pieces {
+        for quarter in 1..4 {
+            let i = (t.spots.len() * quarter / 4).min(t.spots.len() - 1);
+            let s = &t.spots[i];
+            let found = around(film, t.first + i, model, [s.x, s.y], radius)?;
+            strengths.push(found.iter().map(|s| s.peak).fold(0.0, f64::max));
+        }
+    }
+    let peak = median(&mut strengths);
+    let mut added = Vec::new();
+    for k in 0..track.pieces.len() {
+        for forwards in [true, false] {
+            let mut new = continued(film, &track.pieces[k], forwards, model, peak, &occupied)?;
+            if new.len() < 2 || !was_empty_once(film, &new, model, peak)? {
+                continue;
             }
+            occupied.extend(new.iter().map(|(k, _)| *k));
+            new.sort_by_key(|(k, _)| *k);
+            added.extend(Tracklet::runs(&new));
         }
-        let peak = median(&mut strengths);
-        let mut added = Vec::new();
-        for k in 0..track.pieces.len() {
-            for forwards in [true, false] {
-                let mut new = continued(film, &track.pieces[k], forwards, model, peak, &occupied)?;
-                if new.len() < 2 || !was_empty_once(film, &new, model, peak)? {
-                    continue;
-                }
-                occupied.extend(new.iter().map(|(k, _)| *k));
-                new.sort_by_key(|(k, _)| *k);
-                added.extend(Tracklet::runs(&new));
-            }
-        }
-        if !added.is_empty() {
-            track.pieces.extend(added);
-            track.pieces.sort_by_key(|t| t.first);
-        }
+    }
+    if !added.is_empty() {
+        track.pieces.extend(added);
+        track.pieces.sort_by_key(|t| t.first);
     }
     Ok(())
 }

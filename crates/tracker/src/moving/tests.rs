@@ -87,6 +87,26 @@ impl Film for Drawn {
     }
 }
 
+/// What is followed of its own accord, whatever the confidence.
+struct Followed {
+    model: Model,
+    tracks: Vec<Track>,
+    confidence: f64,
+}
+
+fn follow(film: &Drawn) -> Result<Option<Followed>> {
+    let limits = Limits::default();
+    let Some(search) = Search::learn(film, &limits)? else { return Ok(None) };
+    let mut found = survey(&search)?;
+    found.markers.truncate(found.answers);
+    finish(film, &mut found.markers)?;
+    Ok(found.markers.first().map(|m| Followed {
+        model: m.model,
+        tracks: found.markers.iter().map(|m| m.track.clone()).collect(),
+        confidence: found.confidence,
+    }))
+}
+
 /// Root mean square error and that error over the stated uncertainty, both axes.
 fn errors(track: &Track, truth: impl Fn(usize) -> (f64, f64)) -> (f64, f64) {
     let (mut squares, mut weighted, mut n) = (0.0, 0.0, 0.0);
@@ -208,4 +228,82 @@ fn nothing_is_named_where_nothing_moves_or_all_is_noise() {
 fn a_wish_to_stop_ends_the_work() {
     let film = Drawn { stopped: true, ..Drawn::new(13, 2.0, 60, |k| vec![(k as f64, 100.0, 6.0, 240.0)]) };
     assert!(matches!(follow(&film), Err(Error::Interrupted)));
+}
+
+/// What is followed from places that are pointed at.
+fn pointed(film: &Drawn, limits: &Limits, clicks: &[Click]) -> Vec<Result<Marker, Missed>> {
+    let search = Search::learn(film, limits).unwrap().unwrap();
+    let mut followed = follow_clicks(&search, clicks).unwrap();
+    let mut markers: Vec<Marker> = followed.iter().flatten().cloned().collect();
+    finish(film, &mut markers).unwrap();
+    let mut finished = markers.into_iter();
+    followed.iter_mut().flatten().for_each(|m| *m = finished.next().unwrap());
+    followed
+}
+
+/// Where something is in a picture.
+type Path = fn(usize) -> (f64, f64);
+
+/// Two small discs of other sizes and signs, and a large one that is likelier meant.
+fn three(seed: u64) -> (Drawn, [Path; 2]) {
+    fn small(k: usize) -> (f64, f64) {
+        let a = TAU * k as f64 / 70.0;
+        (60.0 + 35.0 * a.cos(), 170.0 + 35.0 * a.sin())
+    }
+    fn dark(k: usize) -> (f64, f64) {
+        (40.0 + 1.5 * k as f64, 30.0 + 15.0 * (k as f64 / 20.0).sin())
+    }
+    let film = Drawn::new(seed, 2.0, 150, |k| {
+        let (a, b, c) = (small(k), dark(k), round(k));
+        vec![(c.0 + 60.0, c.1, 12.0, 240.0), (a.0, a.1, 4.0, 230.0), (b.0, b.1, 6.0, 15.0)]
+    });
+    (film, [small, dark])
+}
+
+#[test]
+fn what_is_pointed_at_is_followed_whatever_else_moves() {
+    for seed in 30..33 {
+        let (film, truth) = three(seed);
+        for picture in [10, 75, 140] {
+            let click =
+                |t: fn(usize) -> (f64, f64)| Click { picture, x: t(picture).0 + 1.5, y: t(picture).1 - 1.0 };
+            let followed = pointed(&film, &Limits::default(), &truth.map(click));
+            for (marker, truth) in followed.iter().zip(truth) {
+                let track = &marker.as_ref().unwrap().track;
+                assert!(track.count >= 140, "seed {seed}, picture {picture}: {} of 150", track.count);
+                let (rms, _) = errors(track, truth);
+                assert!(rms < 0.1, "seed {seed}, picture {picture}: {rms} px");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_place_where_nothing_is_and_one_that_only_flickers_are_refused() {
+    let (film, _) = three(34);
+    let empty = Click { picture: 75, x: 300.0, y: 235.0 };
+    let followed = pointed(&film, &Limits::default(), &[empty]);
+    // The ground's own grains stand still: if one is taken for it, it does not move.
+    assert!(followed.iter().all(|f| f.as_ref().map_or(true, |m| !m.track.moving)), "{followed:?}");
+    let once =
+        Drawn::new(35, 2.0, 60, |k| if k == 30 { vec![(100.0, 100.0, 6.0, 250.0)] } else { Vec::new() });
+    let followed = pointed(&once, &Limits::default(), &[Click { picture: 30, x: 100.0, y: 100.0 }]);
+    assert!(matches!(followed[0], Err(Missed::Ends(..))), "{followed:?}");
+}
+
+#[test]
+fn region_sign_and_level_say_which_of_several_is_meant() {
+    use crate::rig::Region;
+
+    let (film, [small, dark]) = three(36);
+    let only = |limits: Limits, truth: fn(usize) -> (f64, f64)| {
+        let search = Search::learn(&film, &limits).unwrap().unwrap();
+        let found = survey(&search).unwrap();
+        let first = &found.markers[0].track;
+        let near = first.spots().filter(|(k, s)| (s.x - truth(*k).0).hypot(s.y - truth(*k).1) < 2.0).count();
+        assert!(near > 100, "{limits:?}: {near} of {}", first.count);
+    };
+    only(Limits { sign: Some(-1.0), ..Limits::default() }, dark);
+    only(Limits { sign: Some(-1.0), level: Some(35.0), ..Limits::default() }, dark);
+    only(Limits { region: Some(Region::Rectangle([0.0, 120.0, 110.0, 239.0])), ..Limits::default() }, small);
 }

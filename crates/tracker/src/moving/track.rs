@@ -3,7 +3,7 @@
 //! Owns: [`Track`], [`join`], [`join_lone`], [`tracks`], [`chosen`]. Must not: choose which marker is wanted.
 
 use super::spot::Spot;
-use super::tracklet::{Tracklet, median};
+use super::tracklet::{Tracklet, link, median};
 
 /// Longest gap that is joined by prediction, pictures.
 const LONGEST_GAP: usize = 40;
@@ -34,6 +34,8 @@ pub struct Track {
     pub count: usize,
     /// From 0 to 1: how smoothly it moves, how constant its look is, how far it travels in its own sizes.
     pub quality: f64,
+    /// The same without its travel.
+    pub smoothness: f64,
     /// Extent of its path, px.
     pub extent_px: f64,
     /// Whether it moves.
@@ -91,12 +93,14 @@ impl Track {
         let smooth: f64 = pieces.iter().map(|t| quality(t, radius_px) * t.spots.len() as f64).sum();
         let extent_px = extent(pieces.iter().flat_map(|t| &t.spots));
         // Travel in own sizes is the best single evidence that something is a marker.
-        let quality = smooth / count.max(1) as f64 * extent_px / (extent_px + 6.0 * radius_px);
+        let smoothness = smooth / count.max(1) as f64;
+        let quality = smoothness * extent_px / (extent_px + 6.0 * radius_px);
         let look = [0, 1].map(|k| median(&mut pieces.iter().map(|t| t.look()[k]).collect::<Vec<_>>()));
         Self {
             pieces,
             count,
             quality,
+            smoothness,
             extent_px,
             moving: extent_px > (0.8 * radius_px).max(4.0),
             look,
@@ -337,6 +341,12 @@ pub fn join_lone(chains: Vec<Vec<Tracklet>>, radius_px: f64) -> Vec<Vec<Tracklet
     }
     long.extend(short);
     long
+}
+
+/// The tracks of spots in consecutive pictures: linked, and joined over gaps.
+pub fn linked(pictures: &[Vec<Spot>], radius_px: f64, width_px: f64) -> Vec<Track> {
+    let chains = join_lone(join(link(pictures, radius_px, width_px, 0), radius_px), radius_px);
+    tracks(chains, radius_px, pictures.len())
 }
 
 /// The tracks of chains that are long enough to judge.

@@ -179,6 +179,28 @@ impl<'a> WorkFilm<'a> {
         &self.decoded[self.kept[picture]..end]
     }
 
+    /// The picture that shows a frame of the recording; `None` where it was not read or not decoded.
+    pub fn picture_of(&self, frame: u64) -> Option<usize> {
+        let stamp = self.stamps.iter().position(|s| s.index == frame)?;
+        let decoded = self.decoded.binary_search(&stamp).ok()?;
+        self.kept.partition_point(|&k| k <= decoded).checked_sub(1)
+    }
+
+    /// A place in the recording as a place in a work picture, px.
+    pub fn work_px(&self, recorded_px: f64) -> f64 {
+        (recorded_px + 0.5) / self.shrink as f64 - 0.5
+    }
+
+    /// Number of pictures.
+    pub fn pictures(&self) -> usize {
+        self.kept.len()
+    }
+
+    /// The frame of the recording that a picture shows.
+    pub fn frame_of(&self, picture: usize) -> u64 {
+        self.kept.get(picture).map_or(0, |&k| self.stamps[self.decoded[k]].index)
+    }
+
     /// Frames that are copies of the one before them.
     pub fn copies(&self) -> usize {
         self.decoded.len() - self.kept.len()

@@ -1,6 +1,6 @@
 //! Draws nodes, names, bodies, trails and gaps into a frame.
 //!
-//! Owns: [`Overlay`], [`still`]. Must not: track: it draws what a table says.
+//! Owns: [`Overlay`]. Must not: track: it draws what a table says.
 //!
 //! Every stroke has a dark rim, so that it is read on bright and on dark ground.
 
@@ -11,7 +11,6 @@ use opencv::core::{Mat, Point, Scalar};
 use opencv::imgproc;
 
 use super::picture::{colour, failed};
-use crate::detect::Detection;
 use crate::error::Result;
 use crate::frame::Frame;
 use crate::observation::{Observation, Status};
@@ -48,7 +47,7 @@ pub struct Overlay {
     /// Size of marks in the picture: 1 in one of 1280 px.
     mark: f64,
     /// The same in square pixels of the recording.
-    scale: f64,
+    pub(super) scale: f64,
 }
 
 impl Overlay {
@@ -201,11 +200,11 @@ impl Overlay {
         if frame.plane.is_none() {
             text.push_str("   not decoded");
         }
-        self.write(&mut picture, &text, Vector2::new(12.0, 26.0) * s, [255.0; 3])?;
+        self.write(&mut picture, &text, self.corner(), [255.0; 3])?;
         Ok(picture)
     }
 
-    fn stroke(
+    pub(super) fn stroke(
         &self,
         picture: &mut Mat,
         a: Vector2<f64>,
@@ -221,7 +220,7 @@ impl Overlay {
         Ok(())
     }
 
-    fn ring(
+    pub(super) fn ring(
         &self,
         picture: &mut Mat,
         at: Vector2<f64>,
@@ -239,7 +238,13 @@ impl Overlay {
         Ok(())
     }
 
-    fn write(&self, picture: &mut Mat, text: &str, at: Vector2<f64>, colour: [f64; 3]) -> Result<()> {
+    pub(super) fn write(
+        &self,
+        picture: &mut Mat,
+        text: &str,
+        at: Vector2<f64>,
+        colour: [f64; 3],
+    ) -> Result<()> {
         let Some(at) = self.fine(at) else { return Ok(()) };
         let at = Point::new(at.x >> SHIFT, at.y >> SHIFT);
         // Smaller letters cannot be read.
@@ -251,6 +256,30 @@ impl Overlay {
                 .map_err(failed)?;
         }
         Ok(())
+    }
+
+    /// A ring about something that is no node, and its number beside it.
+    pub(super) fn numbered(
+        &self,
+        picture: &mut Mat,
+        at: Vector2<f64>,
+        radius_px: f64,
+        number: usize,
+    ) -> Result<()> {
+        let radius = (radius_px + 3.0 * self.scale).max(7.0 * self.scale);
+        self.ring(picture, at, radius, colour_of(number), 1.5)?;
+        let beside = at + Vector2::new(radius + 2.0 * self.scale, 5.0 * self.scale);
+        self.write(picture, &number.to_string(), beside, colour_of(number))
+    }
+
+    /// Where what is said of the whole picture stands, in square pixels.
+    pub(super) fn corner(&self) -> Vector2<f64> {
+        Vector2::new(12.0, 26.0) * self.scale
+    }
+
+    /// A place of the recording in square pixels.
+    pub(super) fn square(&self, [x, y]: [f64; 2]) -> Vector2<f64> {
+        self.rig.pixel_aspect.to_square(Vector2::new(x, y))
     }
 
     /// Where a node is, in square pixels.
@@ -275,37 +304,13 @@ fn scalar(c: [f64; 3]) -> Scalar {
     Scalar::new(c[0], c[1], c[2], 255.0)
 }
 
-/// A still of the reference picture with the rig drawn, and marks on detections that are no node.
-///
-/// # Errors
-/// As [`Overlay::draw`].
-pub fn still(frame: &Frame, rig: &Rig, detections: &[Detection]) -> Result<Mat> {
-    let mut row = vec![Observation::MISSING; rig.nodes.len()];
-    for (o, n) in row.iter_mut().zip(&rig.nodes) {
-        o.x_px = n.x_px;
-        o.y_px = n.y_px;
-        o.sigma_px = 0.1;
-        o.area_px = 1.0;
-        o.status = Status::Seen;
-    }
-    let mut overlay = Overlay::new(rig);
-    let mut picture = overlay.draw(frame, None, &row)?;
-    for d in detections {
-        let square = |x: f64, y: f64| rig.pixel_aspect.to_square(Vector2::new(x, y));
-        let p = square(d.x_px, d.y_px);
-        if rig.nodes.iter().all(|n| (square(n.x_px, n.y_px) - p).norm() > 3.0) {
-            overlay.ring(&mut picture, p, 6.0 * overlay.scale, [128.0; 3], 1.0)?;
-        }
-    }
-    Ok(picture)
-}
-
 #[cfg(test)]
 mod tests {
     use opencv::prelude::*;
 
     use super::*;
     use crate::frame::PixelFormat;
+    use crate::overlay::still;
     use crate::pixel_aspect::PixelAspect;
     use crate::rig::{Body, Node};
 
@@ -318,6 +323,7 @@ mod tests {
             reference_frame: None,
             region: None,
             lens: None,
+            wanted: Default::default(),
             bodies: vec![Body { name: "b".into() }],
             nodes: vec![node("n0", 30.0), node("n1", 90.0)],
             joints: vec![],
@@ -341,7 +347,7 @@ mod tests {
     #[test]
     fn marks_differ_from_bright_and_from_dark_ground() {
         for ground in [0_u8, 128, 255] {
-            let picture = still(&frame(ground), &rig(), &[]).unwrap();
+            let picture = still(&frame(ground), &rig(), &[], &[]).unwrap();
             // On the ring of n0 something is brighter than the dark rim and something darker than the colour.
             let mut far = 0;
             for y in 28..53 {

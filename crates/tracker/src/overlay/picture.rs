@@ -14,9 +14,18 @@ use crate::gray::gray8;
 use crate::name::text;
 use crate::output;
 
-/// The frame's brightness as an 8-bit picture of three channels, `size` px; black where it could not be decoded. Deep
-/// recordings are shown by their upper 8 bits.
+/// The frame as an 8-bit picture of three channels, `size` px: in its colours where it has them, else by its brightness; black
+/// where it could not be decoded. Deep recordings are shown by their upper 8 bits.
 pub(super) fn colour(frame: &Frame, size: [i32; 2]) -> Result<Mat> {
+    let how = if size[0] < frame.width as i32 { imgproc::INTER_AREA } else { imgproc::INTER_LINEAR };
+    if let Some(planes) = frame.colour.as_ref().filter(|_| frame.plane.is_some()) {
+        let bytes = blue_green_red(&gray8(frame)?, planes, frame.width as usize);
+        let mat = Mat::from_slice(&bytes).map_err(failed)?;
+        let mat = mat.reshape(3, frame.height as i32).map_err(failed)?;
+        let mut out = Mat::default();
+        imgproc::resize(&mat, &mut out, Size::new(size[0], size[1]), 0.0, 0.0, how).map_err(failed)?;
+        return Ok(out);
+    }
     let (w, h) = (frame.width as usize, frame.height as usize);
     let gray = gray8(frame)?;
     let mat = Mat::from_slice(&gray).map_err(failed)?;
@@ -27,11 +36,28 @@ pub(super) fn colour(frame: &Frame, size: [i32; 2]) -> Result<Mat> {
         imgproc::cvt_color_def(&mat, &mut out, imgproc::COLOR_GRAY2BGR).map_err(failed)?;
         return Ok(out);
     }
-    let how = if size[0] < mat.cols() { imgproc::INTER_AREA } else { imgproc::INTER_LINEAR };
     let mut scaled = Mat::default();
     imgproc::resize(&mat, &mut scaled, Size::new(size[0], size[1]), 0.0, 0.0, how).map_err(failed)?;
     imgproc::cvt_color_def(&scaled, &mut out, imgproc::COLOR_GRAY2BGR).map_err(failed)?;
     Ok(out)
+}
+
+/// Samples blue, green, red of brightness and colour differences (BT.601, full range).
+fn blue_green_red(luma: &[u8], [blue, red]: &[Vec<u8>; 2], width: usize) -> Vec<u8> {
+    let height = luma.len() / width.max(1);
+    let wide = if blue.len() < luma.len() { 2 } else { 1 };
+    let row = width.div_ceil(wide).min(blue.len());
+    let mut out = Vec::with_capacity(3 * luma.len());
+    for y in 0..height {
+        for x in 0..width {
+            let k = ((y / wide) * row + x / wide).min(blue.len().saturating_sub(1));
+            let [v, b, r] = [luma[y * width + x], blue[k], red[k]].map(f32::from);
+            let (b, r) = (b - 128.0, r - 128.0);
+            let bgr = [v + 1.772 * b, v - 0.344 * b - 0.714 * r, v + 1.402 * r];
+            out.extend(bgr.map(|c| c.round().clamp(0.0, 255.0) as u8));
+        }
+    }
+    out
 }
 
 /// Samples red, green, blue, pixel by pixel and row by row.

@@ -6,7 +6,7 @@ use serde_json::json;
 
 use super::ahead::End;
 use super::clutter::is_cluttered;
-use super::moving::{self, Outcome};
+use super::moving::{self, Outcome, Unclear};
 use super::observer::{Observer, Stage};
 use super::opening::{Attended, on_threads};
 use super::reading::Run;
@@ -17,7 +17,7 @@ use crate::discover::{Discovery, discover};
 use crate::error::{Error, Fault, Result};
 use crate::frame::Ending;
 use crate::gaps::Damage;
-use crate::message::Message;
+use crate::message::{Message, Setting};
 use crate::name::shown;
 use crate::rig::Rig;
 use crate::source::Interlaced;
@@ -32,7 +32,7 @@ impl Run<'_> {
         &mut self,
         end: Option<End>,
         observer: &mut dyn Observer,
-        unclear: &mut Option<String>,
+        unclear: &mut Option<Unclear>,
     ) -> Result<RunSummary> {
         if self.store.is_empty() && end.is_none() {
             return Err(Error::Interrupted);
@@ -67,6 +67,7 @@ impl Run<'_> {
         self.store.check()?;
         found.rig.region = found.rig.region.or_else(|| self.detect.region.clone());
         found.rig.lens = found.rig.lens.or_else(|| self.detect.lens.clone());
+        found.rig.wanted = self.settings.asked().clone();
         Ok(found)
     }
 
@@ -77,6 +78,14 @@ impl Run<'_> {
         let (timing, clock) = self.times()?;
         self.warnings.extend(timing::notes(&timing));
         let rig = self.rig(end.is_none(), observer)?;
+        if let Some(count) = self.settings.asked().markers
+            && count != rig.nodes.len()
+        {
+            return Err(Error::Rig(
+                Fault::of(Setting::Markers, format!("{count} are wanted, and {} stand out", rig.nodes.len()))
+                    .advice("Point at each of them with " + Setting::Marker),
+            ));
+        }
         let total = self.store.len() as u64;
         observer.stage(Stage::Track, Some(total));
         let mut writer = match &self.settings.output {
@@ -216,6 +225,10 @@ impl Run<'_> {
         });
         if self.settings.open.interlaced != Interlaced::Refuse {
             settings["interlaced"] = self.settings.interlaced_json();
+        }
+        let wanted = self.settings.wanted_json();
+        if !wanted.is_null() {
+            settings["wanted"] = wanted;
         }
         settings
     }

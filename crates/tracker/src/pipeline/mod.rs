@@ -1,10 +1,12 @@
 //! The one way through: source, detect, track, table, in that order, for every front end.
 
 mod ahead;
+mod candidates;
 mod clutter;
 mod detecting;
 mod following;
 mod moving;
+mod moving_nodes;
 mod observer;
 mod opening;
 mod reading;
@@ -15,6 +17,7 @@ mod state;
 mod summary;
 mod times;
 
+pub use candidates::{Candidate, Candidates};
 pub use observer::{Observer, Silent, Stage};
 pub use opening::open;
 pub(crate) use opening::{learn, sample};

@@ -2,6 +2,8 @@
 //!
 //! Owns: [`Observer`], [`Stage`]. Must not: hold a clock; observers may.
 
+use super::candidates::Candidates;
+
 /// What a run is doing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stage {
@@ -40,6 +42,9 @@ impl Stage {
 pub trait Observer {
     /// A stage begins; `total` frames are ahead, if that is known.
     fn stage(&mut self, _stage: Stage, _total: Option<u64>) {}
+
+    /// What was found of what moves: where it is unclear what is meant, and where more moves than is followed.
+    fn candidates(&mut self, _found: Candidates) {}
 
     /// So many frames of the stage are done. Called some hundred times a second at most per thousand frames.
     fn progress(&mut self, _done: u64) {}

@@ -2,7 +2,7 @@
 //!
 //! Owns: [`run`]. Must not: print, read a clock, or do any of the steps' work.
 
-use super::moving::{self, Outcome};
+use super::moving::{self, Outcome, Unclear};
 use super::observer::{Observer, Stage};
 use super::opening::open;
 use super::reading::Run;
@@ -10,7 +10,8 @@ use super::request::{Request, already_done, check};
 use super::settings::RunSettings;
 use super::state;
 use super::summary::RunSummary;
-use crate::error::{Error, Result};
+use crate::error::{Error, Fault, Result};
+use crate::message::Message;
 
 /// Follows the markers of a recording and writes the table. Where none stand out, what moves is followed if it is clear what is
 /// meant.
@@ -22,26 +23,52 @@ use crate::error::{Error, Result};
 /// The error of the part that failed; [`Error::Interrupted`] if the run was stopped before there was anything to
 /// write; [`Error::Table`] if the output is there already.
 pub fn run(settings: &RunSettings, observer: &mut dyn Observer) -> Result<RunSummary> {
+    if settings.asked().names_what_moves() {
+        return run_named(settings, observer);
+    }
     let mut unclear = None;
     let markers = run_markers(settings, observer, &mut unclear);
     if !moving::is_wanted(&markers) || !moving::applies(settings) {
         return markers;
     }
-    let why = match unclear {
-        Some(why) => why,
+    let unclear = match unclear {
+        Some(unclear) => unclear,
         None => match moving::run(settings, observer) {
             Ok(Outcome::Followed(summary)) => return Ok(*summary),
-            Ok(Outcome::Unclear(why)) => why,
+            Ok(Outcome::Unclear(unclear)) => unclear,
             Err(Error::Interrupted) => return Err(Error::Interrupted),
             Err(_) => return markers,
         },
     };
     match markers {
         Ok(mut summary) => {
-            summary.warnings.push(format!("markers are seen in few frames, and {why}").into());
+            let why = Message::from(format!("markers are seen in few frames, and {}. ", unclear.why));
+            summary.warnings.push(why + unclear.advice);
             Ok(summary)
         }
-        Err(error) => Err(error.and_also(&why)),
+        Err(error) => Err(error.and_also(&unclear.why, unclear.advice)),
+    }
+}
+
+/// Follows what was named and only moves: it need not stand out.
+fn run_named(settings: &RunSettings, observer: &mut dyn Observer) -> Result<RunSummary> {
+    moving::check(settings)?;
+    let files = check(settings)?;
+    observer.stage(Stage::Open, None);
+    let source = open(&settings.input, &settings.open, observer)?;
+    let request = Request::new(settings, source.info(), files)?;
+    if let Some(done) = already_done(settings, &request)? {
+        return Ok(done);
+    }
+    drop(source);
+    match moving::run(settings, observer)? {
+        Outcome::Followed(summary) => {
+            settings.output.as_ref().map_or(Ok(()), |output| state::remove(output))?;
+            Ok(*summary)
+        }
+        Outcome::Unclear(unclear) => {
+            Err(Error::Detect(Fault::new(&settings.input, unclear.why).advice(unclear.advice)))
+        }
     }
 }
 
@@ -49,7 +76,7 @@ pub fn run(settings: &RunSettings, observer: &mut dyn Observer) -> Result<RunSum
 fn run_markers(
     settings: &RunSettings,
     observer: &mut dyn Observer,
-    unclear: &mut Option<String>,
+    unclear: &mut Option<Unclear>,
 ) -> Result<RunSummary> {
     let files = check(settings)?;
     observer.stage(Stage::Open, None);

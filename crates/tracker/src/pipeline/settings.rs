@@ -11,6 +11,7 @@ use crate::csv_text::Cells;
 use crate::detect::DetectSettings;
 use crate::rig::Rig;
 use crate::source::{Interlaced, OpenOptions};
+use crate::wanted::Wanted;
 
 /// What to do where the output is there already.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -43,6 +44,8 @@ pub struct RunSettings {
     pub frames: Option<Range<u64>>,
     /// How markers are detected.
     pub detect: DetectSettings,
+    /// What is to be followed; the default is what stands out, or else what moves if it is clear what is meant.
+    pub wanted: Wanted,
     /// Threads for detection; 0 is one for each core. The result is the same for any number.
     pub threads: usize,
     /// How a CSV writes names.
@@ -55,6 +58,17 @@ impl RunSettings {
     /// How interlaced film is read, `null` unless that was said.
     pub(super) fn interlaced_json(&self) -> serde_json::Value {
         json!(Some(self.open.interlaced).filter(|i| *i != Interlaced::Refuse))
+    }
+
+    /// What is to be followed: by the settings, or else by the rig.
+    pub(super) fn asked(&self) -> &Wanted {
+        let of_rig = self.rig.as_ref().map(|r| &r.wanted).filter(|_| self.wanted.is_default());
+        of_rig.unwrap_or(&self.wanted)
+    }
+
+    /// The same as JSON, `null` unless something was said.
+    pub(super) fn wanted_json(&self) -> serde_json::Value {
+        json!(Some(self.asked()).filter(|w| !w.is_default()))
     }
 
     /// The first frame and one past the last; `null` for an open end, as in `--frames 5..`.

@@ -82,6 +82,7 @@ impl State {
             "fps": settings.open.fps,
             "frames": settings.frames_json(),
             "interlaced": settings.interlaced_json(),
+            "wanted": settings.wanted_json(),
         });
         Ok(Self { identity, changes: print.map(|p| p.changes) })
     }
@@ -97,6 +98,7 @@ impl State {
             "fps": meta.settings["fps"],
             "frames": meta.settings["frames"],
             "interlaced": meta.settings["interlaced"],
+            "wanted": meta.settings["wanted"],
         });
         self.same(&before, output, "its run is complete and had another")
     }

@@ -133,6 +133,7 @@ impl Film {
             reference_frame: Some(index),
             region: None,
             lens: None,
+            wanted: Default::default(),
             bodies: scene
                 .links
                 .iter()

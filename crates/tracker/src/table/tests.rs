@@ -20,6 +20,7 @@ pub(crate) fn meta(names: &[(String, usize)], bodies: &[String]) -> TableMeta {
         reference_frame: Some(0),
         region: None,
         lens: None,
+        wanted: Default::default(),
         bodies: bodies.iter().map(|name| Body { name: name.clone() }).collect(),
         nodes: names
             .iter()

@@ -263,6 +263,7 @@ mod tests {
             reference_frame: Some(0),
             region: None,
             lens: None,
+            wanted: Default::default(),
             bodies: vec![Body { name: "b".into() }],
             nodes: nodes.collect(),
             joints: vec![Joint { name: "pivot".into(), bodies: vec!["b".into()], x_px: 300.0, y_px: 300.0 }],

@@ -14,6 +14,7 @@ mod refusal;
 mod score;
 mod setup;
 mod track;
+mod unclear;
 mod watch;
 mod words;
 

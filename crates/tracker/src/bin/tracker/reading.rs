@@ -4,7 +4,9 @@ use std::ops::Range;
 
 use tracker::detect::{DetectSettings, Polarity, Threshold};
 use tracker::pixel_aspect::PixelAspect;
+use tracker::rig::Region;
 use tracker::source::{Decoder, Interlaced, OpenOptions};
+use tracker::wanted::{Pointed, Wanted};
 
 /// How a recording is opened.
 #[derive(Debug, Clone, clap::Args)]
@@ -73,13 +75,43 @@ pub struct FollowArgs {
     /// Threads; 0 is one for each core. The result is the same for any number
     #[arg(long, default_value_t = 0, value_name = "N")]
     pub threads: usize,
+    /// Part of the picture in which markers are looked for: first and last column and row, in px
+    #[arg(long, value_name = "X0,Y0,X1,Y1", value_parser = region, allow_hyphen_values = true)]
+    region: Option<Rectangle>,
+    #[command(flatten)]
+    wanted: WantedArgs,
     #[command(flatten)]
     decode: DecodeArgs,
     #[command(flatten)]
     interlaced: InterlacedArgs,
 }
 
+/// What is to be followed.
+#[derive(Debug, Clone, clap::Args)]
+struct WantedArgs {
+    /// Follow what is at this place of this frame (the first if none is given); once for each marker
+    #[arg(long, value_name = "X,Y[@FRAME]", allow_hyphen_values = true)]
+    marker: Vec<Pointed>,
+    /// How many markers there are
+    #[arg(long, value_name = "N")]
+    markers: Option<usize>,
+    /// Follow these numbers of the picture of `tracker setup` too
+    #[arg(long, value_name = "N,...", value_delimiter = ',')]
+    also: Vec<usize>,
+    /// Two nodes are one marker, whose name is the first; once for each pair
+    #[arg(long, value_name = "N1=N2", value_parser = pair)]
+    same: Vec<Pair>,
+}
+
+type Pair = [String; 2];
+type Rectangle = [f64; 4];
+
 impl FollowArgs {
+    pub fn wanted(&self) -> Wanted {
+        let WantedArgs { marker, markers, also, same } = self.wanted.clone();
+        Wanted { marker, markers, also, same }
+    }
+
     pub fn open(&self) -> OpenOptions {
         self.decode.options(self.fps, self.threads, self.interlaced.setting())
     }
@@ -92,6 +124,7 @@ impl FollowArgs {
                 PolarityArg::Bright => Polarity::Bright,
                 PolarityArg::Dark => Polarity::Dark,
             },
+            region: self.region.map(Region::Rectangle),
             ..DetectSettings::default()
         }
     }
@@ -125,6 +158,23 @@ fn frames(text: &str) -> Result<Range<u64>, String> {
         if t.is_empty() { Ok(none) } else { t.parse().map_err(|_| format!("{t:?} is not a frame; {form}")) }
     };
     Ok(number(start, 0)?..number(end, u64::MAX)?)
+}
+
+fn pair(text: &str) -> Result<Pair, String> {
+    let form = "expected two names of nodes, for example n1=n2";
+    let (a, b) = text.split_once('=').ok_or(form)?;
+    if a.is_empty() || b.is_empty() { Err(form.into()) } else { Ok([a.to_owned(), b.to_owned()]) }
+}
+
+fn region(text: &str) -> Result<Rectangle, String> {
+    let form = "expected X0,Y0,X1,Y1, for example 100,50,400,300";
+    let values: Vec<f64> = text.split(',').map_while(|t| t.trim().parse().ok()).collect();
+    let values: Rectangle = values.try_into().map_err(|_| form)?;
+    if values.iter().all(|v| v.is_finite()) && text.split(',').count() == 4 {
+        Ok(values)
+    } else {
+        Err(form.into())
+    }
 }
 
 fn threshold(text: &str) -> Result<Threshold, String> {

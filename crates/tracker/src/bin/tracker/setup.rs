@@ -16,6 +16,7 @@ use tracker::{output, overlay, setup};
 
 use crate::print;
 use crate::reading::FollowArgs;
+use crate::unclear;
 use crate::watch::Watch;
 use crate::words::CommandLine;
 
@@ -51,11 +52,16 @@ pub fn run(args: Args, front: &CommandLine) -> anyhow::Result<ExitCode> {
         open: args.follow.open(),
         frames: args.follow.frames.clone(),
         detect: args.follow.detect(),
+        wanted: args.follow.wanted(),
         threads: args.follow.threads,
         ..RunSettings::default()
     };
     let mut watch = Watch::new(args.quiet);
-    let found = setup::find(&settings, &mut watch)?;
+    let found = setup::find(&settings, &mut watch);
+    if let Err(Error::Detect(_) | Error::Rig(_)) = &found {
+        unclear::tell(&settings, &picture, args.force, &mut watch);
+    }
+    let found = found?;
     watch.finish();
     let rig = found.rig;
     overlay::save(&found.picture, &picture)?;

@@ -16,6 +16,7 @@ use tracker::table::RunEnding;
 
 use crate::print;
 use crate::reading::FollowArgs;
+use crate::unclear;
 use crate::watch::{INTERRUPTED, Watch};
 use crate::words::CommandLine;
 
@@ -79,6 +80,7 @@ impl Args {
                 },
                 ..self.follow.detect()
             },
+            wanted: self.follow.wanted(),
             threads: self.follow.threads,
             cells: if self.safe_csv { Cells::Safe } else { Cells::Plain },
             reads: self.rig.iter().cloned().collect(),
@@ -89,7 +91,12 @@ impl Args {
 /// Runs it.
 pub fn run(args: Args, front: &CommandLine) -> anyhow::Result<ExitCode> {
     let mut watch = Watch::new(args.quiet);
-    let outcome = run_pipeline(&args.settings()?, &mut watch);
+    let settings = args.settings()?;
+    let outcome = run_pipeline(&settings, &mut watch);
+    if let Err(Error::Detect(_) | Error::Rig(_)) = &outcome {
+        let picture = unclear::picture_beside(&args.output);
+        unclear::tell(&settings, &picture, args.force, &mut watch);
+    }
     watch.finish();
     let state = partial_path(&args.output);
     if matches!(outcome, Err(Error::Interrupted)) && state.exists() {

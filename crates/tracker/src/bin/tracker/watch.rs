@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::Context;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use tracker::pipeline::{Observer, Stage};
+use tracker::pipeline::{Candidates, Observer, Stage};
 
 /// How often the user asked to stop.
 static ASKED: AtomicUsize = AtomicUsize::new(0);
@@ -41,6 +41,8 @@ pub fn listen() -> anyhow::Result<()> {
 /// Shows progress on a terminal's standard error and hears ctrl-c.
 pub struct Watch {
     bar: ProgressBar,
+    /// What was found of what moves, if anything was looked for.
+    pub candidates: Option<Candidates>,
 }
 
 impl Watch {
@@ -52,7 +54,7 @@ impl Watch {
         } else {
             ProgressDrawTarget::stderr_with_hz(8)
         };
-        Self { bar: ProgressBar::with_draw_target(None, target) }
+        Self { bar: ProgressBar::with_draw_target(None, target), candidates: None }
     }
 
     /// Takes the bar away.
@@ -84,6 +86,10 @@ impl Observer for Watch {
             self.bar.set_style(style);
         }
         self.bar.set_message(stage.as_str());
+    }
+
+    fn candidates(&mut self, found: Candidates) {
+        self.candidates = Some(found);
     }
 
     fn progress(&mut self, done: u64) {

@@ -222,6 +222,7 @@ impl Swing {
             reference_frame: Some(reference as u64),
             region: None,
             lens: None,
+            wanted: Default::default(),
             bodies: vec![Body { name: "upper".into() }, Body { name: "lower".into() }],
             nodes,
             joints: vec![

@@ -1,0 +1,39 @@
+//! What is said and drawn where it is not clear what is to be followed.
+//!
+//! Owns: [`tell`], [`picture_beside`]. Must not: find anything.
+
+use std::path::{Path, PathBuf};
+
+use tracker::name::text;
+use tracker::pipeline::RunSettings;
+use tracker::{output, overlay, setup, source};
+
+use crate::print;
+use crate::watch::Watch;
+
+/// Where the picture goes that is drawn in the table's stead.
+pub fn picture_beside(output: &Path) -> PathBuf {
+    output.with_extension("png")
+}
+
+/// Writes the picture of what was found, and a line for each number in it. What keeps the picture from being written is said:
+/// the reason why it is drawn is the error that follows.
+pub fn tell(settings: &RunSettings, picture: &Path, replace: bool, watch: &mut Watch) {
+    let Some(found) = watch.candidates.take().filter(|c| !c.all.is_empty()) else { return };
+    let written = source::files(&settings.input)
+        .and_then(|files| {
+            output::check(&[picture.to_owned()], &files, replace).map_err(tracker::error::Error::Film)
+        })
+        .and_then(|()| setup::picture_of(settings, &found, watch))
+        .and_then(|drawn| overlay::save(&drawn, picture));
+    watch.finish();
+    match written {
+        Ok(()) => {
+            print::say(format!("{}: the picture of what was found in frame {}", text(picture), found.frame))
+        }
+        Err(error) => print::say(format!("the picture of what was found is not written: {error}")),
+    }
+    for candidate in &found.all {
+        print::say(candidate.line());
+    }
+}

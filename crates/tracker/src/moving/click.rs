@@ -1,0 +1,207 @@
+//! Follows what a user pointed at: of all ways of looking the one in which the track through that place holds best.
+//!
+//! Owns: [`Click`], [`follow_clicks`], [`Missed`]. Must not: follow anything else.
+
+use rayon::prelude::*;
+
+use super::marker::{Marker, compact};
+use super::model::Model;
+use super::response::{response, responses};
+use super::search::{Against, Search};
+use super::spot::Spot;
+use super::track::{Track, join, join_lone};
+use super::tracklet::{End, link};
+use crate::error::Result;
+
+/// Limit of a spot at the place that was pointed at, in units of the noise: what was pointed at need not stand out from all else.
+const PLACE_LIMIT: f32 = 3.0;
+/// Part of what was pointed at stands out by from which on a spot in another picture may be it.
+const FILM_PART: f64 = 0.3;
+/// Spots of a picture that are looked at, and how many of the look that was pointed at.
+const MOST_SPOTS: usize = 150;
+const MOST_ALIKE: usize = 30;
+/// A person points at a place with a standard deviation of so many pixels of the octave, and of the picture.
+const REACH_CELLS: f64 = 2.2;
+const REACH_PX: f64 = 1.0;
+/// A person points at a marker's centre to so many of its radii, and to so many pixels.
+const OFF_RADII: f64 = 0.7;
+const OFF_PX: f64 = 2.0;
+/// Ways of looking that are tried, in all and of one octave, and the least part of the best one's answer at the place.
+const CHOICES: usize = 6;
+const CHOICES_OF_OCTAVE: usize = 2;
+const CHOICE_PART: f64 = 0.1;
+/// The look that was pointed at: factors 2.5 in peak and 3 in area, as logarithms.
+const LOOK: [f64; 2] = [0.92, 1.1];
+/// A streak has the same product of peak and length as the marker at rest, to a factor 2, as a logarithm.
+const STREAK: f64 = 0.7;
+/// A track of fewer pictures holds nothing.
+const LEAST_SPOTS: usize = 5;
+/// Smoothness from which on a track holds.
+const LEAST_SMOOTHNESS: f64 = 0.1;
+
+/// A place in a picture, px.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Click {
+    /// Index of the picture.
+    pub picture: usize,
+    /// Column, px.
+    pub x: f64,
+    /// Row, px.
+    pub y: f64,
+}
+
+/// Why nothing is followed from a place that was pointed at.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Missed {
+    /// Nothing stands out there.
+    Nothing,
+    /// What stands out there, in this way of looking, is seen in so few pictures in a row.
+    Ends(Model, usize, End),
+    /// It is seen in so many pictures, but jumps or changes its look.
+    Restless(Model, usize),
+}
+
+/// A way of looking at what was pointed at.
+struct Choice {
+    model: Model,
+    against: Against,
+    /// What was pointed at.
+    spot: Spot,
+    limit: f32,
+    score: f64,
+}
+
+impl Choice {
+    /// Whether a spot may be what was pointed at, as its look goes.
+    fn fits(&self, s: &Spot) -> bool {
+        let ratio = |f: fn(&Spot) -> f64| (f(s) / f(&self.spot)).ln();
+        let peak = ratio(|s| s.peak);
+        let streak = ratio(|s| s.peak * s.length).abs() < STREAK;
+        (peak.abs() < LOOK[0] || streak) && ratio(|s| s.area).abs() < LOOK[1]
+    }
+}
+
+/// What a marker is worth, with it; or why it does not hold.
+type Judged = Result<(f64, Marker), Missed>;
+
+/// Ways of looking in which something stands out at a place, the best first.
+fn choices(search: &Search, click: &Click) -> Result<Vec<Choice>> {
+    let picture = search.film.read(click.picture)?;
+    let all = responses(&picture, search.count);
+    let models = search.models();
+    let both: Vec<(Model, Against)> =
+        models.iter().flat_map(|m| [Against::Ground, Against::Around].map(|a| (*m, a))).collect();
+    let mut found: Vec<Choice> = both
+        .into_par_iter()
+        .filter_map(|(model, against)| {
+            let spots =
+                search.spots(&picture, &all[model.octave], &model, against, (PLACE_LIMIT, usize::MAX));
+            let reach = REACH_CELLS * model.radius_px() / 2.0 + REACH_PX;
+            let score = |s: &Spot| s.snr * (-(off(s, click) / reach).powi(2)).exp();
+            let spot = spots.into_iter().max_by(|a, b| score(a).total_cmp(&score(b)))?;
+            let limit = (FILM_PART * spot.snr).max(f64::from(PLACE_LIMIT)) as f32;
+            let score = score(&spot);
+            (score > 1.0).then_some(Choice { model, against, spot, limit, score })
+        })
+        .collect();
+    found.sort_by(|a, b| b.score.total_cmp(&a.score));
+    let best = found.first().map_or(0.0, |c| c.score);
+    let mut chosen: Vec<Choice> = Vec::new();
+    for c in found {
+        let same = |o: &&Choice| o.model.octave == c.model.octave && o.against == c.against;
+        if c.score >= CHOICE_PART * best && chosen.iter().filter(same).count() < CHOICES_OF_OCTAVE {
+            chosen.push(c);
+        }
+    }
+    chosen.truncate(CHOICES);
+    Ok(chosen)
+}
+
+fn off(s: &Spot, click: &Click) -> f64 {
+    (s.x - click.x).hypot(s.y - click.y)
+}
+
+/// For each place the marker that is followed from there, or why none is. Places of the markers are those of the filter alone;
+/// [`super::finish`] refines them.
+///
+/// # Errors
+/// Those of the film; [`crate::error::Error::Interrupted`] once the work is to stop.
+pub fn follow_clicks(search: &Search, clicks: &[Click]) -> Result<Vec<Result<Marker, Missed>>> {
+    let film = search.film;
+    let tried: Vec<(usize, Choice)> = clicks
+        .iter()
+        .enumerate()
+        .map(|(i, click)| Ok(choices(search, click)?.into_iter().map(move |c| (i, c))))
+        .collect::<Result<Vec<_>>>()?
+        .into_iter()
+        .flatten()
+        .collect();
+    // By picture, then choice.
+    let found: Vec<Vec<Vec<Spot>>> = (0..film.count())
+        .into_par_iter()
+        .map(|i| {
+            film.heed()?;
+            let picture = film.read(i)?;
+            let spots = |(_, c): &(usize, Choice)| {
+                let response = response(&picture, c.model.octave);
+                let most = (c.limit, MOST_SPOTS);
+                let mut spots = search.spots(&picture, &response, &c.model, c.against, most);
+                spots.retain(|s| c.fits(s));
+                spots.truncate(MOST_ALIKE);
+                spots
+            };
+            Ok(tried.iter().map(spots).collect())
+        })
+        .collect::<Result<_>>()?;
+    let judged: Vec<(usize, Judged)> = tried
+        .par_iter()
+        .enumerate()
+        .map(|(k, (i, choice))| {
+            let pictures: Vec<Vec<Spot>> = found.iter().map(|p| p[k].clone()).collect();
+            Ok((*i, judge(search, &clicks[*i], choice, &pictures)?))
+        })
+        .collect::<Result<_>>()?;
+    Ok((0..clicks.len())
+        .map(|i| {
+            let mine = || judged.iter().filter(|(j, _)| *j == i).map(|(_, r)| r);
+            let best = mine().flatten().max_by(|a, b| a.0.total_cmp(&b.0));
+            match (best, mine().find_map(|r| r.as_ref().err())) {
+                (Some((_, marker)), _) => Ok(marker.clone()),
+                (None, missed) => Err(missed.copied().unwrap_or(Missed::Nothing)),
+            }
+        })
+        .collect())
+}
+
+/// The track through a place in one way of looking, with what it is worth; else why it does not hold.
+fn judge(
+    search: &Search,
+    click: &Click,
+    choice: &Choice,
+    pictures: &[Vec<Spot>],
+) -> Result<Judged> {
+    let model = choice.model;
+    let radius = model.radius_px();
+    let is_clicked = |s: &Spot| (s.x - choice.spot.x).hypot(s.y - choice.spot.y) < 0.5;
+    let tracklets = link(pictures, radius, search.width, 0);
+    let at_click = |t: &&super::tracklet::Tracklet| {
+        let nth = click.picture.checked_sub(t.first);
+        nth.and_then(|n| t.spots.get(n)).is_some_and(is_clicked)
+    };
+    let (alone, end) = tracklets.iter().find(at_click).map_or((0, End::Lost), |t| (t.spots.len(), t.end));
+    let chains = join_lone(join(tracklets, radius), radius);
+    let Some(chain) = chains.into_iter().find(|c| c.iter().any(|t| at_click(&t))) else {
+        return Ok(Err(Missed::Ends(model, alone, end)));
+    };
+    let track = Track::of(chain, radius);
+    if track.count < LEAST_SPOTS {
+        return Ok(Err(Missed::Ends(model, track.count, end)));
+    }
+    if track.smoothness < LEAST_SMOOTHNESS {
+        return Ok(Err(Missed::Restless(model, track.count)));
+    }
+    let (radius_px, compact) = compact(search.film, &track, &model)?;
+    let near = (-(off(&choice.spot, click) / (OFF_RADII * radius_px + OFF_PX)).powi(2)).exp();
+    let worth = track.count as f64 * (0.3 + 0.7 * track.quality) * (0.2 + 0.8 * compact) * near;
+    Ok(Ok((worth, Marker { track, model, radius_px })))
+}

@@ -1,0 +1,85 @@
+//! A marker that moves: its track, how it is looked at, how large it is.
+//!
+//! Owns: [`Marker`], [`finish`]. Must not: choose which marker is wanted.
+
+use rayon::prelude::*;
+
+use super::backdrop::Backdrop;
+use super::centre::refine;
+use super::model::Model;
+use super::picture::Film;
+use super::rest::extend;
+use super::track::Track;
+use super::tracklet::median;
+use crate::error::Result;
+
+/// Places from which the radius of a marker is learned.
+const RADIUS_PLACES: usize = 24;
+
+/// A marker that moves.
+#[derive(Debug, Clone)]
+pub struct Marker {
+    /// Where it is.
+    pub track: Track,
+    /// How it is looked at.
+    pub model: Model,
+    /// Its radius, px.
+    pub radius_px: f64,
+}
+
+impl Marker {
+    /// A track, with the radius that its places show.
+    pub fn of(film: &dyn Film, track: Track, model: Model) -> Result<Self> {
+        let (radius_px, _) = compact(film, &track, &model)?;
+        Ok(Self { track, model, radius_px })
+    }
+
+    /// Whether two are one: near each other where both are seen.
+    pub fn is_same(&self, other: &Self, within_px: f64) -> bool {
+        let places: std::collections::HashMap<usize, (f64, f64)> =
+            self.track.spots().map(|(k, s)| (k, (s.x, s.y))).collect();
+        let mut apart: Vec<f64> = other
+            .track
+            .spots()
+            .filter_map(|(k, s)| places.get(&k).map(|p| (p.0 - s.x).hypot(p.1 - s.y)))
+            .collect();
+        apart.len() as f64 > 0.3 * self.track.count.min(other.track.count) as f64
+            && median(&mut apart) < within_px
+    }
+}
+
+/// Radius of a track's marker, px, and how compact it is: the part of its places at which a region is found, less where the
+/// region's size is another than the filter's.
+pub fn compact(film: &dyn Film, track: &Track, model: &Model) -> Result<(f64, f64)> {
+    let c = refine(film, &mut track.clone(), model, RADIUS_PLACES, None, None)?;
+    let compact = c.found * (-(c.radius_px / model.radius_px()).ln().powi(2) / 0.5).exp();
+    Ok((c.radius_px, compact))
+}
+
+/// Takes the centres of markers from close by, follows those that come to rest, and leaves out places that jump aside. Those of
+/// one way of looking have one radius.
+///
+/// # Errors
+/// Those of the film; [`crate::error::Error::Interrupted`] once the work is to stop.
+pub fn finish(film: &dyn Film, markers: &mut [Marker]) -> Result<()> {
+    let mut done = vec![false; markers.len()];
+    while let Some(first) = done.iter().position(|d| !d) {
+        let model = markers[first].model;
+        let same: Vec<usize> = (first..markers.len()).filter(|&k| markers[k].model == model).collect();
+        let backdrop = Backdrop::learn(film, &model)?;
+        let mut group: Vec<&mut Marker> =
+            markers.iter_mut().enumerate().filter(|(k, _)| same.contains(k)).map(|(_, m)| m).collect();
+        let refined = |group: &mut Vec<&mut Marker>| -> Result<()> {
+            group.iter_mut().try_for_each(|m| {
+                refine(film, &mut m.track, &model, usize::MAX, Some(m.radius_px), Some(&backdrop)).map(|_| ())
+            })
+        };
+        // Twice: what comes to rest is looked for from places that the ground does not pull.
+        refined(&mut group)?;
+        group.par_iter_mut().try_for_each(|m| extend(film, &mut m.track, &model))?;
+        refined(&mut group)?;
+        group.iter_mut().for_each(|m| m.track.settle(m.radius_px));
+        same.into_iter().for_each(|k| done[k] = true);
+    }
+    Ok(())
+}

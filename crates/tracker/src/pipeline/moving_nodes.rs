@@ -1,0 +1,432 @@
+//! Nodes of what moves, and the table of them.
+//!
+//! Owns: [`Moving`]. Must not: choose what is followed.
+
+use serde_json::{Value, json};
+
+use super::candidates::look;
+use super::settings::RunSettings;
+use super::summary::{MOVING, RunSummary};
+use super::times::times;
+use crate::detect::DetectSettings;
+use crate::error::{Error, Fault, Place, Result};
+use crate::frame::{Ending, SourceInfo};
+use crate::gaps::{Damage, Gaps};
+use crate::message::{Message, Setting};
+use crate::moving::{Marker, WorkFilm};
+use crate::observation::{Observation, Status};
+use crate::rig::{Body, Node, RIG_SCHEMA, Rig};
+use crate::store::FrameStamp;
+use crate::table::{NodeTable, Rows, RunEnding, SCHEMA_VERSION, SourceFacts, TableMeta, TableWriter, Tally};
+use crate::timing::{self, Steps};
+use crate::wanted::Wanted;
+
+/// A marker this near to the place that a given rig has for a node is that node, in radii.
+const NAMED_RADII: f64 = 1.0;
+/// From this part of the radius on it is said that a centre is not well known.
+const TELL_SIGMA_RADII: f64 = 0.1;
+
+/// How what is followed was chosen.
+pub(super) enum Chosen {
+    /// It is likeliest meant, with this confidence; so many other things move.
+    Likeliest { confidence: f64, others: usize },
+    /// It was pointed at.
+    Pointed,
+    /// It was named by its number in the picture.
+    Numbered,
+}
+
+/// What was followed, in the recording's own pixels and frames.
+pub(super) struct Moving {
+    /// A name for each column.
+    names: Vec<String>,
+    markers: Vec<Marker>,
+    chosen: Chosen,
+    scale: f64,
+    copies: usize,
+    decoded: usize,
+    stamps: Vec<FrameStamp>,
+    /// By frame, then track.
+    rows: Vec<Vec<Observation>>,
+    ending: Ending,
+    gaps: Gaps,
+}
+
+impl Moving {
+    /// Of finished markers, a column for each.
+    pub fn of(film: &WorkFilm, markers: Vec<Marker>, chosen: Chosen) -> Self {
+        let rows = rows(film, &markers);
+        Self {
+            names: (0..markers.len()).map(|k| format!("n{k}")).collect(),
+            markers,
+            chosen,
+            scale: film.shrink() as f64,
+            copies: film.copies(),
+            decoded: film.decoded(),
+            stamps: film.stamps().to_vec(),
+            ending: film.ending().clone(),
+            gaps: film.gaps().clone(),
+            rows,
+        }
+    }
+
+    /// Makes one column of each two that are one marker; the first name stays.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for a name that is none, and where both are seen in one frame at two places.
+    pub fn unite(&mut self, same: &[[String; 2]]) -> Result<()> {
+        for pair in same {
+            let column = |name: &String| {
+                self.names.iter().position(|n| n == name).ok_or_else(|| {
+                    Error::Argument(
+                        Fault::of(Setting::Same, format!("{name} is no node of what is followed"))
+                            .advice(format!("Its nodes are {}", self.names.join(", "))),
+                    )
+                })
+            };
+            let (a, b) = (column(&pair[0])?, column(&pair[1])?);
+            if a == b {
+                continue;
+            }
+            let near_px = self.markers[a].radius_px * self.scale;
+            for (stamp, row) in self.stamps.iter().zip(&mut self.rows) {
+                let apart = (row[a].x_px - row[b].x_px).hypot(row[a].y_px - row[b].y_px);
+                if apart > near_px {
+                    return Err(Error::Argument(
+                        Fault::of(
+                            Setting::Same,
+                            format!("{} and {} are both seen, {apart:.0} px apart", pair[0], pair[1]),
+                        )
+                        .at(Place::Frame(stamp.index))
+                        .advice("Give two that are never seen together"),
+                    ));
+                }
+                if !row[a].status.is_seen() && row[b].status.is_seen() {
+                    row[a] = row[b];
+                }
+                row.remove(b);
+            }
+            self.names.remove(b);
+            self.markers.remove(b);
+        }
+        Ok(())
+    }
+
+    /// Puts the columns into the order of a rig's nodes, by their places in its reference frame. Whether each node has one.
+    pub fn name_by(&mut self, rig: &Rig) -> bool {
+        let Some(order) = self.named(rig) else { return false };
+        for row in &mut self.rows {
+            *row = order.iter().map(|&k| row[k]).collect();
+        }
+        self.markers = order.iter().map(|&k| self.markers[k].clone()).collect();
+        self.names = rig.nodes.iter().map(|n| n.name.clone()).collect();
+        true
+    }
+
+    /// Writes the table. The columns are those of a rig that is given, in its order.
+    pub fn write(
+        self,
+        settings: &RunSettings,
+        wanted: &Wanted,
+        info: &SourceInfo,
+        facts: SourceFacts,
+    ) -> Result<RunSummary> {
+        let rig = match &settings.rig {
+            None => self.rig(&facts, settings, wanted),
+            Some(rig) => Rig { pixel_aspect: facts.pixel_aspect, ..rig.clone() },
+        };
+        let mut steps = Steps::default();
+        self.stamps.iter().for_each(|s| steps.push(s.ticks));
+        let (timing, clock) = times(info, &steps, self.stamps.first().map_or(0, |s| s.index))?;
+        let mut writer = match &settings.output {
+            Some(output) => Some(TableWriter::create(output, &rig, settings.cells)?),
+            None => None,
+        };
+        let mut collected = settings.collect.then(Rows::default);
+        let mut tally = Tally::new(&rig);
+        for (place, (stamp, observations)) in self.stamps.iter().zip(&self.rows).enumerate() {
+            let time_s = clock.seconds(place as u64, stamp.ticks);
+            if let Some(writer) = &mut writer {
+                writer.push(stamp.index, time_s, observations)?;
+            }
+            if let Some(collected) = &mut collected {
+                collected.push(stamp.index, time_s, observations);
+            }
+            tally.push(observations);
+        }
+        let mut damage = Damage { gaps: self.gaps.clone(), ..Damage::default() };
+        self.stamps.iter().filter(|s| !s.decoded).for_each(|s| damage.undecoded.push(s.index));
+        let mut warnings = info.warnings.clone();
+        warnings.extend(timing::notes(&timing));
+        warnings.extend(damage.gaps.dropped_words().map(Message::from));
+        warnings.extend(self.notes());
+        let mut doubtful = Vec::new();
+        for (node, usual) in self.doubtful() {
+            let name = rig.nodes[node].name.clone();
+            warnings.push(
+                format!(
+                    "the centre of {name} depends on what is taken for the marker: brightness, colour and outline have centres \
+                     that differ; its standard uncertainty is {usual:.1} px in half of the frames"
+                )
+                .into(),
+            );
+            doubtful.push(name);
+        }
+        let meta = TableMeta {
+            schema_version: SCHEMA_VERSION,
+            tool: TableMeta::this_tool(),
+            settings: self.settings_json(settings, wanted, &facts),
+            source: SourceFacts { rate_hz: timing.rate_hz, rate_origin: timing.rate_origin, ..facts },
+            time: Some(timing),
+            ending: match self.ending {
+                Ending::Early { frames, byte, reason } => RunEnding::Early { frames, byte, reason },
+                Ending::Complete if damage.is_damaged() => RunEnding::Damaged,
+                Ending::Complete => RunEnding::Complete,
+            },
+            rig,
+            damage,
+        };
+        if let Some(writer) = writer {
+            writer.finish(&meta)?;
+        }
+        Ok(RunSummary {
+            frames: self.rows.len() as u64,
+            resumed: 0,
+            resumable: false,
+            moving: true,
+            doubtful,
+            nodes: tally.summary(),
+            warnings,
+            table: collected.map(|rows| NodeTable { meta: meta.clone(), rows }),
+            meta,
+        })
+    }
+
+    fn settings_json(&self, settings: &RunSettings, wanted: &Wanted, facts: &SourceFacts) -> Value {
+        let looks: Vec<Value> = self
+            .markers
+            .iter()
+            .map(|m| {
+                json!({
+                    "bright": m.model.sign > 0.0,
+                    "luma, blue, red": m.model.direction.0,
+                    "octave": m.model.octave,
+                    "radius_px": m.radius_px * self.scale,
+                })
+            })
+            .collect();
+        let (confidence, others) = match self.chosen {
+            Chosen::Likeliest { confidence, others } => (Some(confidence), Some(others)),
+            Chosen::Pointed | Chosen::Numbered => (None, None),
+        };
+        let detect = DetectSettings { pixel_aspect: facts.pixel_aspect, ..settings.detect.clone() };
+        let mut all = json!({
+            "detect": detect,
+            MOVING: {
+                "markers": looks,
+                "confidence": confidence,
+                "others": others,
+                "copies": self.copies,
+            },
+            "fps": settings.open.fps,
+            "decoder": settings.open.decoder,
+            "frames": settings.frames_json(),
+            "rig": if settings.rig.is_some() { "given" } else { "found" },
+        });
+        if !settings.interlaced_json().is_null() {
+            all["interlaced"] = settings.interlaced_json();
+        }
+        if !wanted.is_default() {
+            all["wanted"] = json!(wanted);
+        }
+        all
+    }
+
+    /// For each node of a given rig the column of the marker that is at its place in the reference frame, or, where there is no
+    /// such frame, where it is first seen; `None` where one has none.
+    fn named(&self, rig: &Rig) -> Option<Vec<usize>> {
+        let row: Vec<Observation> = match rig.reference_frame {
+            Some(index) => self.rows[self.stamps.iter().position(|s| s.index == index)?].clone(),
+            None => (0..self.markers.len()).map(|k| self.first_seen(k)).collect(),
+        };
+        let mut order = Vec::with_capacity(rig.nodes.len());
+        for node in &rig.nodes {
+            let off = |k: &usize| (row[*k].x_px - node.x_px).hypot(row[*k].y_px - node.y_px);
+            let near_px = |k: &usize| NAMED_RADII * self.markers[*k].radius_px * self.scale;
+            let free = (0..row.len()).filter(|k| !order.contains(k) && row[*k].status.is_seen());
+            order.push(free.min_by(|a, b| off(a).total_cmp(&off(b))).filter(|k| off(k) < near_px(k))?);
+        }
+        Some(order)
+    }
+
+    /// The first row of a column in which it is seen, or a missing one.
+    fn first_seen(&self, node: usize) -> Observation {
+        let seen = self.rows.iter().map(|r| r[node]).find(|o| o.status.is_seen());
+        seen.unwrap_or(Observation::MISSING)
+    }
+
+    /// One body for each node; the reference frame is the first in which all are seen, if there is one.
+    fn rig(&self, facts: &SourceFacts, settings: &RunSettings, wanted: &Wanted) -> Rig {
+        let image = |o: &Observation| [o.x_px, o.y_px];
+        let whole = self.rows.iter().position(|r| r.iter().all(|o| o.status.is_seen()));
+        let place = |node: usize| match whole {
+            Some(frame) => image(&self.rows[frame][node]),
+            None => {
+                Some(self.first_seen(node)).filter(|o| o.status.is_seen()).as_ref().map_or([0.0; 2], image)
+            }
+        };
+        let name = |node: usize| format!("body{}", node + 1);
+        let count = self.markers.len();
+        Rig {
+            schema: RIG_SCHEMA,
+            image_px: [facts.width, facts.height],
+            pixel_aspect: facts.pixel_aspect,
+            reference_frame: whole.map(|f| self.stamps[f].index),
+            region: settings.detect.region.clone(),
+            lens: None,
+            wanted: wanted.clone(),
+            bodies: (0..count).map(|k| Body { name: name(k) }).collect(),
+            nodes: (0..count)
+                .map(|k| {
+                    let [x_px, y_px] = place(k);
+                    Node { name: self.names[k].clone(), body: name(k), x_px, y_px }
+                })
+                .collect(),
+            joints: Vec::new(),
+        }
+    }
+
+    /// Columns whose usual standard uncertainty is a large part of the radius, with that uncertainty, px.
+    fn doubtful(&self) -> Vec<(usize, f32)> {
+        let limit = |node: usize| TELL_SIGMA_RADII * self.markers[node].radius_px * self.scale;
+        let usual = |node: usize| {
+            let seen = self.rows.iter().map(|r| &r[node]).filter(|o| o.status.is_seen());
+            let mut sigma: Vec<f32> = seen.map(|o| o.sigma_px).collect();
+            sigma.sort_unstable_by(f32::total_cmp);
+            sigma.get(sigma.len() / 2).copied()
+        };
+        let columns = 0..self.rows.first().map_or(0, Vec::len);
+        columns.filter_map(|k| Some((k, usual(k).filter(|s| f64::from(*s) > limit(k))?))).collect()
+    }
+
+    /// How it was found, in words.
+    fn notes(&self) -> Vec<Message> {
+        let count = self.markers.len();
+        let markers = if count == 1 { "marker" } else { "markers" };
+        let looks = |m: &Marker| look(&m.model, m.radius_px, self.scale);
+        let what = match &self.chosen {
+            Chosen::Likeliest { confidence, others } => {
+                let others = match others {
+                    0 => String::new(),
+                    1 => "; one more thing moves and is not followed".into(),
+                    n => format!("; {n} more things move and are not followed"),
+                };
+                let look = self.markers.first().map_or_else(String::new, looks);
+                format!(
+                    "no markers stand out from an even background: followed what moves, {count} {markers} of one look ({look}), \
+                     with confidence {confidence:.2} of 1{others}"
+                )
+            }
+            Chosen::Pointed | Chosen::Numbered => {
+                let by = if matches!(self.chosen, Chosen::Pointed) { "place" } else { "number" };
+                let each = self.names.iter().zip(&self.markers);
+                let each: Vec<String> = each.map(|(n, m)| format!("{n} ({})", looks(m))).collect();
+                format!("followed what moves and was named by its {by}: {}", each.join(", "))
+            }
+        };
+        let mut notes: Vec<Message> = vec![
+            format!("{what}. No bodies are made of them. Look at the overlay before you use the table")
+                .into(),
+        ];
+        if self.copies > 0 {
+            notes.push(
+                format!(
+                    "{} of {} frames are copies of the frame before them: their times are those of the file, not of what they \
+                     show",
+                    self.copies, self.decoded
+                )
+                .into(),
+            );
+        }
+        notes
+    }
+}
+
+/// The nodes of every frame.
+fn rows(film: &WorkFilm, markers: &[Marker]) -> Vec<Vec<Observation>> {
+    let scale = film.shrink() as f64;
+    let unknown = |decoded: bool| if decoded { Observation::MISSING } else { Observation::UNDECODED };
+    let mut rows: Vec<Vec<Observation>> =
+        film.stamps().iter().map(|s| vec![unknown(s.decoded); markers.len()]).collect();
+    for (node, track) in markers.iter().map(|m| &m.track).enumerate() {
+        let mut last = None;
+        for (picture, spot) in track.spots() {
+            let back = last.is_some_and(|l| l + 1 < picture);
+            last = Some(picture);
+            // A copy shows the marker where the frame before it does.
+            for (nth, &row) in film.frames(picture).iter().enumerate() {
+                rows[row][node] = Observation {
+                    x_px: film.recorded_px(spot.x),
+                    y_px: film.recorded_px(spot.y),
+                    sigma_px: (track.sigma_px(spot) * scale) as f32,
+                    area_px: (spot.area * scale * scale) as f32,
+                    status: if back && nth == 0 { Status::Reacquired } else { Status::Seen },
+                };
+            }
+        }
+    }
+    rows
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::moving::{Direction, Model, Track};
+
+    /// A column for each radius, in work pictures of half the size.
+    fn moving(radii_px: &[f64], rows: Vec<Vec<Observation>>) -> Moving {
+        let model = Model { direction: Direction::LUMA, sign: 1.0, octave: 1 };
+        let marker = |r: &f64| Marker { track: Track::of(Vec::new(), *r), model, radius_px: *r };
+        Moving {
+            names: (0..radii_px.len()).map(|k| format!("n{k}")).collect(),
+            markers: radii_px.iter().map(marker).collect(),
+            chosen: Chosen::Likeliest { confidence: 0.5, others: 0 },
+            scale: 2.0,
+            copies: 0,
+            decoded: rows.len(),
+            stamps: (0..rows.len() as u64)
+                .map(|k| FrameStamp { index: k, ticks: k as i64, decoded: true })
+                .collect(),
+            rows,
+            ending: Ending::Complete,
+            gaps: Gaps::default(),
+        }
+    }
+
+    fn at(x_px: f64) -> Observation {
+        Observation { x_px, y_px: 0.0, sigma_px: 0.1, status: Status::Seen, ..Observation::MISSING }
+    }
+
+    #[test]
+    fn a_centre_is_doubtful_from_a_tenth_of_the_radius_on() {
+        let seen = |sigma_px: f32| Observation { sigma_px, ..at(0.0) };
+        // A work picture of half the size: the radius is 10 px. A node that is never seen is not doubtful.
+        let rows = vec![vec![seen(0.9), seen(1.1), Observation::MISSING]; 3];
+        assert_eq!(moving(&[5.0; 3], rows).doubtful(), [(1, 1.1)]);
+    }
+
+    #[test]
+    fn two_columns_become_one_where_they_are_not_seen_apart() {
+        let none = Observation::MISSING;
+        let same = |a: &str, b: &str| [[a.to_owned(), b.to_owned()]];
+        let mut m = moving(&[5.0; 3], vec![vec![at(1.0), none, at(50.0)], vec![none, at(2.0), at(51.0)]]);
+        m.unite(&same("n0", "n1")).unwrap();
+        assert_eq!(m.names, ["n0", "n2"]);
+        let x = |r: &Vec<Observation>| r.iter().map(|o| o.x_px).collect::<Vec<_>>();
+        assert_eq!(m.rows.iter().map(x).collect::<Vec<_>>(), [[1.0, 50.0], [2.0, 51.0]]);
+        let error = m.unite(&same("n0", "n2")).unwrap_err().to_string();
+        assert!(error.starts_with("same, frame 0: n0 and n2 are both seen, 49 px apart"), "{error}");
+        let error = m.unite(&same("n0", "n1")).unwrap_err().to_string();
+        assert!(error.contains("n1 is no node") && error.ends_with("n0, n2"), "{error}");
+    }
+}

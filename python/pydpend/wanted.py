@@ -1,0 +1,96 @@
+"""What a user says of what to follow, as the compiled half takes it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, TypeAlias
+
+from pydpend.crossing import WantedArguments
+from pydpend.errors import ArgumentError, Setting, fault
+
+Place: TypeAlias = tuple[float, float] | tuple[float, float, int] | str
+"""Column and row in px, and the frame: ``(312, 201, 57)`` or ``"312,201@57"``."""
+Places: TypeAlias = Place | Sequence[Place]
+Pair: TypeAlias = tuple[str, str] | str
+"""Two names of nodes: ``("n1", "n2")`` or ``"n1=n2"``."""
+Pairs: TypeAlias = Pair | Sequence[Pair]
+Numbers: TypeAlias = int | Sequence[int] | str
+Region: TypeAlias = tuple[float, float, float, float] | str
+"""First and last column and row in px: ``(100, 50, 400, 300)``, all inside."""
+
+
+def _refused(name: str, value: object, advice: str) -> ArgumentError:
+    return ArgumentError(fault(Setting(name, subject=True), f"{value!r} cannot be", advice))
+
+
+def _places(given: Places | None) -> list[str]:
+    if given is None:
+        return []
+    one = isinstance(given, str) or (len(given) > 0 and isinstance(given[0], (int, float)))
+    return [_place(place) for place in ([given] if one else given)]
+
+
+def _place(place: Any) -> str:
+    if isinstance(place, str):
+        return place
+    try:
+        x, y, *frame = place
+        at = f"{float(x)!r},{float(y)!r}"
+        return at if not frame else f"{at}@{int(*frame)}"
+    except (TypeError, ValueError):
+        raise _refused("marker", place, "Give (x, y) or (x, y, frame)") from None
+
+
+def _numbers(given: Numbers) -> list[int]:
+    try:
+        values = given.split(",") if isinstance(given, str) else [given] if isinstance(given, int) else given
+        numbers = [int(value) for value in values]
+    except (TypeError, ValueError):
+        raise _refused("also", given, "Give numbers of the picture, for example [2, 3]") from None
+    if any(not 0 <= number < 1 << 31 for number in numbers):
+        raise _refused("also", given, "Give numbers of the picture, for example [2, 3]")
+    return numbers
+
+
+def _pairs(given: Pairs) -> list[tuple[str, str]]:
+    pair = isinstance(given, str) or (
+        len(given) == 2 and all(isinstance(v, str) and "=" not in v for v in given)
+    )
+    out = []
+    for one in [given] if pair else given:
+        names = one.split("=") if isinstance(one, str) else tuple(one)
+        if len(names) != 2 or not all(names):
+            raise _refused("same", one, "Give two names of nodes, for example ('n1', 'n2')")
+        out.append((str(names[0]), str(names[1])))
+    return out
+
+
+def _region(given: Region | None) -> tuple[float, float, float, float] | None:
+    if given is None:
+        return None
+    try:
+        x0, y0, x1, y1 = (float(v) for v in (given.split(",") if isinstance(given, str) else given))
+    except (TypeError, ValueError):
+        raise _refused(
+            "region", given, "Give first and last column and row, for example (100, 50, 400, 300)"
+        ) from None
+    return x0, y0, x1, y1
+
+
+def wanted_arguments(
+    marker: Places | None,
+    markers: int | None,
+    also: Numbers,
+    same: Pairs,
+    region: Region | None,
+) -> WantedArguments:
+    """The same as the compiled half takes it, which knows what makes sense.
+
+    Returns
+    -------
+    tuple
+        Places as texts, how many markers there are, numbers, pairs of names, region in px.
+    """
+    if markers is not None and not 0 <= markers < 1 << 31:
+        raise _refused("markers", markers, "Give 1 or more")
+    return _places(marker), markers, _numbers(also), _pairs(same), _region(region)
