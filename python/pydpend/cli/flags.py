@@ -32,7 +32,7 @@ def add_fields(p: argparse.ArgumentParser, options: type, fields: Iterable[Field
                 choices=choices,
                 metavar=unit,
                 help=told,
-                action=action,
+                action=adds,
             )
 
 
