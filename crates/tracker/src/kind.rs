@@ -444,9 +444,13 @@ fn kind_of_json(text: &str) -> Kind {
 
 fn kind_of_toml(table: &toml::Table) -> Kind {
     let has = |key: &str| table.contains_key(key);
+    // A file of options gives places of markers as texts.
+    let has_tables = |key: &str| {
+        table.get(key).and_then(toml::Value::as_array).is_some_and(|a| a.iter().any(toml::Value::is_table))
+    };
     if has("node") {
         Kind::Rig
-    } else if has("marker") || has("link") || has("camera") {
+    } else if has_tables("marker") || has("link") || has("camera") {
         Kind::Scene
     } else if has("part") || has("constants") {
         Kind::Model
@@ -489,7 +493,7 @@ mod tests {
             bytes.extend(name.as_bytes());
             bytes
         };
-        let cases: [(&str, &[u8], Kind); 18] = [
+        let cases: [(&str, &[u8], Kind); 20] = [
             ("a.csv", b"\0\0\0\x18ftypisom", Kind::Film),
             ("b.mp4", b"time_s,phi1_rad\n0,1\n", Kind::Angles),
             ("c.csv", b"# made by hand\ntime_s;phi1_deg;phi2_deg\n", Kind::Angles),
@@ -500,6 +504,8 @@ mod tests {
             ("h.toml", b"schema = 1\n[[node]]\nname = 'n0'\n", Kind::Rig),
             ("i.toml", b"[[part]]\nname = 'bar'\n", Kind::Model),
             ("j.toml", b"frames = 4\n[camera]\ndepth_bits = 8\n", Kind::Scene),
+            ("j.toml", b"[[marker]]\nradius_px = 3\n", Kind::Scene),
+            ("j.toml", b"inputs = []\nmarker = ['3,4@5']\n", Kind::Config),
             ("k.json", b"{\"schema\": 1, \"slope_v_per_rad\": 0.1}", Kind::Calibration),
             ("l.xlsx", &zip("[Content_Types].xml"), Kind::Spreadsheet),
             ("l.npz", &zip("phi.npy"), Kind::NumpyArchive),
