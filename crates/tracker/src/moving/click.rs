@@ -174,12 +174,7 @@ pub fn follow_clicks(search: &Search, clicks: &[Click]) -> Result<Vec<Result<Mar
 }
 
 /// The track through a place in one way of looking, with what it is worth; else why it does not hold.
-fn judge(
-    search: &Search,
-    click: &Click,
-    choice: &Choice,
-    pictures: &[Vec<Spot>],
-) -> Result<Judged> {
+fn judge(search: &Search, click: &Click, choice: &Choice, pictures: &[Vec<Spot>]) -> Result<Judged> {
     let model = choice.model;
     let radius = model.radius_px();
     let is_clicked = |s: &Spot| (s.x - choice.spot.x).hypot(s.y - choice.spot.y) < 0.5;
