@@ -8,7 +8,8 @@ import importlib.util
 import inspect
 import json
 import pkgutil
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -155,6 +156,69 @@ def test_a_text_that_is_no_result_is_one_line(kind: str) -> None:
             cls.from_json(text, "mine.json")
         assert str(caught.value).startswith("mine.json")
         assert "\n" not in str(caught.value)
+
+
+ODD: tuple[Any, ...] = (None, "x", -1, [1], {})
+
+
+def places(value: Any, above: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+    """Where something stands in a document; of lists the first two."""
+    inside = (
+        value.items() if isinstance(value, dict) else enumerate(value[:2]) if isinstance(value, list) else ()
+    )
+    for key, held in inside:
+        yield (*above, key)
+        yield from places(held, (*above, key))
+
+
+@pytest.mark.parametrize("kind", JSON)
+def test_an_odd_value_anywhere_is_one_line_or_does_no_harm(kind: str) -> None:
+    """Null, text, a number below zero, a list or a table in place of each value; and each value left out."""
+    result = JSON[kind]()
+    whole = result.to_json()
+    refused: list[str] = []
+    for place in places(json.loads(whole)):
+        # The fits in trials are those of a fit.
+        if place[0] in ("joint", "each") and len(place) > 2:
+            continue
+        for odd in (*ODD, "leave out"):
+            document = json.loads(whole)
+            held = document
+            for key in place[:-1]:
+                held = held[key]
+            if odd == "leave out":
+                held.pop(place[-1])
+            else:
+                held[place[-1]] = odd
+            try:
+                found = type(result).from_json(json.dumps(document), "mine.json")
+            except dp.PydpendError as problem:
+                refused.append(str(problem))
+                continue
+            found.to_json()
+            if isinstance(found, TableResult):
+                found.to_arrow()
+    assert len(refused) > 20
+    assert not [said for said in refused if "\n" in said]
+
+
+@pytest.mark.parametrize(
+    ("windows", "said"),
+    [
+        ({"x": [[0.0, 1.0]]}, "key windows.x: 'x' is no length of a window in s"),
+        ({"-1": [[0.0, 1.0]]}, "key windows.-1: '-1' is no length of a window in s"),
+        ({"1": [[0.0, 1.0], [0.0]]}, "key windows.1: its lists are of different lengths"),
+        ({"1": [[0.0]]}, "key windows.1: a start and the error of one link or two are expected"),
+        (
+            {"1": [[0.0, 1.0, 1.0, 1.0]]},
+            "key windows.1: a start and the error of one link or two are expected",
+        ),
+    ],
+)
+def test_odd_windows_of_a_prediction_are_one_line(windows: dict[str, Any], said: str) -> None:
+    text = json.dumps(prediction().to_dict() | {"windows": windows})
+    with pytest.raises(dp.FitError, match=re.escape(said)):
+        dp.Prediction.from_json(text)
 
 
 def test_every_json_result_goes_there_and_back() -> None:

@@ -141,7 +141,11 @@ class Table:
 
     def array(self, key: str, *shape: int) -> NDArray[np.float64]:
         """Finite numbers in lists within lists, of this shape; -1 stands for any length."""
-        out = np.array(self._nested(self.place(key), self._get(key), shape), dtype=np.float64)
+        nested = self._nested(self.place(key), self._get(key), shape)
+        try:
+            out = np.array(nested, dtype=np.float64)
+        except ValueError:
+            self.refuse(key, "its lists are of different lengths")
         # A list that is empty hides the lengths of what it has none of.
         return out.reshape([max(n, 0) for n in shape]) if out.size == 0 else out
 

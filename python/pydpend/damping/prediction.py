@@ -166,7 +166,7 @@ class Prediction(JsonResult, TableResult):
             given = table.table(key)
             return {window: Window.of_table(given.table(window)) for window in given}
 
-        rows = table.table("windows")
+        rows = {length: _rows_of(table.table("windows"), length) for length in table.table("windows")}
         upper, lower = table.array("zeros_rad", 2).tolist()
         return cls(
             table.text("name"),
@@ -174,7 +174,7 @@ class Prediction(JsonResult, TableResult):
             group("forecast"),
             group("forecast_calm"),
             (upper, lower),
-            {window: rows.array(window, -1, -1) for window in rows},
+            rows,
             table.text("message"),
         )
 
@@ -191,6 +191,20 @@ class Prediction(JsonResult, TableResult):
         table = np.array(found, dtype=np.float64).reshape(-1, 2 + links)
         names = ("window_s", "start_s", "phi1_rms_deg", "phi2_rms_deg")[: 2 + links]
         return dict(zip(names, table.T, strict=True))
+
+
+def _rows_of(windows: Table, length: str) -> Floats:
+    """The windows of one length, (n, 1 + links), checked."""
+    rows = windows.array(length, -1, -1)
+    try:
+        known = float(length) > 0
+    except ValueError:
+        known = False
+    if not known:
+        windows.refuse(length, f"{length!r} is no length of a window in s")
+    if rows.size and rows.shape[1] not in (2, 3):
+        windows.refuse(length, "a start and the error of one link or two are expected in each row")
+    return rows
 
 
 def predict(
