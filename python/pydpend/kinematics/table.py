@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pydpend.errors import AnglesError, Setting, fault
+from pydpend.errors import AnglesError, Setting, Text, fault
 from pydpend.instants import seconds_of_numpy
 from pydpend.tabular import TableResult, html_table
 
@@ -186,72 +186,61 @@ def check_table(
     place: Callable[[int, str], str],
 ) -> None:
     """Times finite and rising, angles not infinite, sigmas not negative, no wrap between neighbours."""
-    bad = np.flatnonzero(~np.isfinite(t))
-    if bad.size:
-        raise AnglesError(
-            fault(
-                name,
-                f"the time {t[bad[0]]} is not a number",
-                "Give every row a time",
-                place=place(int(bad[0]), "time_s"),
-            )
-        )
-    bad = np.flatnonzero(np.diff(t) <= 0) + 1
-    if bad.size:
-        i = int(bad[0])
-        raise AnglesError(
-            fault(
-                name,
-                f"the time {t[i]:.9g} s does not come after {t[i - 1]:.9g} s",
-                "Sort the rows by time and remove repeats",
-                place=place(i, "time_s"),
-            )
-        )
+
+    def refuse_first(bad: NDArray[np.bool_], column: str, say: Callable[[int], str], advice: Text) -> None:
+        """The error for the first row that is ``bad``, if there is one."""
+        rows = np.flatnonzero(bad)
+        if rows.size:
+            row = int(rows[0])
+            raise AnglesError(fault(name, say(row), advice, place=place(row, column)))
+
+    def falls(values: NDArray[Any]) -> NDArray[np.bool_]:
+        """Which rows do not come after the one before."""
+        return np.concatenate([[False], np.diff(values) <= 0])
+
+    refuse_first(
+        ~np.isfinite(t), "time_s", lambda i: f"the time {t[i]} is not a number", "Give every row a time"
+    )
+    refuse_first(
+        falls(t),
+        "time_s",
+        lambda i: f"the time {t[i]:.9g} s does not come after {t[i - 1]:.9g} s",
+        "Sort the rows by time and remove repeats",
+    )
     if frame is not None:
-        bad = np.flatnonzero(np.diff(frame) <= 0) + 1
-        if bad.size:
-            i = int(bad[0])
-            raise AnglesError(
-                fault(
-                    name,
-                    f"frame {frame[i]} does not come after frame {frame[i - 1]}",
-                    "Sort the rows by frame and remove repeats",
-                    place=place(i, "frame"),
-                )
-            )
+        refuse_first(
+            falls(frame),
+            "frame",
+            lambda i: f"frame {frame[i]} does not come after frame {frame[i - 1]}",
+            "Sort the rows by frame and remove repeats",
+        )
     # Over a gap a link may turn by more than half a turn; between neighbouring rows that is a wrap.
-    neighbours = np.diff(t) <= 1.5 * np.median(np.diff(t)) if t.size > 1 else np.zeros(0, dtype=bool)
+    step = np.diff(t)
+    neighbours = (
+        np.concatenate([[False], step <= 1.5 * np.median(step)]) if t.size > 1 else np.zeros(1, dtype=bool)
+    )
+
+    def check_link(k: int, angle: Floats, error: Floats) -> None:
+        """The same of link ``k``, from 1, at the T times."""
+        refuse_first(
+            np.isinf(angle),
+            f"phi{k}_rad",
+            lambda i: "the angle is infinite",
+            "Leave the field empty where the link was not seen",
+        )
+        refuse_first(
+            (error < 0) | np.isinf(error),
+            f"sigma{k}_rad",
+            lambda i: f"the standard uncertainty {error[i]:.6g} rad cannot be",
+            "Give a finite one that is not negative, or none",
+        )
+        jump = np.abs(np.diff(angle, prepend=np.nan))
+        refuse_first(
+            (jump > math.pi) & neighbours,
+            f"phi{k}_rad",
+            lambda i: f"the angle jumps by {jump[i]:.4g} rad from one row to the next: it is not unwrapped",
+            "Read it with " + Setting("unwrap", True),
+        )
+
     for k in range(phi.shape[1]):
-        bad = np.flatnonzero(np.isinf(phi[:, k]))
-        if bad.size:
-            raise AnglesError(
-                fault(
-                    name,
-                    "the angle is infinite",
-                    "Leave the field empty where the link was not seen",
-                    place=place(int(bad[0]), f"phi{k + 1}_rad"),
-                )
-            )
-        bad = np.flatnonzero((sigma[:, k] < 0) | np.isinf(sigma[:, k]))
-        if bad.size:
-            i = int(bad[0])
-            raise AnglesError(
-                fault(
-                    name,
-                    f"the standard uncertainty {sigma[i, k]:.6g} rad cannot be",
-                    "Give a finite one that is not negative, or none",
-                    place=place(i, f"sigma{k + 1}_rad"),
-                )
-            )
-        step = np.abs(np.diff(phi[:, k]))
-        bad = np.flatnonzero((step > math.pi) & neighbours) + 1
-        if bad.size:
-            i = int(bad[0])
-            raise AnglesError(
-                fault(
-                    name,
-                    f"the angle jumps by {step[i - 1]:.4g} rad from one row to the next: it is not unwrapped",
-                    "Read it with " + Setting("unwrap", True),
-                    place=place(i, f"phi{k + 1}_rad"),
-                )
-            )
+        check_link(k + 1, phi[:, k], sigma[:, k])
