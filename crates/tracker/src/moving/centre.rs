@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use super::backdrop::Backdrop;
 use super::model::Model;
+use super::outline::circle_of;
 use super::own_colour::own_colour;
 use super::picture::Film;
 use super::response::Direction;
@@ -35,6 +36,11 @@ const LEVEL_STEP: f64 = 0.2;
 const LEVEL_DOUBT: f64 = 0.12;
 /// The same part of the difference between the silhouette's centre and the region's.
 const SILHOUETTE_DOUBT: f64 = 0.5;
+/// Part of the difference between the outline's circle and the region which is not known of the centre.
+const CIRCLE_DOUBT: f64 = 0.25;
+/// Region and circle agree where their centres are nearer to each other than this, in radii: from there on it is said of a
+/// centre that it is doubtful.
+const DIFFER_RADII: f64 = 0.1;
 /// What the filter's answer alone leaves open of a centre, in radii.
 const COARSE_DOUBT_RADII: f64 = 0.3;
 
@@ -55,6 +61,8 @@ struct Found {
     moved: f64,
     /// What the way of finding it leaves open.
     doubt: f64,
+    /// From it to the middle of the circle that most of its outline lies on, where there is one.
+    to_circle: Option<[f64; 2]>,
 }
 
 /// How the markers of one track are looked at closely.
@@ -94,6 +102,8 @@ impl Look<'_> {
         // Where what is behind its edge is uneven, a higher level has another centre than a lower one.
         let [low, high] =
             [-LEVEL_STEP, LEVEL_STEP].map(|step| w.region(place, radius, step).unwrap_or(region));
+        let circle = self.own.and_then(|_| circle_of(&w.outline(place, radius), (region.area / PI).sqrt()));
+        let to_circle = circle.map(|c| [c.middle[0] - region.x, c.middle[1] - region.y]);
         let mut doubt = LEVEL_DOUBT * (high.x - low.x).hypot(high.y - low.y);
         if let (Some(backdrop), Some(_)) = (self.backdrop, self.own)
             && let Some(s) = w.silhouette(backdrop, place, radius)
@@ -104,7 +114,7 @@ impl Look<'_> {
         }
         let region = Region { x: region.x + x0, y: region.y + y0, ..region };
         let moved = (region.x - at[0]).hypot(region.y - at[1]);
-        Ok(Some(Found { region, moved, doubt }))
+        Ok(Some(Found { region, moved, doubt, to_circle }))
     }
 }
 
@@ -136,15 +146,18 @@ pub fn refine(
         None => learning_radius(&places, first, found)?,
     };
     let usual = median(&mut results.iter().flatten().map(|f| f.region.area).collect::<Vec<_>>());
+    let covered = usual_to_circle(&results, radius);
     // What the region is off the filter's answer by, px of the octave.
     let shifts: Vec<Option<([f64; 2], f64)>> = places
         .iter()
         .zip(&results)
         .map(|(place, found)| {
-            let Found { region, moved, doubt } = (*found)?;
+            let Found { region, moved, doubt, to_circle } = (*found)?;
             let at = on_octave(spot(place));
             let fits = moved < radius + 0.5 && AREA_RATIO.contains(&(region.area / usual));
-            fits.then_some(([region.x - at[0], region.y - at[1]], doubt))
+            let [x, y] = covered.map_or([0.0; 2], |usual| to_circle.unwrap_or(usual));
+            let doubt = doubt.hypot(CIRCLE_DOUBT * x.hypot(y));
+            fits.then_some(([region.x + x - at[0], region.y + y - at[1]], doubt))
         })
         .collect();
     let middle = [0, 1].map(|k| median(&mut shifts.iter().flatten().map(|(s, _)| s[k]).collect::<Vec<_>>()));
@@ -167,6 +180,16 @@ pub fn refine(
         good += usize::from(usual.is_some());
     }
     Ok(Centres { radius_px: radius * scale, found: good as f64 / places.len().max(1) as f64 })
+}
+
+/// From regions to the middles of their outlines' circles, usually, px of the octave; `None` where they agree or most have none. Where
+/// they do not agree, the marker is a disc of which something covers a part: a net, a stripe, a highlight, fingers.
+fn usual_to_circle(results: &[Option<Found>], radius: f64) -> Option<[f64; 2]> {
+    let all: Vec<[f64; 2]> = results.iter().flatten().filter_map(|f| f.to_circle).collect();
+    let mut apart: Vec<f64> = all.iter().map(|d| d[0].hypot(d[1])).collect();
+    let most = 2 * all.len() > results.iter().flatten().count();
+    let differ = median(&mut apart) > DIFFER_RADII * radius;
+    (most && differ).then(|| [0, 1].map(|k| median(&mut all.iter().map(|d| d[k]).collect::<Vec<_>>())))
 }
 
 type Place = (usize, usize);

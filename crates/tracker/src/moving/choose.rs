@@ -34,6 +34,14 @@ const ANSWER_PART: f64 = 0.12;
 /// The same for what is offered beside the answers: of another look, and looked at in another way.
 const OTHER_LOOK_PART: f64 = 0.3;
 const OTHER_MODEL_PART: f64 = 0.5;
+/// A companion is seen in at most this part of the pictures in which the other one is, and it in at least this part of its own
+/// pictures; its offset changes by at most this part of its travel.
+const COMPANION_PART: f64 = 0.5;
+const COMPANION_SEEN: f64 = 0.8;
+const COMPANION_OFFSET: f64 = 0.25;
+/// Looks of one marker in two stretches agree to a quarter, as logarithms of peak and area, and so many times better than others'.
+const SAME_LOOK: f64 = 0.25;
+const CLEAR_LOOK: f64 = 2.0;
 /// Pictures of which the one that shows most is taken, and places in it.
 const STRONGEST_PICTURES: usize = 15;
 const STRONGEST: usize = 9;
@@ -279,7 +287,59 @@ fn answers(winner: Run, width: f64) -> (Vec<Track>, Vec<Track>, f64) {
         keep = group;
         others.extend(rest);
     }
+    let (companions, mut keep): (Vec<Track>, Vec<Track>) = {
+        let all = keep.clone();
+        keep.into_iter().partition(|t| all.iter().any(|a| is_companion(t, a)))
+    };
+    others.extend(companions);
+    join_by_look(&mut keep, radius);
     (keep, others, heaviest)
+}
+
+/// Whether a track goes beside a longer one and nowhere else, as a shadow or a reflection does: it is offered and not named.
+fn is_companion(t: &Track, of: &Track) -> bool {
+    if (t.count as f64) > COMPANION_PART * of.count as f64 {
+        return false;
+    }
+    let places: std::collections::HashMap<usize, &Spot> = of.spots().collect();
+    let beside: Vec<(&Spot, Spot)> = t
+        .spots()
+        .filter_map(|(k, s)| places.get(&k).map(|o| (s, Spot { x: s.x - o.x, y: s.y - o.y, ..*s })))
+        .collect();
+    let offset = extent(beside.iter().map(|(_, d)| d));
+    let travel = extent(beside.iter().map(|(s, _)| *s));
+    beside.len() as f64 > COMPANION_SEEN * t.count as f64 && offset < COMPANION_OFFSET * travel
+}
+
+/// Joins tracks that are never seen together where the look of two agrees better than that of any other two that could be one.
+fn join_by_look(tracks: &mut Vec<Track>, radius_px: f64) {
+    loop {
+        let apart = |a: &Track, b: &Track| (a.look[0] - b.look[0]).hypot(a.look[1] - b.look[1]);
+        let follows = |a: &Track, b: &Track| match (a.spots().last(), b.spots().next()) {
+            (Some((end, p)), Some((begin, q))) => {
+                let fastest = |t: &Track| t.pieces.iter().map(|p| p.longest_step_px()).fold(0.0, f64::max);
+                let reach = fastest(a).max(fastest(b)) * begin.saturating_sub(end) as f64 + 3.0 * radius_px;
+                begin > end && (p.x - q.x).hypot(p.y - q.y) <= reach
+            }
+            _ => false,
+        };
+        let n = tracks.len();
+        let pairs: Vec<(f64, usize, usize)> = (0..n)
+            .flat_map(|a| (0..n).map(move |b| (a, b)))
+            .filter(|&(a, b)| a != b && follows(&tracks[a], &tracks[b]))
+            .map(|(a, b)| (apart(&tracks[a], &tracks[b]), a, b))
+            .collect();
+        let clear = |&&(d, a, b): &&(f64, usize, usize)| {
+            let rivals = pairs.iter().filter(|p| (p.1 == a) != (p.2 == b));
+            d < SAME_LOOK
+                && rivals.map(|p| p.0).fold(f64::INFINITY, f64::min) > CLEAR_LOOK * d + SAME_LOOK / 2.0
+        };
+        let Some(&(_, a, b)) = pairs.iter().filter(clear).min_by(|a, b| a.0.total_cmp(&b.0)) else { return };
+        let mut pieces = tracks[a].pieces.clone();
+        pieces.extend(tracks[b].pieces.iter().cloned());
+        tracks[a] = Track::of(pieces, radius_px);
+        tracks.remove(b);
+    }
 }
 
 /// What stands out most in the picture in which most does, strongest first: for recordings in which nothing moves smoothly.

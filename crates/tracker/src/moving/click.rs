@@ -34,6 +34,8 @@ const CHOICE_PART: f64 = 0.1;
 const LOOK: [f64; 2] = [0.92, 1.1];
 /// A streak has the same product of peak and length as the marker at rest, to a factor 2, as a logarithm.
 const STREAK: f64 = 0.7;
+/// What a thing that does not move is worth beside one that does: one points at what moves.
+const STILL: f64 = 0.1;
 /// A track of fewer pictures holds nothing.
 const LEAST_SPOTS: usize = 5;
 /// Smoothness from which on a track holds.
@@ -121,12 +123,16 @@ fn off(s: &Spot, click: &Click) -> f64 {
     (s.x - click.x).hypot(s.y - click.y)
 }
 
-/// For each place the marker that is followed from there, or why none is. Places of the markers are those of the filter alone;
+/// For each place the marker that is followed from there, or why none is; one of those `known` to move, if it holds better. Places of the markers are those of the filter alone;
 /// [`super::finish`] refines them.
 ///
 /// # Errors
 /// Those of the film; [`crate::error::Error::Interrupted`] once the work is to stop.
-pub fn follow_clicks(search: &Search, clicks: &[Click]) -> Result<Vec<Result<Marker, Missed>>> {
+pub fn follow_clicks(
+    search: &Search,
+    clicks: &[Click],
+    known: &[Marker],
+) -> Result<Vec<Result<Marker, Missed>>> {
     let film = search.film;
     let tried: Vec<(usize, Choice)> = clicks
         .iter()
@@ -161,6 +167,17 @@ pub fn follow_clicks(search: &Search, clicks: &[Click]) -> Result<Vec<Result<Mar
             Ok((*i, judge(search, &clicks[*i], choice, &pictures)?))
         })
         .collect::<Result<_>>()?;
+    let mut judged = judged;
+    for (i, click) in clicks.iter().enumerate() {
+        for marker in known {
+            if let Some((_, spot)) = marker.track.spots().find(|(k, _)| *k == click.picture) {
+                let worth = worth(search, click, spot, &marker.track, marker.model)?;
+                if off(spot, click) < marker.radius_px + OFF_PX {
+                    judged.push((i, Ok((worth.0, marker.clone()))));
+                }
+            }
+        }
+    }
     Ok((0..clicks.len())
         .map(|i| {
             let mine = || judged.iter().filter(|(j, _)| *j == i).map(|(_, r)| r);
@@ -195,8 +212,15 @@ fn judge(search: &Search, click: &Click, choice: &Choice, pictures: &[Vec<Spot>]
     if track.smoothness < LEAST_SMOOTHNESS {
         return Ok(Err(Missed::Restless(model, track.count)));
     }
-    let (radius_px, compact) = compact(search.film, &track, &model)?;
-    let near = (-(off(&choice.spot, click) / (OFF_RADII * radius_px + OFF_PX)).powi(2)).exp();
-    let worth = track.count as f64 * (0.3 + 0.7 * track.quality) * (0.2 + 0.8 * compact) * near;
+    let (worth, radius_px) = worth(search, click, &choice.spot, &track, model)?;
     Ok(Ok((worth, Marker { track, model, radius_px })))
+}
+
+/// What a track through a place is worth as what was pointed at, and its radius, px: how much of it is seen, how smoothly and far
+/// it moves, how compact it is and how near to the place.
+fn worth(search: &Search, click: &Click, spot: &Spot, track: &Track, model: Model) -> Result<(f64, f64)> {
+    let (radius_px, compact) = compact(search.film, track, &model)?;
+    let near = (-(off(spot, click) / (OFF_RADII * radius_px + OFF_PX)).powi(2)).exp();
+    let moves = STILL + (1.0 - STILL) * track.quality;
+    Ok((track.count as f64 * moves * (0.2 + 0.8 * compact) * near, radius_px))
 }

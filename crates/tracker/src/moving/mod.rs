@@ -16,6 +16,7 @@ mod ground;
 mod limits;
 mod marker;
 mod model;
+mod outline;
 mod own_colour;
 mod picture;
 mod response;

@@ -233,7 +233,7 @@ fn a_wish_to_stop_ends_the_work() {
 /// What is followed from places that are pointed at.
 fn pointed(film: &Drawn, limits: &Limits, clicks: &[Click]) -> Vec<Result<Marker, Missed>> {
     let search = Search::learn(film, limits).unwrap().unwrap();
-    let mut followed = follow_clicks(&search, clicks).unwrap();
+    let mut followed = follow_clicks(&search, clicks, &survey(&search).unwrap().markers).unwrap();
     let mut markers: Vec<Marker> = followed.iter().flatten().cloned().collect();
     finish(film, &mut markers).unwrap();
     let mut finished = markers.into_iter();

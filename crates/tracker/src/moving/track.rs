@@ -23,6 +23,13 @@ const FOURTH_DIFFERENCE_VARIANCE: f64 = 70.0;
 /// A place that lies aside by more than this, in radii and in units of the usual scatter, is another region's.
 const JUMP_RADII: f64 = 0.25;
 const JUMP_NOISE: f64 = 8.0;
+/// A step aside and a step back are alike to this factor; where a motion turns one of them is missing.
+const BACK_PART: f64 = 0.4;
+/// Places to either side that tell where a place ought to be, and the part of them that is believed: more than half.
+const PATH_PLACES: usize = 6;
+const PATH_PART: f64 = 0.55;
+/// A place of which so many radii are not known is none: it may as well be beside the marker.
+const LOST_RADII: f64 = 0.5;
 /// Median of the sum of two squares of normal numbers of one variance over its mean: ln 2.
 const MEDIAN_OF_TWO_SQUARES: f64 = std::f64::consts::LN_2;
 /// One marker through the recording.
@@ -69,10 +76,12 @@ impl Track {
         self.noise_px = self.scatter_px();
         let limit = (JUMP_RADII * radius_px).max(JUMP_NOISE * self.noise_px);
         let kept = |t: &Tracklet| {
-            let all: Vec<(usize, Spot)> = (t.first..).zip(t.spots.iter().copied()).collect();
-            let jumps: Vec<usize> =
-                (2..all.len().saturating_sub(2)).filter(|&i| jumps(&t.spots[i - 2..=i + 2], limit)).collect();
-            let kept: Vec<_> = all.into_iter().filter(|(k, _)| !jumps.contains(&(k - t.first))).collect();
+            let s = &t.spots;
+            let jumps = |i: usize| i >= 2 && i + 2 < s.len() && jumps(&s[i - 2..=i + 2], limit);
+            let aside = |i: usize| jumps(i) && off_path_px(s, i) > limit;
+            let unknown = |i: usize| s[i].doubt_px > LOST_RADII * radius_px && s[i].doubt_px.is_finite();
+            let kept: Vec<(usize, Spot)> =
+                (0..s.len()).filter(|&i| !aside(i) && !unknown(i)).map(|i| (t.first + i, s[i])).collect();
             Tracklet::runs(&kept)
         };
         self.pieces = self.pieces.iter().flat_map(kept).collect();
@@ -166,8 +175,33 @@ fn jumps(s: &[Spot], limit_px: f64) -> bool {
     let second = |i: usize| [s[i - 1].x - 2.0 * s[i].x + s[i + 1].x, s[i - 1].y - 2.0 * s[i].y + s[i + 1].y];
     let [a, b, c] = [second(1), second(2), second(3)];
     let size = b[0].hypot(b[1]);
-    let sum = (a[0] + b[0] + c[0]).hypot(a[1] + b[1] + c[1]);
-    size / 2.0 > limit_px && sum < size / 2.0
+    // Along the step back, in parts of it.
+    let back = |v: [f64; 2]| -(v[0] * b[0] + v[1] * b[1]) / (size * size).max(1e-12);
+    size / 2.0 > limit_px && back(a) > BACK_PART && back(c) > BACK_PART
+}
+
+/// How far a place is from the path that most of the places around it lie on, px: where every other place lies aside, the fewer
+/// are wrong.
+fn off_path_px(s: &[Spot], i: usize) -> f64 {
+    let window = i.saturating_sub(PATH_PLACES)..(i + PATH_PLACES + 1).min(s.len());
+    let all: Vec<(f64, &Spot)> = window.map(|k| (k as f64 - i as f64, &s[k])).collect();
+    let most = ((PATH_PART * all.len() as f64).ceil() as usize).max(4).min(all.len());
+    let mut chosen: Vec<(f64, &Spot)> = all.clone();
+    let mut path = [[0.0; 3]; 2];
+    for _ in 0..5 {
+        let fit =
+            |f: fn(&Spot) -> f64| polynomial(&chosen.iter().map(|(t, s)| (*t, f(s))).collect::<Vec<_>>(), 2);
+        path = [fit(|s| s.x), fit(|s| s.y)];
+        let off = |(t, s): &(f64, &Spot)| {
+            let at = |c: &[f64; 3]| c[0] + c[1] * t + c[2] * t * t;
+            (s.x - at(&path[0])).hypot(s.y - at(&path[1]))
+        };
+        let mut nearest = all.clone();
+        nearest.sort_by(|a, b| off(a).total_cmp(&off(b)));
+        nearest.truncate(most);
+        chosen = nearest;
+    }
+    (s[i].x - path[0][0]).hypot(s[i].y - path[1][0])
 }
 
 /// Whether a streak points where it goes.

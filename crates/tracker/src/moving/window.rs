@@ -146,6 +146,26 @@ impl Window {
         (s > 0.0).then(|| Region { x: sx / s, y: sy / s, area: cells.len() as f64 })
     }
 
+    /// Points of the outline of the region of the marker at a place, half way between a pixel inside and one outside.
+    pub fn outline(&self, at: [f64; 2], radius: f64) -> Vec<[f64; 2]> {
+        let Some([low, high]) = self.levels(at, radius) else { return Vec::new() };
+        let level = low + (high - low) * LARGE_LEVEL;
+        let inside: Vec<bool> = self.values.iter().map(|v| f64::from(*v) > level).collect();
+        let Some(cells) = self.connected(&inside, at, radius) else { return Vec::new() };
+        let cells = fill(&cells, self.width, self.height);
+        let mut covered = vec![false; self.width * self.height];
+        cells.iter().for_each(|&c| covered[c] = true);
+        let place = |c: usize| [(c % self.width) as f64, (c / self.width) as f64];
+        let mut points = Vec::new();
+        for &c in &cells {
+            for n in neighbours(c, self.width, self.height).filter(|n| !covered[*n]) {
+                let (p, q) = (place(c), place(n));
+                points.push([(p[0] + q[0]) / 2.0, (p[1] + q[1]) / 2.0]);
+            }
+        }
+        points
+    }
+
     /// The region about a place that differs from the backdrop in brightness or in colour, with its holes.
     pub fn silhouette(&self, backdrop: &Backdrop, at: [f64; 2], radius: f64) -> Option<Region> {
         let behind = backdrop.part((self.x0, self.y0), (self.width, self.height));

@@ -10,6 +10,7 @@ use super::moving::{self, Outcome, Unclear};
 use super::observer::{Observer, Stage};
 use super::opening::{Attended, on_threads};
 use super::reading::Run;
+use super::sizes::{MOST_SIZES, Sizes};
 use super::state;
 use super::summary::RunSummary;
 use super::times::times;
@@ -94,6 +95,7 @@ impl Run<'_> {
         };
         let mut rows = self.settings.collect.then(Rows::default);
         let mut tally = Tally::new(&rig);
+        let mut sizes = Sizes::of(self.settings.rig.as_ref(), &rig);
         // A run that was stopped while it read is only stopped here if the user does not want to wait.
         let mut stop = end.is_none();
         let reading_was_stopped = stop;
@@ -112,6 +114,7 @@ impl Run<'_> {
                     rows.push(stamp.index, time_s, observations);
                 }
                 tally.push(observations);
+                sizes.push(observations);
                 if !stamp.decoded {
                     damage.undecoded.push(stamp.index);
                 }
@@ -127,6 +130,21 @@ impl Run<'_> {
             Err(error) => return Err(error),
         }
         self.store.check()?;
+        let nodes = tally.summary();
+        if !stop && nodes.iter().all(|n| n.seen == 0) {
+            return Err(Error::Rig(
+                Fault::new("recording", "what stands out cannot be told apart in any frame").advice(
+                    "Point at each marker with " + Setting::Marker + ", or give a rig with " + Setting::Rig,
+                ),
+            ));
+        }
+        let doubtful: Vec<String> = sizes.uneven().map(|k| nodes[k].node.clone()).collect();
+        if !doubtful.is_empty() {
+            self.warnings.push(format!(
+                "{} changes size by more than a factor {MOST_SIZES}, as no disc does: an arm, a hand or several things may be taken \
+                 for a marker", doubtful.join(", ")
+            ).into());
+        }
         let ending = end.map(|e| e.ending).filter(|_| !stop);
         let meta = self.meta(rig, timing, damage, ending);
         self.warnings.extend(meta.damage.gaps.dropped_words().map(Message::from));
@@ -141,8 +159,8 @@ impl Run<'_> {
             resumed: self.resumed,
             resumable: stop && self.settings.output.is_some() && !self.files.is_empty(),
             moving: false,
-            doubtful: Vec::new(),
-            nodes: tally.summary(),
+            doubtful,
+            nodes,
             warnings: std::mem::take(&mut self.warnings),
             table: rows.map(|rows| NodeTable { meta: meta.clone(), rows }),
             meta,

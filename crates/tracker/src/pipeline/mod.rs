@@ -13,6 +13,7 @@ mod reading;
 mod request;
 mod run;
 mod settings;
+mod sizes;
 mod state;
 mod summary;
 mod times;

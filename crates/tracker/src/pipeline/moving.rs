@@ -107,7 +107,8 @@ pub(super) fn check(settings: &RunSettings) -> Result<()> {
     Ok(())
 }
 
-/// Whether markers were not found, or are seen in so few frames that what was taken for them is something else.
+/// Whether markers were not found, or are seen in so few frames or change their size so much that what was taken for them is
+/// something else.
 pub(super) fn is_wanted(markers: &Result<RunSummary>) -> bool {
     match markers {
         Ok(summary) => {
@@ -115,7 +116,8 @@ pub(super) fn is_wanted(markers: &Result<RunSummary>) -> bool {
                 let rows = n.seen + n.missing + n.ambiguous;
                 rows == 0 || (n.seen as f64) < LEAST_SEEN * rows as f64
             };
-            summary.meta.ending != RunEnding::Interrupted && summary.nodes.iter().all(seldom)
+            let doubtful = |n: &NodeSummary| seldom(n) || summary.doubtful.contains(&n.node);
+            summary.meta.ending != RunEnding::Interrupted && summary.nodes.iter().all(doubtful)
         }
         Err(error) => matches!(error, Error::Detect(_) | Error::Rig(_)),
     }
@@ -358,7 +360,8 @@ fn pointed(film: &WorkFilm, search: &Search, places: &[Pointed]) -> Result<Found
         format!("({:.0}, {:.0}) px in frame {}", p.x_px, p.y_px, p.frame.unwrap_or(first))
     };
     let mut markers: Vec<Marker> = Vec::with_capacity(clicks.len());
-    for (k, followed) in follow_clicks(search, &clicks)?.into_iter().enumerate() {
+    let Survey { markers: known, answers, confidence } = survey(search)?;
+    for (k, followed) in follow_clicks(search, &clicks, &known)?.into_iter().enumerate() {
         match followed {
             Ok(marker) => {
                 if let Some(other) = markers.iter().position(|m| m.is_same(&marker, marker.radius_px)) {
@@ -373,8 +376,7 @@ fn pointed(film: &WorkFilm, search: &Search, places: &[Pointed]) -> Result<Found
                 markers.push(marker);
             }
             Err(missed) => {
-                let Survey { markers, answers, confidence } = survey(search)?;
-                let candidates = candidates(film, search, &markers, answers, confidence, &[])?;
+                let candidates = candidates(film, search, &known, answers, confidence, &[])?;
                 let why = format!("at {} {}", shown(k), missed_words(missed, film.shrink() as f64));
                 return Ok(Found::unclear(Unclear::new(why, point_at(&candidates)), candidates));
             }

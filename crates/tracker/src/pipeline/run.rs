@@ -42,7 +42,10 @@ pub fn run(settings: &RunSettings, observer: &mut dyn Observer) -> Result<RunSum
     };
     match markers {
         Ok(mut summary) => {
-            let why = Message::from(format!("markers are seen in few frames, and {}. ", unclear.why));
+            let why = Message::from(format!(
+                "what stands out is seen in few frames or changes its size, and {}. ",
+                unclear.why
+            ));
             summary.warnings.push(why + unclear.advice);
             Ok(summary)
         }
