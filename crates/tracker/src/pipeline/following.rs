@@ -22,7 +22,9 @@ use crate::message::{Message, Setting};
 use crate::name::shown;
 use crate::rig::Rig;
 use crate::source::Interlaced;
-use crate::table::{NodeTable, Rows, RunEnding, SCHEMA_VERSION, SourceFacts, TableMeta, TableWriter, Tally};
+use crate::table::{
+    NodeSummary, NodeTable, Rows, RunEnding, SCHEMA_VERSION, SourceFacts, TableMeta, TableWriter, Tally,
+};
 use crate::timing::{self, Clock, Steps, Timing};
 use crate::track::track_recording;
 
@@ -79,14 +81,7 @@ impl Run<'_> {
         let (timing, clock) = self.times()?;
         self.warnings.extend(timing::notes(&timing));
         let rig = self.rig(end.is_none(), observer)?;
-        if let Some(count) = self.settings.asked().markers
-            && count != rig.nodes.len()
-        {
-            return Err(Error::Rig(
-                Fault::of(Setting::Markers, format!("{count} are wanted, and {} stand out", rig.nodes.len()))
-                    .advice("Point at each of them with " + Setting::Marker),
-            ));
-        }
+        self.check_count(&rig)?;
         let total = self.store.len() as u64;
         observer.stage(Stage::Track, Some(total));
         let mut writer = match &self.settings.output {
@@ -131,20 +126,7 @@ impl Run<'_> {
         }
         self.store.check()?;
         let nodes = tally.summary();
-        if !stop && nodes.iter().all(|n| n.seen == 0) {
-            return Err(Error::Rig(
-                Fault::new("recording", "what stands out cannot be told apart in any frame").advice(
-                    "Point at each marker with " + Setting::Marker + ", or give a rig with " + Setting::Rig,
-                ),
-            ));
-        }
-        let doubtful: Vec<String> = sizes.uneven().map(|k| nodes[k].node.clone()).collect();
-        if !doubtful.is_empty() {
-            self.warnings.push(format!(
-                "{} changes size by more than a factor {MOST_SIZES}, as no disc does: an arm, a hand or several things may be taken \
-                 for a marker", doubtful.join(", ")
-            ).into());
-        }
+        let doubtful = if stop { Vec::new() } else { self.judge(&nodes, &mut sizes)? };
         let ending = end.map(|e| e.ending).filter(|_| !stop);
         let meta = self.meta(rig, timing, damage, ending);
         self.warnings.extend(meta.damage.gaps.dropped_words().map(Message::from));
@@ -165,6 +147,41 @@ impl Run<'_> {
             table: rows.map(|rows| NodeTable { meta: meta.clone(), rows }),
             meta,
         })
+    }
+
+    /// Refuses a rig of another number of nodes than there are markers, if that was said.
+    fn check_count(&self, rig: &Rig) -> Result<()> {
+        if let Some(count) = self.settings.asked().markers
+            && count != rig.nodes.len()
+        {
+            return Err(Error::Rig(
+                Fault::of(Setting::Markers, format!("{count} are wanted, and {} stand out", rig.nodes.len()))
+                    .advice("Point at each of them with " + Setting::Marker),
+            ));
+        }
+        Ok(())
+    }
+
+    /// Nodes that hardly are markers, of which it is told why.
+    ///
+    /// # Errors
+    /// [`Error::Rig`] where no node is ever seen.
+    fn judge(&mut self, nodes: &[NodeSummary], sizes: &mut Sizes) -> Result<Vec<String>> {
+        if nodes.iter().all(|n| n.seen == 0) {
+            return Err(Error::Rig(
+                Fault::new("recording", "what stands out cannot be told apart in any frame").advice(
+                    "Point at each marker with " + Setting::Marker + ", or give a rig with " + Setting::Rig,
+                ),
+            ));
+        }
+        let doubtful: Vec<String> = sizes.uneven().map(|k| nodes[k].node.clone()).collect();
+        if !doubtful.is_empty() {
+            self.warnings.push(format!(
+                "{} changes size by more than a factor {MOST_SIZES}, as no disc does: an arm, a hand or several things may be taken \
+                 for a marker", doubtful.join(", ")
+            ).into());
+        }
+        Ok(doubtful)
     }
 
     /// The rig that is given, or the one found.
