@@ -50,6 +50,7 @@ check: build
 	.venv/bin/ruff format --check .
 	.venv/bin/mypy
 	MYPYPATH=python .venv/bin/stubtest pydpend._native
+	cargo check --release --locked -p tracker --lib --no-default-features
 
 # Long: the eight scenes by twenty seeds, real motion filmed, then the estimators' sweeps.
 validate: build

@@ -238,8 +238,9 @@ def test_a_config_says_whatever_a_flag_can(tmp_path: Path, capsys: pytest.Captur
         "clock": True, "intervals": "profile", "comparison": False, "prediction": False, "start_s": 1.5, "stop_s": 9.0,
         "angle_maps": True, "zero": "-178,-182", "link_length_m": 0.17, "estimator": "linkage",
         "columns": "time_s=t", "hanging_deg": -180.0, "overlay": False, "threads": 3, "pixel_aspect": "4:3",
-        "marker": ("3,4@5", "6.5,7"), "markers": 2, "also": "2,3", "same": ("n1=n2",), "region": "0,1,20,30",
-        "threshold": 12.5, "polarity": "dark",
+        "marker": ("3,4@5", "6.5,7"), "markers": 2, "also": "2,3", "same": ("n1=n2",), "decoder": "opencv",
+        "interlaced": "as-frames", "allow_protocol": True, "frames": "0..9", "threshold": 120.0, "polarity": "dark",
+        "centroid": "contour", "region": "0,1,20,30", "min_area_px": 5.0, "max_area_px": 500.0,
     }  # fmt: skip
     energy: dict[str, object] = {"method": "energy", "laws": "paper", "ten_coefficients": True}
     single: dict[str, object] = {"pinned": True}

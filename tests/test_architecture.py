@@ -32,7 +32,18 @@ GROUPS: tuple[tuple[str, ...], ...] = (
         "arrays",
         "series",
     ),
-    ("nodes", "live", "wanted", "tracking", "filming", "scoring", "exporting", "components", "bearings"),
+    (
+        "reading_options",
+        "nodes",
+        "live",
+        "wanted",
+        "tracking",
+        "filming",
+        "scoring",
+        "exporting",
+        "components",
+        "bearings",
+    ),
     ("coefficients", "model", "fit_options", "fit_status", "information"),
     ("kinematics",),
     ("encoder",),
@@ -54,7 +65,7 @@ def top_modules() -> list[str]:
 # The same for the crates. A crate that is not listed has no rooms but files beside each other.
 RUST_GROUPS: dict[str, tuple[tuple[str, ...], ...]] = {
     "tracker": (
-        ("message", "name", "csv_text", "error", "stop", "output", "packed", "kind"),
+        ("message", "name", "csv_text", "error", "setting_words", "stop", "output", "packed", "kind"),
         ("pixel_aspect", "gaps", "frame", "gray", "observation", "timing", "peak_level", "rig", "wanted"),
         ("source",),
         ("detect",),

@@ -89,7 +89,7 @@ def flags() -> dict[str, set[str]]:
     return found | {f"tracker {name}": set(FLAG.findall(text)) for name, text in tracker_help().items()}
 
 
-PYTHON_ONLY = {"min_area_px", "max_area_px", "link_length_sigma_m"}
+PYTHON_ONLY = {"link_length_sigma_m"}
 """Settings that no command has."""
 
 
@@ -272,7 +272,7 @@ def test_a_setting_that_a_command_has_not_is_named_with_one_that_has(
     commands = _parsers()[1]
     with speaking(CommandLine(commands, "plot")):
         assert str(Message.of(Setting("unwrap", True))).startswith("--unwrap (of `pydpend ")
-        assert str(Message.of(Setting("decoder"))) == "--decoder (of `tracker track`)"
+        assert str(Message.of(Setting("threshold"))) == "--threshold (of `pydpend analyse`)"
         assert (
             str("Leave " + Setting("prediction", False) + ".")
             == "Leave --no-prediction (of `pydpend analyse`)."

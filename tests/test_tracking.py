@@ -325,7 +325,7 @@ def test_live_images_are_followed() -> None:
         ({"frames": (5, 3)}, "frames"),
         ({"frames": "all"}, "frames"),
         ({"threads": 0}, "threads"),
-        ({"polarity": "grey"}, "polarity: .*Give one of auto, bright, dark"),
+        ({"polarity": "grey"}, "polarity: .*Give auto, bright or dark"),
         ({"decoder": "vlc"}, "decoder"),
         ({"threshold": float("nan")}, "threshold"),
     ],

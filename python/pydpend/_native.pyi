@@ -13,11 +13,9 @@ from numpy.typing import NDArray
 from pydpend.crossing import (
     Callback,
     Columns,
-    DetectArguments,
     Found,
     Frames,
     HeldColumns,
-    OpenArguments,
     Row,
     SegmentArrays,
     WantedArguments,
@@ -27,10 +25,15 @@ from pydpend.kinds import Kind
 
 __all__ = [
     "VERSION",
+    "DetectSettings",
+    "EncodeSettings",
     "Film",
     "IntegratorSettings",
     "Law",
     "LiveTracker",
+    "OpenOptions",
+    "OutputSettings",
+    "OverlaySettings",
     "Ratio",
     "ShootingFit",
     "ShootingSettings",
@@ -42,6 +45,7 @@ __all__ = [
     "detect",
     "fingerprint",
     "follow_motion",
+    "frame_range",
     "info",
     "kind_of",
     "laws",
@@ -56,6 +60,7 @@ __all__ = [
     "recording_files",
     "rig_toml",
     "score_places",
+    "setting_words",
     "setup",
     "shooting_fit",
     "shooting_segments",
@@ -72,17 +77,84 @@ __all__ = [
 
 VERSION: str
 
+def setting_words() -> dict[str, list[str]]:
+    """The words of each setting that has words, the default first."""
+
+def frame_range(text: str) -> tuple[int, int | None]:
+    """The frames of ``A..B``, of which B may be left out."""
+
+@final
+class OpenOptions:
+    """How a recording is opened; `pydpend.reading_options.OpenOptions` names each."""
+
+    def __new__(
+        cls,
+        *,
+        fps: float | None = None,
+        decoder: str = "auto",
+        interlaced: str = "refuse",
+        allow_protocol: bool = False,
+        threads: int = 0,
+        pixel_aspect: str | None = None,
+    ) -> Self: ...
+
+@final
+class DetectSettings:
+    """What is a marker; `pydpend.reading_options.DetectOptions` names each."""
+
+    def __new__(
+        cls,
+        *,
+        threshold: float | None = None,
+        polarity: str = "auto",
+        centroid: str = "disc",
+        region: str | None = None,
+        min_area_px: float | None = None,
+        max_area_px: float | None = None,
+    ) -> Self: ...
+
+@final
+class OutputSettings:
+    """Where the result of a run goes: `existing` is ``refuse``, ``replace`` or ``resume``."""
+
+    def __new__(
+        cls,
+        path: str | None,
+        *,
+        existing: str = "refuse",
+        safe_csv: bool = False,
+        reads: Sequence[str] = ...,
+    ) -> Self: ...
+
+@final
+class OverlaySettings:
+    """How a film with what was found is drawn; `width` is in px."""
+
+    def __new__(cls, *, every: int, width: int | None, play_fps: int, quality: int) -> Self: ...
+
+@final
+class EncodeSettings:
+    """How a film is encoded, and where its truth goes; `bits` are those of a sample."""
+
+    def __new__(
+        cls,
+        *,
+        truth: str | None,
+        codec: str | None,
+        quality: int | None,
+        x264_preset: str | None,
+        gray_only: bool,
+        bits: int | None,
+    ) -> Self: ...
+
 def track(
     input: str,
     rig: str | None,
     frames: Frames,
-    detect: DetectArguments,
-    open: OpenArguments,
+    detect: DetectSettings,
+    open: OpenOptions,
     wanted: WantedArguments,
-    output: str | None,
-    existing: str,
-    safe_csv: bool,
-    reads: list[str],
+    output: OutputSettings,
     progress: Callback,
 ) -> tuple[Columns, list[Message], BaseException | None]:
     """Columns, warnings, and the exception that stopped the run, if one did. `rig` is JSON."""
@@ -90,12 +162,11 @@ def track(
 def setup(
     input: str,
     frames: Frames,
-    detect: DetectArguments,
-    open: OpenArguments,
+    detect: DetectSettings,
+    open: OpenOptions,
     wanted: WantedArguments,
-    output: str | None,
+    output: OutputSettings,
     picture: str | None,
-    replace: bool,
     progress: Callback,
 ) -> tuple[str, list[Message], NDArray[np.uint8]]:
     """The rig as JSON, warnings, and the reference picture with the rig drawn, (H, W, 3), red, green, blue."""
@@ -104,17 +175,12 @@ def overlay_film(
     input: str,
     held: HeldColumns,
     meta: str,
-    output: str,
-    open: OpenArguments,
-    every: int,
-    width: int | None,
-    play_fps: int,
-    quality: int,
-    replace: bool,
-    reads: list[str],
+    open: OpenOptions,
+    film: OverlaySettings,
+    output: OutputSettings,
     progress: Callback,
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Of each of the film's K pictures the frame, (K,), and its time in the recording in s, (K,). `width` is in px."""
+    """Of each of the film's K pictures the frame, (K,), and its time in the recording in s, (K,)."""
 
 def recording_files(input: str | Path) -> list[Path]:
     """The files that a recording is read from; none for what is read once only."""
@@ -125,13 +191,12 @@ def fingerprint(files: list[Path]) -> str:
 def check_outputs(outputs: list[str], inputs: list[str], replace: bool) -> None:
     """Refuses outputs that would replace an input, one another or, unless `replace`, what is there already."""
 
-def info(input: str, open: OpenArguments) -> str:
+def info(input: str, open: OpenOptions) -> str:
     """What is known of a recording before it is read through, as JSON."""
 
 def detect(
     image: NDArray[Any],
-    settings: DetectArguments,
-    area_px: tuple[float | None, float | None],
+    settings: DetectSettings,
     depth_bits: int | None,
     aspect: str | None,
 ) -> Found:
@@ -141,7 +206,7 @@ def detect(
 class LiveTracker:
     """Follows the markers of a rig, image by image."""
 
-    def __new__(cls, rig_text: str, settings: DetectArguments, depth_bits: int | None) -> Self: ...
+    def __new__(cls, rig_text: str, settings: DetectSettings, depth_bits: int | None) -> Self: ...
     def learn(self, images: list[NDArray[Any]]) -> None:
         """Learns thresholds and noise from images of the scene."""
 
@@ -211,20 +276,8 @@ class Film:
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Times (T,), centres (T, N, 2), visible part (T, N), angles (T, L)."""
 
-    def write(
-        self,
-        output: str,
-        truth: str | None,
-        codec: str | None,
-        quality: int | None,
-        x264_preset: str | None,
-        gray_only: bool,
-        bits: int | None,
-        safe_csv: bool,
-        replace: bool,
-        reads: list[str],
-    ) -> None:
-        """Writes the film, and its truth if a file is named; `bits` are those of a sample."""
+    def write(self, encoding: EncodeSettings, output: OutputSettings) -> None:
+        """Writes the film, and its truth if a file is named."""
 
 def score_places(
     nodes: list[str],

@@ -31,12 +31,8 @@ Columns: TypeAlias = tuple[
 
 Found: TypeAlias = tuple[NDArray[np.float64], NDArray[np.float32], NDArray[np.uint8]]
 Row: TypeAlias = tuple[NDArray[np.float64], NDArray[np.float32], NDArray[np.float32], NDArray[np.uint8]]
-DetectArguments: TypeAlias = tuple[float | None, str, str]
-OpenArguments: TypeAlias = tuple[float | None, str, str, bool, int, str | None]
-WantedArguments: TypeAlias = tuple[
-    list[str], int | None, list[int], list[tuple[str, str]], tuple[float, float, float, float] | None
-]
-"""Places that were pointed at, how many markers there are, numbers, pairs of nodes, region in px."""
+WantedArguments: TypeAlias = tuple[list[str], int | None, list[int], list[tuple[str, str]]]
+"""Places that were pointed at, how many markers there are, numbers, pairs of nodes."""
 Frames: TypeAlias = tuple[int, int | None] | None
 Callback: TypeAlias = Callable[[str, int, int | None], object] | None
 """Called with stage, frames done and frames in all, if known."""

@@ -173,7 +173,16 @@ class PydpendError(Exception):
 
 
 class TrackerError(PydpendError):
-    """The tracker, the part that turns a film into a node table."""
+    """The tracker, the part that turns a film into a node table.
+
+    Attributes
+    ----------
+    kind : str
+        ``invalid``, ``damaged``, ``unsupported``, ``setting``, ``nothing_found``, ``missing``, ``exists`` or
+        ``system``.
+    """
+
+    kind: str = "invalid"
 
 
 class SourceError(TrackerError):
@@ -198,6 +207,8 @@ class FilmError(TrackerError):
 
 class ArgumentError(TrackerError, ValueError):
     """An argument of the tracker that makes no sense: an array of the wrong type or shape, a range, a rate."""
+
+    kind = "setting"
 
 
 class AnglesError(PydpendError):

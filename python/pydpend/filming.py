@@ -257,18 +257,19 @@ class Film:
         FilmError
             If the form cannot hold the film, a file is there already or is the scene's, or the film cannot be written.
         """
-        self._film.write(
-            os.fsdecode(output),
-            None if truth is None else os.fsdecode(truth),
-            codec,
-            quality,
-            x264_preset,
-            gray_only,
-            bits,
-            safe_csv,
-            force,
-            self._reads,
+        encoding = _native.EncodeSettings(
+            truth=None if truth is None else os.fsdecode(truth),
+            codec=codec,
+            quality=quality,
+            x264_preset=x264_preset,
+            gray_only=gray_only,
+            bits=bits,
         )
+        existing = "replace" if force else "refuse"
+        written = _native.OutputSettings(
+            os.fsdecode(output), existing=existing, safe_csv=safe_csv, reads=self._reads
+        )
+        self._film.write(encoding, written)
 
 
 def film(

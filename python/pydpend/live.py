@@ -13,11 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pydpend import _native
-from pydpend._typing import Centroid, PixelAspect, Polarity
+from pydpend._typing import Centroid, PixelAspect, Polarity, Region
 from pydpend.crossing import Found
 from pydpend.errors import ArgumentError, fault
 from pydpend.nodes import Rig
 from pydpend.output import AnyPath
+from pydpend.reading_options import DetectOptions, aspect_text
 
 DETECTION = np.dtype(
     [
@@ -35,19 +36,6 @@ background in the image's units, longer over shorter axis, and flags: 1 saturate
 """
 
 
-def aspect_text(aspect: PixelAspect | None) -> str | None:
-    """As the compiled half takes it; it knows what makes sense."""
-    if aspect is None or isinstance(aspect, str):
-        return aspect
-    try:
-        width, height = aspect
-    except (TypeError, ValueError):
-        raise ArgumentError(
-            fault("pixel_aspect", f"{aspect!r} is no width and height", "Give (16, 15) or '16:15'")
-        ) from None
-    return f"{width}:{height}"
-
-
 def _detections(found: Found) -> NDArray[np.void]:
     xy_px, rest, flags = found
     out = np.empty(len(flags), dtype=DETECTION)
@@ -63,7 +51,8 @@ def detect(
     *,
     threshold: float | None = None,
     polarity: Polarity = "auto",
-    centroid: Centroid = "weighted",
+    centroid: Centroid = "disc",
+    region: Region | None = None,
     min_area_px: float | None = None,
     max_area_px: float | None = None,
     depth_bits: int | None = None,
@@ -79,8 +68,10 @@ def detect(
         Level in the image's units; learned from the image if not given.
     polarity : {"auto", "bright", "dark"}
         Whether markers are brighter or darker than what is around them.
-    centroid : {"weighted", "contour"}
-        Centre by intensity, or by OpenCV's contours as in the paper (Section 4).
+    centroid : {"disc", "weighted", "contour"}
+        As in `track`.
+    region : sequence of float or str, optional
+        As in `track`.
     min_area_px, max_area_px : float, optional
         Limits of a marker's area, px; learned if not given.
     depth_bits : int, optional
@@ -101,10 +92,15 @@ def detect(
     DetectError
         If no threshold can be learned.
     """
-    area = (min_area_px, max_area_px)
-    return _detections(
-        _native.detect(image, (threshold, polarity, centroid), area, depth_bits, aspect_text(pixel_aspect))
+    options = DetectOptions(
+        threshold=threshold,
+        polarity=polarity,
+        centroid=centroid,
+        region=region,
+        min_area_px=min_area_px,
+        max_area_px=max_area_px,
     )
+    return _detections(_native.detect(image, options.detected(), depth_bits, aspect_text(pixel_aspect)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,12 +161,13 @@ class Tracker:
         *,
         threshold: float | None = None,
         polarity: Polarity = "auto",
-        centroid: Centroid = "weighted",
+        centroid: Centroid = "disc",
         depth_bits: int | None = None,
     ) -> None:
         self.rig = rig if isinstance(rig, Rig) else Rig.read(rig)
         self._next = 0
-        self._live = _native.LiveTracker(self.rig.to_json(), (threshold, polarity, centroid), depth_bits)
+        options = DetectOptions(threshold=threshold, polarity=polarity, centroid=centroid)
+        self._live = _native.LiveTracker(self.rig.to_json(), options.detected(), depth_bits)
 
     def learn(self, images: Iterable[NDArray[Any]]) -> None:
         """Learns thresholds and noise from some images of the scene; else the first image tracked is all there is.

@@ -16,44 +16,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pydpend import _native
-from pydpend._typing import Centroid, Decoder, Interlaced, PixelAspect, Polarity, Progress
+from pydpend._typing import (
+    Centroid,
+    Decoder,
+    Frames,
+    Interlaced,
+    PixelAspect,
+    Polarity,
+    Progress,
+    Region,
+)
 from pydpend.errors import ArgumentError, fault
-from pydpend.live import aspect_text
 from pydpend.nodes import Nodes, Rig, nodes_of, read_nodes
 from pydpend.output import AnyPath
+from pydpend.reading_options import OpenOptions, ReadingOptions
 from pydpend.tabular import TableResult
-from pydpend.wanted import Numbers, Pairs, Places, Region, wanted_arguments
+from pydpend.wanted import Numbers, Pairs, Places, wanted_arguments
 
 Path: TypeAlias = AnyPath
-
-
-def _frames(frames: tuple[int, int | None] | range | None) -> tuple[int, int | None] | None:
-    if frames is None:
-        return None
-    if isinstance(frames, range):
-        if frames.step != 1:
-            raise ArgumentError(fault("frames", f"{frames} has a step", "Give a range without one"))
-        frames = (frames.start, frames.stop)
-    try:
-        start, stop = frames
-        start, stop = int(start), None if stop is None else int(stop)
-    except (TypeError, ValueError):
-        raise ArgumentError(
-            fault("frames", f"{frames!r} is no range", "Give (first, one past the last)")
-        ) from None
-    if start < 0 or (stop is not None and stop <= start):
-        raise ArgumentError(fault("frames", f"{frames!r} holds no frame", "Give (first, one past the last)"))
-    return start, stop
-
-
-def _threads(threads: int | None) -> int:
-    if threads is None:
-        return 0
-    if not 0 < threads < 1 << 62:
-        raise ArgumentError(
-            fault("threads", f"{threads} is out of range", "Give 1 or more, or None for one a core")
-        )
-    return int(threads)
 
 
 def _count(name: str, value: int) -> int:
@@ -114,7 +94,7 @@ def track(
     rig: Rig | Path | None = None,
     *,
     fps: float | None = None,
-    frames: tuple[int, int | None] | range | None = None,
+    frames: Frames | None = None,
     threads: int | None = None,
     progress: Progress = None,
     output: Path | None = None,
@@ -128,7 +108,9 @@ def track(
     region: Region | None = None,
     threshold: float | None = None,
     polarity: Polarity = "auto",
-    centroid: Centroid = "weighted",
+    centroid: Centroid = "disc",
+    min_area_px: float | None = None,
+    max_area_px: float | None = None,
     decoder: Decoder = "auto",
     interlaced: Interlaced = "refuse",
     allow_protocol: bool = False,
@@ -144,8 +126,8 @@ def track(
         Nodes, bodies and joints, or a file of them; found in the recording if not given.
     fps : float, optional
         Frames a second of recorded time, Hz, instead of what the recording claims.
-    frames : tuple of int or range, optional
-        First frame and one past the last, counted from 0; None for the latter is the end.
+    frames : tuple of int, range or str, optional
+        First frame and one past the last, counted from 0; None for the latter is the end. ``(0, 500)`` or ``"0..500"``.
     threads : int, optional
         At least 1; one a core if not given. The result is the same for any number.
     progress : callable or bool, optional
@@ -168,14 +150,18 @@ def track(
         Numbers of the picture of `setup` that are to be followed too.
     same : tuple of str or sequence of these
         Pairs of nodes that are one marker, which keeps the first name.
-    region : tuple of float, shape (4,), optional
-        Where markers are looked for: first and last column and row, px.
     threshold : float, optional
         Level that parts markers from what is around them, in the recording's units; learned from it if not given.
     polarity : {"auto", "bright", "dark"}
         Whether markers are brighter or darker than what is around them.
-    centroid : {"weighted", "contour"}
-        Centre by intensity, or by OpenCV's contours as in the paper (Section 4).
+    centroid : {"disc", "weighted", "contour"}
+        Centre by the disc that fits best, by intensity above the background, or by OpenCV's contours as in the paper
+        (Section 4).
+    region : sequence of float or str, optional
+        Part of the image in which markers are looked for: first column and row and last column and row in px,
+        ``(0, 0, 319, 239)`` or ``"0,0,319,239"``; the rig's if not given.
+    min_area_px, max_area_px : float, optional
+        Limits of a marker's area, px; learned from the recording if not given.
     decoder : {"auto", "ffmpeg", "opencv"}
         What reads compressed film.
     interlaced : {"refuse", "as-frames"}
@@ -208,20 +194,34 @@ def track(
         On Ctrl-C, within two seconds. What was done until then is the exception's ``nodes``, and with `output` it is
         kept there, to go on with ``resume=True``.
     """
+    reading = ReadingOptions(
+        fps=fps,
+        decoder=decoder,
+        interlaced=interlaced,
+        pixel_aspect=pixel_aspect,
+        allow_protocol=allow_protocol,
+        threads=threads,
+        frames=frames,
+        threshold=threshold,
+        polarity=polarity,
+        centroid=centroid,
+        region=region,
+        min_area_px=min_area_px,
+        max_area_px=max_area_px,
+    )
     existing = "resume" if resume else "replace" if force else "refuse"
+    target = None if output is None else os.fsdecode(output)
+    written = _native.OutputSettings(target, existing=existing, safe_csv=safe_csv, reads=_files(rig))
     callback, close = _callback(progress)
     try:
         columns, warnings, stopped = _native.track(
             os.fsdecode(path),
             _rig(rig),
-            _frames(frames),
-            (threshold, polarity, centroid),
-            (fps, decoder, interlaced, allow_protocol, _threads(threads), aspect_text(pixel_aspect)),
-            wanted_arguments(marker, markers, also, same, region),
-            None if output is None else os.fsdecode(output),
-            existing,
-            safe_csv,
-            _files(rig),
+            reading.span(),
+            reading.detected(),
+            reading.opened(),
+            wanted_arguments(marker, markers, also, same),
+            written,
             callback,
         )
     finally:
@@ -259,7 +259,7 @@ def setup(
     picture: Path | None = None,
     force: bool = False,
     fps: float | None = None,
-    frames: tuple[int, int | None] | range | None = None,
+    frames: Frames | None = None,
     threads: int | None = None,
     progress: Progress = None,
     marker: Places | None = None,
@@ -269,6 +269,9 @@ def setup(
     region: Region | None = None,
     threshold: float | None = None,
     polarity: Polarity = "auto",
+    centroid: Centroid = "disc",
+    min_area_px: float | None = None,
+    max_area_px: float | None = None,
     decoder: Decoder = "auto",
     interlaced: Interlaced = "refuse",
     allow_protocol: bool = False,
@@ -286,8 +289,10 @@ def setup(
         An image file to write, for example .png: the reference picture with all that was found.
     force : bool
         Whether to replace `output` and `picture` if they are there already.
-    fps, frames, threads, progress, marker, markers, also, same, region, threshold, polarity : optional
+    fps, frames, threads, progress, marker, markers, also, same : optional
         As in `track`; the rig keeps what was said of what to follow.
+    threshold, polarity, centroid, region, min_area_px, max_area_px : optional
+        As in `track`.
     decoder, interlaced, allow_protocol, pixel_aspect : optional
         As in `track`.
 
@@ -312,17 +317,33 @@ def setup(
     Where it is not clear what is to be followed, the exception's ``picture`` shows what was found, each with its number
     and its path, and its ``candidates`` say a line of each; the file `picture` is then that picture.
     """
+    reading = ReadingOptions(
+        fps=fps,
+        decoder=decoder,
+        interlaced=interlaced,
+        pixel_aspect=pixel_aspect,
+        allow_protocol=allow_protocol,
+        threads=threads,
+        frames=frames,
+        threshold=threshold,
+        polarity=polarity,
+        centroid=centroid,
+        region=region,
+        min_area_px=min_area_px,
+        max_area_px=max_area_px,
+    )
+    target = None if output is None else os.fsdecode(output)
+    written = _native.OutputSettings(target, existing="replace" if force else "refuse")
     callback, close = _callback(progress)
     try:
         text, warnings, drawn = _native.setup(
             os.fsdecode(path),
-            _frames(frames),
-            (threshold, polarity, "weighted"),
-            (fps, decoder, interlaced, allow_protocol, _threads(threads), aspect_text(pixel_aspect)),
-            wanted_arguments(marker, markers, also, same, region),
-            None if output is None else os.fsdecode(output),
+            reading.span(),
+            reading.detected(),
+            reading.opened(),
+            wanted_arguments(marker, markers, also, same),
+            written,
             None if picture is None else os.fsdecode(picture),
-            force,
             callback,
         )
     finally:
@@ -373,9 +394,12 @@ def overlay(
     quality: int = 20,
     force: bool = False,
     progress: Progress = None,
+    fps: float | None = None,
+    threads: int | None = None,
     decoder: Decoder = "auto",
     interlaced: Interlaced = "refuse",
     allow_protocol: bool = False,
+    pixel_aspect: PixelAspect | None = None,
 ) -> OverlayFilm:
     """A film of a recording with its nodes, names, bodies, trails and gaps drawn in.
 
@@ -397,7 +421,7 @@ def overlay(
         Rate factor of x264, 0 (best, largest) to 51.
     force : bool
         Whether to replace `output` if it is there already.
-    progress, decoder, interlaced, allow_protocol : optional
+    progress, fps, threads, decoder, interlaced, allow_protocol, pixel_aspect : optional
         As in `track`.
 
     Returns
@@ -421,20 +445,30 @@ def overlay(
     table = [] if isinstance(nodes, Nodes) else [os.fsdecode(nodes)]
     if not isinstance(nodes, Nodes):
         nodes = read_nodes(nodes)
+    opening = OpenOptions(
+        fps=fps,
+        decoder=decoder,
+        interlaced=interlaced,
+        pixel_aspect=pixel_aspect,
+        allow_protocol=allow_protocol,
+        threads=threads,
+    )
+    drawing = _native.OverlaySettings(
+        every=_count("every", every),
+        width=None if width is None else _count("width", width),
+        play_fps=_count("play_fps", play_fps),
+        quality=_count("quality", quality),
+    )
+    film = _native.OutputSettings(os.fsdecode(output), existing="replace" if force else "refuse", reads=table)
     callback, close = _callback(progress)
     try:
         frame, t_s = _native.overlay_film(
             os.fsdecode(recording),
             nodes._columns(),
             nodes._meta_json(),
-            os.fsdecode(output),
-            (None, decoder, interlaced, allow_protocol, 0, None),
-            _count("every", every),
-            None if width is None else _count("width", width),
-            _count("play_fps", play_fps),
-            _count("quality", quality),
-            force,
-            table,
+            opening.opened(),
+            drawing,
+            film,
             callback,
         )
     finally:
@@ -446,7 +480,9 @@ def info(
     path: Path,
     *,
     fps: float | None = None,
+    threads: int | None = None,
     decoder: Decoder = "auto",
+    interlaced: Interlaced = "as-frames",
     allow_protocol: bool = False,
     pixel_aspect: PixelAspect | None = None,
 ) -> dict[str, Any]:
@@ -456,8 +492,10 @@ def info(
     ----------
     path : path-like
         The recording.
-    fps, decoder, allow_protocol, pixel_aspect : optional
+    fps, threads, decoder, allow_protocol, pixel_aspect : optional
         As in `track`.
+    interlaced : {"as-frames", "refuse"}
+        As in `track`, but what interlaced film is, is told by default.
 
     Returns
     -------
@@ -477,6 +515,13 @@ def info(
     ArgumentError
         If an argument makes no sense.
     """
-    opened = (fps, decoder, "as-frames", allow_protocol, 0, aspect_text(pixel_aspect))
-    known: dict[str, Any] = json.loads(_native.info(os.fsdecode(path), opened))
+    opening = OpenOptions(
+        fps=fps,
+        decoder=decoder,
+        interlaced=interlaced,
+        pixel_aspect=pixel_aspect,
+        allow_protocol=allow_protocol,
+        threads=threads,
+    )
+    known: dict[str, Any] = json.loads(_native.info(os.fsdecode(path), opening.opened()))
     return known

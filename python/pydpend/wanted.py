@@ -15,8 +15,6 @@ Pair: TypeAlias = tuple[str, str] | str
 """Two names of nodes: ``("n1", "n2")`` or ``"n1=n2"``."""
 Pairs: TypeAlias = Pair | Sequence[Pair]
 Numbers: TypeAlias = int | Sequence[int] | str
-Region: TypeAlias = tuple[float, float, float, float] | str
-"""First and last column and row in px: ``(100, 50, 400, 300)``, all inside."""
 
 
 def _refused(name: str, value: object, advice: str) -> ArgumentError:
@@ -65,32 +63,19 @@ def _pairs(given: Pairs) -> list[tuple[str, str]]:
     return out
 
 
-def _region(given: Region | None) -> tuple[float, float, float, float] | None:
-    if given is None:
-        return None
-    try:
-        x0, y0, x1, y1 = (float(v) for v in (given.split(",") if isinstance(given, str) else given))
-    except (TypeError, ValueError):
-        raise _refused(
-            "region", given, "Give first and last column and row, for example (100, 50, 400, 300)"
-        ) from None
-    return x0, y0, x1, y1
-
-
 def wanted_arguments(
     marker: Places | None,
     markers: int | None,
     also: Numbers,
     same: Pairs,
-    region: Region | None,
 ) -> WantedArguments:
     """The same as the compiled half takes it, which knows what makes sense.
 
     Returns
     -------
     tuple
-        Places as texts, how many markers there are, numbers, pairs of names, region in px.
+        Places as texts, how many markers there are, numbers, pairs of names.
     """
     if markers is not None and not 0 <= markers < 1 << 31:
         raise _refused("markers", markers, "Give 1 or more")
-    return _places(marker), markers, _numbers(also), _pairs(same), _region(region)
+    return _places(marker), markers, _numbers(also), _pairs(same)

@@ -4,7 +4,7 @@ use crate::motion::flow;
 use crate::parameters::{Field, Parameters};
 use crate::state::{Contact, State};
 
-/// How dry friction is taken.
+/// Law of dry friction: exact or smooth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Friction {
     /// Exact: joints stick and slip at located instants.
@@ -13,7 +13,7 @@ pub enum Friction {
     Smooth(f64),
 }
 
-/// What a pendulum's joints can do.
+/// Joints of a pendulum that can slide or stick.
 #[derive(Clone, Copy, Debug)]
 pub struct Joints {
     /// Joint has dry friction at all.

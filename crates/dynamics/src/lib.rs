@@ -16,6 +16,24 @@
 //! 2 psi a1 + (zeta + A3 cos d) a2 + A3 sin d w2^2 + sigma sin(phi1) = Q1        d = phi1 - phi2
 //! 2 lambda a2 + (zeta + A3 cos d) a1 - A3 sin d w1^2 + kappa sin(phi2) = Q2
 //! ```
+//!
+//! Energy is kept where nothing dissipates it:
+//!
+//! ```
+//! use dynamics::analysis::simulate::{Settings, simulate};
+//! use dynamics::{Field, Fixed, Parameters};
+//!
+//! let fixed = Fixed { m1_kg: 0.3, m2_kg: 0.12, l1_m: 0.17, g_m_s2: 9.81, lower_inner_m: 0.0, lower_outer_m: 0.15 };
+//! let pendulum = Parameters::zero(fixed)
+//!     .with(Field::Psi, 3.4e-3)
+//!     .with(Field::Lambda, 4.2e-4)
+//!     .with(Field::A3, 1.4e-3)
+//!     .with(Field::Sigma, 0.45)
+//!     .with(Field::Kappa, 0.081);
+//! let run = simulate(&pendulum, [2.0, 2.5, 0.0, 0.0], &[0.0, 1.0, 2.0], &Settings::default()).unwrap();
+//! let [first, .., last] = &run.samples[..] else { panic!("three times were asked for") };
+//! assert!((last.energy / first.energy - 1.0).abs() < 1e-10);
+//! ```
 
 pub mod analysis;
 mod balance;

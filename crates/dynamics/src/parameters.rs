@@ -2,7 +2,7 @@
 
 use crate::scalar::Real;
 
-/// What is never differentiated: masses carried by the joints, lengths, gravity. SI.
+/// Constants that are never differentiated: masses carried by the joints, lengths, gravity. SI.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fixed {
     /// Mass carried by joint 1 besides the lower link: the upper link with its hardware, kg.
@@ -74,9 +74,9 @@ pub enum Field {
 }
 
 impl Field {
-    /// How many there are.
+    /// Number of parameters.
     pub const COUNT: usize = 19;
-    /// All, in order.
+    /// All parameters, in order.
     pub const ALL: [Field; Field::COUNT] = [
         Field::Psi,
         Field::Lambda,

@@ -2,7 +2,7 @@
 
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-/// What the equations of motion need of a number. Comparisons are made on [`Real::value`].
+/// A number as the equations of motion need it. Comparisons are made on [`Real::value`].
 pub trait Real:
     Copy
     + Add<Output = Self>
@@ -24,7 +24,7 @@ pub trait Real:
     fn vanishes(&self) -> bool;
     /// A function of this number with the given value and derivative there.
     fn chain(self, value: f64, slope: f64) -> Self;
-    /// How many directions it is differentiated in.
+    /// Number of directions in which the scalar carries derivatives.
     const DIRECTIONS: usize;
     /// Adds `slope` times the derivatives of `inner` to the derivatives, the value left as it is.
     fn carry(&mut self, slope: f64, inner: &Self);

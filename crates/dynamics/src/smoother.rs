@@ -86,7 +86,7 @@ impl Intensity<'_> {
     }
 }
 
-/// What the forward pass keeps for the backward one.
+/// Results of the forward pass that the backward pass needs.
 struct Kept<const N: usize> {
     state: SVector<f64, N>,
     covariance: SMatrix<f64, N, N>,
@@ -208,7 +208,7 @@ pub fn smooth<const N: usize>(data: Measured<'_>, noise: &Noise) -> Smoothed<N> 
     out
 }
 
-/// How much rougher than the likeliest process the proxy of the truth in [`calibrate`] may be, as a logarithm.
+/// Largest roughness of the proxy of the truth in [`calibrate`] over that of the likeliest process, as a logarithm.
 const ROUGHER: f64 = 3.0;
 
 /// Factors by which the standard uncertainties of angle, rate and acceleration are to be multiplied.
@@ -259,7 +259,7 @@ pub fn calibrate<const N: usize>(
     factors
 }
 
-/// A film in whole pixels at rest has no scatter at all; the factor on its sigmas stops here.
+/// Least factor on the sigmas: a film in whole pixels at rest has no scatter at all.
 const LEAST_FACTOR: f64 = 1e-3;
 
 /// Added to the logarithm of every stretch's intensity. Within a stretch the motion is rough and quiet in turn, and
@@ -268,7 +268,7 @@ const LEAST_FACTOR: f64 = 1e-3;
 /// seeds apart from the tests': it raises the likelihood there and leaves [`calibrate`] little bias to estimate.
 const PRUDENCE: f64 = 1.5;
 
-/// How the noise is to be found.
+/// Settings of the search for the noise.
 #[derive(Clone, Copy, Debug)]
 pub struct Search {
     /// Whether the given uncertainties may be scaled by a common factor.

@@ -3,7 +3,7 @@
 /// `[phi1, phi2, w1, w2]`, rad and rad/s.
 pub type State<S> = [S; 4];
 
-/// How a joint's dry friction acts.
+/// Contact of a joint's dry friction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Contact {
     /// Sliding with this sign (+1 or -1) of the joint's rate (`w1`, `w2 - w1`).
@@ -14,7 +14,7 @@ pub enum Contact {
     Stuck,
 }
 
-/// What [`accelerations`] gives.
+/// Accelerations and forces of a state, as [`accelerations`] gives them.
 #[derive(Clone, Copy, Debug)]
 pub struct Motion<S> {
     /// Accelerations of the links, rad/s^2.

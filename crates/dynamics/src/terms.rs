@@ -8,7 +8,7 @@
 use crate::parameters::{Field, Fixed};
 use crate::scalar::Real;
 
-/// What a term does to the equations.
+/// Role of a term in the equations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// Takes energy out, smooth in the state.
@@ -35,7 +35,7 @@ pub enum Place {
 }
 
 impl Place {
-    /// The word for it in files and in Python.
+    /// The word in files and in Python.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -68,7 +68,7 @@ pub enum Law {
 }
 
 impl Law {
-    /// The word for it in files and in Python.
+    /// The word in files and in Python.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -95,7 +95,7 @@ impl Law {
         }
     }
 
-    /// Whether it is one of the paper's three (Table 5 corrected).
+    /// Whether the law is one of the paper's three (Table 5 corrected).
     #[must_use]
     pub const fn is_of_the_paper(self) -> bool {
         matches!(self, Law::Viscous | Law::Quadratic | Law::Load)
@@ -157,7 +157,7 @@ pub const TERMS: [Term; 13] = {
     ]
 };
 
-/// What the forces are functions of.
+/// Arguments of the forces.
 #[derive(Clone, Copy, Debug)]
 pub struct Kinematics<S> {
     /// Rates of the links, rad/s.
@@ -171,13 +171,13 @@ pub struct Kinematics<S> {
 }
 
 impl Term {
-    /// Whether it is a force, with a power and a work; else it changes inertia or gravity.
+    /// Whether the term is a force, with a power and a work; else it changes inertia or gravity.
     #[must_use]
     pub const fn is_force(&self) -> bool {
         matches!(self.kind, Kind::Drag | Kind::Dry | Kind::Drive)
     }
 
-    /// Whether its coefficient may be below zero: a drive and a direction have a sign, a loss and an inertia have none.
+    /// Whether the term's coefficient may be below zero: a drive and a direction have a sign, a loss and an inertia have none.
     #[must_use]
     pub const fn is_signed(&self) -> bool {
         matches!(self.kind, Kind::Drive | Kind::Gravity)

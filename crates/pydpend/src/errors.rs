@@ -51,7 +51,11 @@ pub fn raise(py: Python<'_>, error: Error) -> PyErr {
         Error::Interrupted => return PyKeyboardInterrupt::new_err(()),
         _ => "TrackerError",
     };
-    exception(py, class, &error.message())
+    let raised = exception(py, class, &error.message());
+    match raised.value(py).setattr("kind", error.kind().name()) {
+        Ok(()) => raised,
+        Err(error) => error,
+    }
 }
 
 /// A refusal of an argument: `name: problem. Advice`.

@@ -1,4 +1,4 @@
-//! The film maker for Python: a scene's images, truth and files.
+//! Passes the film maker to Python: a scene's images, truth and files.
 
 use std::path::PathBuf;
 
@@ -9,10 +9,12 @@ use numpy::{
 use pyo3::prelude::*;
 use tracker::error::{Error, Fault};
 use tracker::score::{Tracked, score};
+use tracker::setting_words::Worded;
+use tracker::synth::encode::Codec;
 use tracker::synth::{self, Film, MotionTable, Scene, Truth, WriteOptions};
 
 use crate::errors::raise;
-use crate::settings::cells;
+use crate::settings::OutputSettings;
 
 /// Times (T,) and angles (T, L) of a motion given from Python.
 type Motion<'py> = Option<(PyReadonlyArray1<'py, f64>, PyReadonlyArray2<'py, f64>)>;
@@ -134,47 +136,16 @@ impl PyFilm {
     }
 
     /// Writes the film and, if wanted, its truth.
-    #[pyo3(signature = (output, truth, codec, quality, x264_preset, gray_only, bits, safe_csv, replace, reads))]
-    #[expect(clippy::too_many_arguments, reason = "the options of one call of Python's")]
-    fn write(
-        &self,
-        py: Python<'_>,
-        output: PathBuf,
-        truth: Option<PathBuf>,
-        codec: Option<&str>,
-        quality: Option<u32>,
-        x264_preset: Option<String>,
-        gray_only: bool,
-        bits: Option<u32>,
-        safe_csv: bool,
-        replace: bool,
-        reads: Vec<PathBuf>,
-    ) -> PyResult<()> {
-        let codec = match codec {
-            None => None,
-            Some("h264") => Some(synth::encode::Codec::H264),
-            Some("ffv1") => Some(synth::encode::Codec::Ffv1),
-            Some("mjpeg") => Some(synth::encode::Codec::Mjpeg),
-            Some("raw") => Some(synth::encode::Codec::Raw),
-            Some(other) => {
-                let fault = Fault::new("codec", format!("{other:?} is not one"))
-                    .advice("Choose h264, ffv1, mjpeg or raw");
-                return Err(raise(py, Error::Film(fault)));
-            }
-        };
+    fn write(&self, py: Python<'_>, encoding: &EncodeSettings, output: &OutputSettings) -> PyResult<()> {
+        let path = output.named(py)?.to_owned();
         let options = WriteOptions {
-            codec,
-            quality,
-            x264_preset,
-            gray_only,
-            bits,
-            truth,
-            cells: cells(safe_csv),
-            replace,
-            reads,
+            cells: output.cells,
+            replace: output.replaces(),
+            reads: output.reads.clone(),
+            ..encoding.0.clone()
         };
         let done = py.detach(|| {
-            synth::write(&self.film, &output, &options, &mut |_| {
+            synth::write(&self.film, &path, &options, &mut |_| {
                 Python::attach(|py| py.check_signals()).map_err(|_| Error::Interrupted)
             })
         });
@@ -195,6 +166,39 @@ impl PyFilm {
         let fault = Fault::new("frame", format!("{frame} of a film of {} frames", self.film.frames()))
             .advice("Count from 0");
         Err(raise(py, Error::Film(fault)))
+    }
+}
+
+/// Settings of encoding a film, and where its truth goes.
+#[pyclass(frozen, module = "pydpend._native")]
+pub struct EncodeSettings(WriteOptions);
+
+#[pymethods]
+impl EncodeSettings {
+    /// `bits` are those of a sample.
+    #[new]
+    #[pyo3(signature = (*, truth, codec, quality, x264_preset, gray_only, bits))]
+    fn new(
+        py: Python<'_>,
+        truth: Option<PathBuf>,
+        codec: Option<&str>,
+        quality: Option<u32>,
+        x264_preset: Option<String>,
+        gray_only: bool,
+        bits: Option<u32>,
+    ) -> PyResult<Self> {
+        let codec = codec
+            .map(|word| Codec::from_word(word).map_err(|fault| raise(py, Error::Film(fault))))
+            .transpose()?;
+        Ok(Self(WriteOptions {
+            codec,
+            quality,
+            x264_preset,
+            gray_only,
+            bits,
+            truth,
+            ..WriteOptions::default()
+        }))
     }
 }
 

@@ -23,11 +23,13 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _native {
     #[pymodule_export]
-    use super::film::{PyFilm, score_places};
+    use super::film::{EncodeSettings, PyFilm, score_places};
     #[pymodule_export]
     use super::live::{LiveTracker, detect};
     #[pymodule_export]
     use super::rig::{read_rig, rig_toml, write_rig};
+    #[pymodule_export]
+    use super::settings::{OutputSettings, OverlaySettings, PyDetectSettings, PyOpenOptions, setting_words};
     #[pymodule_export]
     use super::simulation::{
         IntegratorSettings, SimulatedMotion, poincare_section, simulate_ensemble, simulate_motion,
@@ -40,7 +42,9 @@ mod _native {
         arrow_reader, check_table, damage_words, kind_of, misplaced, read_meta, read_table, write_table,
     };
     #[pymodule_export]
-    use super::track::{check_outputs, fingerprint, info, overlay_film, recording_files, setup, track};
+    use super::track::{
+        check_outputs, fingerprint, frame_range, info, overlay_film, recording_files, setup, track,
+    };
 
     #[pymodule_export]
     use super::dynamics::{follow_motion, unit_powers};

@@ -1,4 +1,4 @@
-//! Single images: detection in one, and a tracker fed one after the other.
+//! Passes detection in one image, and a tracker that is fed image by image, to Python.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use tracker::track::Tracker;
 
 use crate::errors::{argument, raise};
 use crate::images::frame_of;
-use crate::settings::{DetectArguments, detect_settings, pixel_aspect, rig};
+use crate::settings::{PyDetectSettings, pixel_aspect, rig};
 
 /// x, y in px, sigma in px, area in px, peak, elongation, flags: one entry per detection.
 type Found<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f32>>, Bound<'py, PyArray1<u8>>);
@@ -32,14 +32,12 @@ fn found<'py>(py: Python<'py>, detections: &[Detection]) -> PyResult<Found<'py>>
 pub fn detect<'py>(
     py: Python<'py>,
     image: &Bound<'py, PyAny>,
-    settings: DetectArguments,
-    area_px: (Option<f64>, Option<f64>),
+    settings: &PyDetectSettings,
     depth_bits: Option<u32>,
     aspect: Option<&str>,
 ) -> PyResult<Found<'py>> {
-    let mut settings = detect_settings(py, &settings)?;
-    (settings.min_area_px, settings.max_area_px) = area_px;
-    settings.pixel_aspect = pixel_aspect(py, aspect)?.unwrap_or_default();
+    let pixel_aspect = pixel_aspect(py, aspect)?.unwrap_or_default();
+    let settings = DetectSettings { pixel_aspect, ..settings.0.clone() };
     let frame = frame_of(image, "image", 0, 0, depth_bits)?;
     let detections = py.detach(|| {
         let frames = [frame];
@@ -86,14 +84,14 @@ impl LiveTracker {
     fn new(
         py: Python<'_>,
         rig_text: &str,
-        settings: DetectArguments,
+        settings: &PyDetectSettings,
         depth_bits: Option<u32>,
     ) -> PyResult<Self> {
-        let mut settings = detect_settings(py, &settings)?;
         let Some(rig) = rig(py, Some(rig_text))? else {
             return Err(argument(py, "rig", "there is none", "Give the rig that is filmed"));
         };
-        settings.region = rig.region.clone();
+        let mut settings = settings.0.clone();
+        settings.region = settings.region.or_else(|| rig.region.clone());
         settings.lens = rig.lens.clone();
         settings.pixel_aspect = rig.pixel_aspect;
         let tracker = Tracker::new(&rig).map_err(|e| raise(py, e))?;

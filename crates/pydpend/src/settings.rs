@@ -1,113 +1,207 @@
-//! Converts keyword arguments to the settings of a run.
-//!
-//! Owns: their words. Words are those of the command line.
+//! Converts keyword arguments to the settings of a run; their words are parsed by the library.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
 
 use pyo3::prelude::*;
 use tracker::csv_text::Cells;
-use tracker::detect::{Centroid, DetectSettings, Polarity, Threshold};
+use tracker::detect::{Centroid, DetectSettings, PolaritySetting, Threshold};
+use tracker::error::{Error, Fault};
+use tracker::overlay::FilmSettings;
+use tracker::pipeline::Existing;
 use tracker::pixel_aspect::PixelAspect;
 use tracker::rig::{Region, Rig};
+use tracker::setting_words::Worded;
 use tracker::source::{Decoder, Interlaced, OpenOptions};
+use tracker::synth::encode::Codec;
 use tracker::wanted::Wanted;
 
 use crate::errors::{argument, raise};
 
-/// One of `words`, by its place; an error that names them all.
-fn word<T: Copy>(py: Python<'_>, name: &str, given: &str, words: &[(&str, T)]) -> PyResult<T> {
-    words.iter().find(|(w, _)| *w == given).map(|(_, value)| *value).ok_or_else(|| {
-        let known: Vec<&str> = words.iter().map(|(w, _)| *w).collect();
-        argument(py, name, format!("{given:?} is not known"), &format!("Give one of {}", known.join(", ")))
-    })
+/// The value of a word.
+pub fn word<T: Worded>(py: Python<'_>, text: &str) -> PyResult<T> {
+    T::from_word(text).map_err(|fault: Fault| raise(py, Error::Argument(fault)))
 }
 
-/// How markers are detected: threshold in the recording's units or `None`, polarity, centroid.
-pub type DetectArguments = (Option<f64>, String, String);
+/// Settings of detection.
+#[pyclass(frozen, name = "DetectSettings", module = "pydpend._native")]
+pub struct PyDetectSettings(pub DetectSettings);
 
-/// Detection settings of keyword arguments.
-pub fn detect_settings(py: Python<'_>, given: &DetectArguments) -> PyResult<DetectSettings> {
-    let (threshold, polarity, centroid) = given;
-    if threshold.is_some_and(|t| !t.is_finite()) {
-        return Err(argument(py, "threshold", "it is not finite", "Give a number in the recording's units"));
+#[pymethods]
+impl PyDetectSettings {
+    /// `threshold` and areas are learned where they are None; `region` is `X0,Y0,X1,Y1`.
+    #[new]
+    #[pyo3(signature = (*, threshold=None, polarity="auto", centroid="disc", region=None, min_area_px=None, max_area_px=None))]
+    fn new(
+        py: Python<'_>,
+        threshold: Option<f64>,
+        polarity: &str,
+        centroid: &str,
+        region: Option<&str>,
+        min_area_px: Option<f64>,
+        max_area_px: Option<f64>,
+    ) -> PyResult<Self> {
+        if threshold.is_some_and(|t| !t.is_finite()) {
+            return Err(argument(
+                py,
+                "threshold",
+                "it is not finite",
+                "Give a number in the recording's units",
+            ));
+        }
+        for (name, area) in [("min_area_px", min_area_px), ("max_area_px", max_area_px)] {
+            if area.is_some_and(|a| !(a.is_finite() && a >= 0.0)) {
+                return Err(argument(py, name, "it is not an area", "Give px, 0 or more"));
+            }
+        }
+        let region: Option<Region> = region
+            .map(str::parse)
+            .transpose()
+            .map_err(|problem| argument(py, "region", problem, "The first pixel is 0,0"))?;
+        Ok(Self(DetectSettings {
+            threshold: threshold.map_or(Threshold::Auto, Threshold::Raw),
+            polarity: word::<PolaritySetting>(py, polarity)?,
+            centroid: word::<Centroid>(py, centroid)?,
+            region,
+            min_area_px,
+            max_area_px,
+            ..DetectSettings::default()
+        }))
     }
-    Ok(DetectSettings {
-        threshold: threshold.map_or(Threshold::Auto, Threshold::Raw),
-        polarity: word(
-            py,
-            "polarity",
-            polarity,
-            &[("auto", Polarity::Auto), ("bright", Polarity::Bright), ("dark", Polarity::Dark)],
-        )?,
-        centroid: word(
-            py,
-            "centroid",
-            centroid,
-            &[("weighted", Centroid::Weighted), ("contour", Centroid::Contour)],
-        )?,
-        ..DetectSettings::default()
-    })
 }
 
 /// What is to be followed: places that were pointed at, how many markers there are, numbers of the picture, pairs of nodes that
-/// are one, and the region in px.
-pub type WantedArguments =
-    (Vec<String>, Option<usize>, Vec<usize>, Vec<(String, String)>, Option<(f64, f64, f64, f64)>);
+/// are one.
+pub type WantedArguments = (Vec<String>, Option<usize>, Vec<usize>, Vec<(String, String)>);
 
-/// What is to be followed, and the region.
-pub fn wanted(py: Python<'_>, given: &WantedArguments) -> PyResult<(Wanted, Option<Region>)> {
-    let (marker, markers, also, same, region) = given.clone();
+/// What is to be followed.
+pub fn wanted(py: Python<'_>, given: WantedArguments) -> PyResult<Wanted> {
+    let (marker, markers, also, same) = given;
     let place = |text: String| {
         text.parse().map_err(|why: String| {
             argument(py, "marker", format!("{text:?} cannot be"), &format!("It is {why}"))
         })
     };
-    if let Some((x0, y0, x1, y1)) = region
-        && ![x0, y0, x1, y1].iter().all(|v| v.is_finite())
-    {
-        return Err(argument(py, "region", "it is not finite", "Give first and last column and row in px"));
-    }
     let marker = marker.into_iter().map(place).collect::<PyResult<Vec<_>>>()?;
     let same = same.into_iter().map(|(a, b)| [a, b]).collect();
-    let region = region.map(|(x0, y0, x1, y1)| Region::Rectangle([x0, y0, x1, y1]));
-    Ok((Wanted { marker, markers, also, same }, region))
+    Ok(Wanted { marker, markers, also, same })
 }
 
-/// How a recording is read: rate or `None`, decoder, how interlaced film is read, whether addresses may be opened,
-/// threads, pixel aspect or `None`.
-pub type OpenArguments = (Option<f64>, String, String, bool, usize, Option<String>);
+/// Options of opening a recording.
+#[pyclass(frozen, name = "OpenOptions", module = "pydpend._native")]
+pub struct PyOpenOptions(pub OpenOptions);
 
-/// Of `W:H`.
-pub fn pixel_aspect(py: Python<'_>, given: Option<&str>) -> PyResult<Option<PixelAspect>> {
-    let wrong = |problem| argument(py, "pixel_aspect", problem, "Give for example 16:15");
-    given.map(str::parse).transpose().map_err(wrong)
+#[pymethods]
+impl PyOpenOptions {
+    /// `threads` is 0 for one each core, `pixel_aspect` is `W:H`.
+    #[new]
+    #[pyo3(signature = (*, fps=None, decoder="auto", interlaced="refuse", allow_protocol=false, threads=0, pixel_aspect=None))]
+    fn new(
+        py: Python<'_>,
+        fps: Option<f64>,
+        decoder: &str,
+        interlaced: &str,
+        allow_protocol: bool,
+        threads: usize,
+        pixel_aspect: Option<&str>,
+    ) -> PyResult<Self> {
+        Ok(Self(OpenOptions {
+            fps,
+            pixel_aspect: self::pixel_aspect(py, pixel_aspect)?,
+            decoder: word::<Decoder>(py, decoder)?,
+            interlaced: word::<Interlaced>(py, interlaced)?,
+            allow_protocol,
+            threads,
+            colour: false,
+        }))
+    }
 }
 
-/// Reading options of keyword arguments.
-pub fn open_options(py: Python<'_>, given: &OpenArguments) -> PyResult<OpenOptions> {
-    let (fps, decoder, interlaced, allow_protocol, threads, aspect) = given;
-    Ok(OpenOptions {
-        fps: *fps,
-        pixel_aspect: pixel_aspect(py, aspect.as_deref())?,
-        decoder: word(
-            py,
-            "decoder",
-            decoder,
-            &[("auto", Decoder::Auto), ("ffmpeg", Decoder::Ffmpeg), ("opencv", Decoder::Opencv)],
-        )?,
-        interlaced: word(
-            py,
-            "interlaced",
-            interlaced,
-            &[("refuse", Interlaced::Refuse), ("as-frames", Interlaced::AsFrames)],
-        )?,
-        allow_protocol: *allow_protocol,
-        threads: *threads,
-        colour: false,
-    })
+/// Settings of the output of a run.
+#[pyclass(frozen, module = "pydpend._native")]
+pub struct OutputSettings {
+    /// The file; `None` writes none.
+    pub path: Option<PathBuf>,
+    /// What is done where it is there already.
+    pub existing: Existing,
+    /// Form of the names in a CSV.
+    pub cells: Cells,
+    /// Files that are read, which no output replaces.
+    pub reads: Vec<PathBuf>,
+}
+
+#[pymethods]
+impl OutputSettings {
+    /// `existing` is `refuse`, `replace` or `resume`.
+    #[new]
+    #[pyo3(signature = (path, *, existing="refuse", safe_csv=false, reads=Vec::new()))]
+    fn new(
+        py: Python<'_>,
+        path: Option<PathBuf>,
+        existing: &str,
+        safe_csv: bool,
+        reads: Vec<PathBuf>,
+    ) -> PyResult<Self> {
+        let existing = match existing {
+            "refuse" => Existing::Refuse,
+            "replace" => Existing::Replace,
+            "resume" => Existing::Resume,
+            other => return Err(argument(py, "existing", format!("{other:?} is not known"), "Give refuse")),
+        };
+        Ok(Self { path, existing, cells: cells(safe_csv), reads })
+    }
+}
+
+impl OutputSettings {
+    /// Whether a file that is there already is replaced.
+    pub fn replaces(&self) -> bool {
+        self.existing == Existing::Replace
+    }
+
+    /// The file of a step that always writes one.
+    pub fn named(&self, py: Python<'_>) -> PyResult<&Path> {
+        self.path.as_deref().ok_or_else(|| argument(py, "output", "it is not named", "Give a file"))
+    }
+}
+
+/// Settings of a film into which nodes are drawn.
+#[pyclass(frozen, module = "pydpend._native")]
+pub struct OverlaySettings(pub FilmSettings);
+
+#[pymethods]
+impl OverlaySettings {
+    /// `width` is in px, None is the recording's.
+    #[new]
+    #[pyo3(signature = (*, every, width, play_fps, quality))]
+    fn new(every: usize, width: Option<u32>, play_fps: u32, quality: u32) -> Self {
+        Self(FilmSettings { play_fps, quality, every, width, replace: false })
+    }
 }
 
 /// How a CSV writes names.
 pub fn cells(safe_csv: bool) -> Cells {
     if safe_csv { Cells::Safe } else { Cells::Plain }
+}
+
+/// The words of each setting that has words, the default first.
+#[pyfunction]
+pub fn setting_words() -> HashMap<&'static str, Vec<&'static str>> {
+    fn words<T: Worded>() -> (&'static str, Vec<&'static str>) {
+        (T::SETTING.name(), T::WORDS.iter().map(|(word, _)| *word).collect())
+    }
+    HashMap::from([
+        words::<PolaritySetting>(),
+        words::<Centroid>(),
+        words::<Decoder>(),
+        words::<Interlaced>(),
+        words::<Codec>(),
+    ])
+}
+
+/// The pixel aspect of `W:H`.
+pub fn pixel_aspect(py: Python<'_>, given: Option<&str>) -> PyResult<Option<PixelAspect>> {
+    let wrong = |problem| argument(py, "pixel_aspect", problem, "Give for example 16:15");
+    given.map(str::parse).transpose().map_err(wrong)
 }
 
 /// A rig of its JSON, checked.

@@ -122,7 +122,7 @@ impl Segments<'_> {
     }
 }
 
-/// What a fit is asked for. See `pydpend.damping.shooting.solve` for each.
+/// Settings of a fit. See `pydpend.damping.shooting.solve` for each.
 #[pyclass(frozen, module = "pydpend._native")]
 pub struct ShootingSettings(Settings);
 

@@ -15,7 +15,7 @@ use pyo3::prelude::*;
 
 use crate::dynamics::parameters;
 
-/// How a motion is integrated.
+/// Settings of the integrator.
 #[pyclass(frozen, module = "pydpend._native")]
 pub struct IntegratorSettings(Settings);
 

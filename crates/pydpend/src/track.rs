@@ -1,24 +1,24 @@
-//! Whole recordings: `track`, `setup`, `overlay`, `info`.
+//! Passes the work on whole recordings to Python: `track`, `setup`, `overlay`, `info`.
 
 use std::path::{Path, PathBuf};
 
 use numpy::{IntoPyArray, PyArray1, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use serde_json::json;
-use tracker::detect::DetectSettings;
 use tracker::error::Error;
 use tracker::message::Message;
 use tracker::name::text;
 use tracker::output;
 use tracker::overlay::{self, FilmSettings};
-use tracker::pipeline::{self, Existing, RunSettings};
+use tracker::pipeline::{self, RunSettings};
 use tracker::source;
 use tracker::table::{Fingerprint, SourceFacts};
+use tracker::wanted::Wanted;
 
 use crate::errors::{argument, raise, to_python};
 use crate::rig::rig_json;
 use crate::settings::{
-    DetectArguments, OpenArguments, WantedArguments, cells, detect_settings, open_options, rig, wanted,
+    OutputSettings, OverlaySettings, PyDetectSettings, PyOpenOptions, WantedArguments, rig, wanted,
 };
 use crate::tables::{Columns, Held, columns, table_of};
 use crate::watch::Watch;
@@ -27,25 +27,29 @@ use crate::watch::Watch;
 type Frames = Option<(u64, Option<u64>)>;
 
 fn settings(
-    py: Python<'_>,
     input: PathBuf,
-    rig_text: Option<&str>,
     frames: Frames,
-    detect: &DetectArguments,
-    open: &OpenArguments,
-    given: &WantedArguments,
-) -> PyResult<RunSettings> {
-    let (wanted, region) = wanted(py, given)?;
-    Ok(RunSettings {
+    detect: &PyDetectSettings,
+    open: &PyOpenOptions,
+    wanted: Wanted,
+) -> RunSettings {
+    RunSettings {
         input: text(&input),
-        rig: rig(py, rig_text)?,
         frames: frames.map(|(start, end)| start..end.unwrap_or(u64::MAX)),
-        detect: DetectSettings { region, ..detect_settings(py, detect)? },
+        detect: detect.0.clone(),
         wanted,
-        threads: open.4,
-        open: open_options(py, open)?,
+        threads: open.0.threads,
+        open: open.0.clone(),
         ..RunSettings::default()
-    })
+    }
+}
+
+/// The frames of `A..B`, of which B may be left out.
+#[pyfunction]
+pub fn frame_range(py: Python<'_>, text: &str) -> PyResult<(u64, Option<u64>)> {
+    let frames = pipeline::frame_range(text)
+        .map_err(|problem| argument(py, "frames", format!("{text:?} cannot be"), &problem))?;
+    Ok((frames.start, (frames.end < u64::MAX).then_some(frames.end)))
 }
 
 /// Warnings as messages of `pydpend.errors`.
@@ -63,25 +67,20 @@ pub fn track<'py>(
     input: PathBuf,
     rig: Option<&str>,
     frames: Frames,
-    detect: DetectArguments,
-    open: OpenArguments,
+    detect: &PyDetectSettings,
+    open: &PyOpenOptions,
     wanted: WantedArguments,
-    output: Option<PathBuf>,
-    existing: &str,
-    safe_csv: bool,
-    reads: Vec<PathBuf>,
+    output: &OutputSettings,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<(Columns<'py>, Messages<'py>, Option<PyErr>)> {
-    let mut settings = settings(py, input, rig, frames, &detect, &open, &wanted)?;
-    settings.output = output;
-    settings.collect = true;
-    settings.cells = cells(safe_csv);
-    settings.reads = reads;
-    settings.existing = match existing {
-        "refuse" => Existing::Refuse,
-        "replace" => Existing::Replace,
-        "resume" => Existing::Resume,
-        other => return Err(argument(py, "existing", format!("{other:?} is not known"), "Give refuse")),
+    let settings = RunSettings {
+        rig: self::rig(py, rig)?,
+        output: output.path.clone(),
+        existing: output.existing,
+        collect: true,
+        cells: output.cells,
+        reads: output.reads.clone(),
+        ..settings(input, frames, detect, open, self::wanted(py, wanted)?)
     };
     let mut watch = Watch::new(progress);
     let outcome = py.detach(|| pipeline::run(&settings, &mut watch));
@@ -98,7 +97,7 @@ pub fn track<'py>(
 /// A rig as JSON, warnings, and the reference picture with the rig drawn, (H, W, 3).
 type Found<'py> = (String, Messages<'py>, Bound<'py, PyArray3<u8>>);
 
-/// Lines, samples red, green, blue, rows and columns.
+/// Lines, samples red, green, blue, width and height.
 type Unclear = (Vec<String>, Vec<u8>, [usize; 2]);
 
 /// What was found where it is not clear what is meant: a line of each, and the picture, which is also written if a file is given.
@@ -107,10 +106,10 @@ fn drawn(settings: &RunSettings, file: Option<&Path>, watch: &mut Watch) -> Opti
     let found = watch.candidates.take().filter(|c| !c.all.is_empty())?;
     let picture = tracker::setup::picture_of(settings, &found, watch).ok()?;
     if let Some(path) = file {
-        overlay::save(&picture, path).ok()?;
+        picture.save(path).ok()?;
     }
     let lines = found.all.iter().map(|c| c.line()).collect();
-    Some((lines, overlay::rgb(&picture).ok()?, overlay::size(&picture)))
+    Some((lines, picture.rgb().ok()?, picture.size_px()))
 }
 
 /// Finds the rig of a recording; rig and picture are also written if files are given.
@@ -120,45 +119,39 @@ pub fn setup<'py>(
     py: Python<'py>,
     input: PathBuf,
     frames: Frames,
-    detect: DetectArguments,
-    open: OpenArguments,
+    detect: &PyDetectSettings,
+    open: &PyOpenOptions,
     wanted: WantedArguments,
-    output: Option<PathBuf>,
+    output: &OutputSettings,
     picture: Option<PathBuf>,
-    replace: bool,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Found<'py>> {
-    let settings = settings(py, input, None, frames, &detect, &open, &wanted)?;
+    let settings = settings(input, frames, detect, open, self::wanted(py, wanted)?);
     let mut watch = Watch::new(progress);
     let mut unclear = None;
     let outcome = py.detach(|| {
-        let outputs: Vec<PathBuf> = output.iter().chain(&picture).cloned().collect();
-        output::check(&outputs, &source::files(&settings.input)?, replace).map_err(Error::Rig)?;
+        let outputs: Vec<PathBuf> = output.path.iter().chain(&picture).cloned().collect();
+        output::check(&outputs, &source::files(&settings.input)?, output.replaces()).map_err(Error::Rig)?;
         let found = tracker::setup::find(&settings, &mut watch);
         if let Err(Error::Detect(_) | Error::Rig(_)) = &found {
             unclear = drawn(&settings, picture.as_deref(), &mut watch);
         }
         let found = found?;
         if let Some(path) = &picture {
-            overlay::save(&found.picture, path)?;
+            found.picture.save(path)?;
         }
-        if let Some(path) = &output {
+        if let Some(path) = &output.path {
             found.rig.write(path)?;
         }
-        Ok((
-            rig_json(&found.rig)?,
-            found.warnings,
-            overlay::rgb(&found.picture)?,
-            overlay::size(&found.picture),
-        ))
+        Ok((rig_json(&found.rig)?, found.warnings, found.picture.rgb()?, found.picture.size_px()))
     });
     let outcome = watch.done(py, outcome);
-    if let (Err(error), Some((lines, samples, [h, w]))) = (&outcome, unclear) {
+    if let (Err(error), Some((lines, samples, [w, h]))) = (&outcome, unclear) {
         let exception = error.value(py);
         exception.setattr("candidates", lines)?;
         exception.setattr("picture", samples.into_pyarray(py).reshape([h, w, 3])?)?;
     }
-    let (rig, warnings, samples, [h, w]) = outcome?;
+    let (rig, warnings, samples, [w, h]) = outcome?;
     let picture = samples.into_pyarray(py).reshape([h, w, 3])?;
     Ok((rig, messages(py, &warnings)?, picture))
 }
@@ -168,30 +161,24 @@ type Filmed<'py> = (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<f64>>);
 
 /// Draws nodes into their recording: of each picture of the film the frame and the time in s, (K,).
 #[pyfunction]
-#[expect(clippy::too_many_arguments, reason = "the options of one call of Python's")]
 pub fn overlay_film<'py>(
     py: Python<'py>,
     input: PathBuf,
     held: Held<'_>,
     meta: &str,
-    output: PathBuf,
-    open: OpenArguments,
-    every: usize,
-    width: Option<u32>,
-    play_fps: u32,
-    quality: u32,
-    replace: bool,
-    reads: Vec<PathBuf>,
+    open: &PyOpenOptions,
+    film: &OverlaySettings,
+    output: &OutputSettings,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Filmed<'py>> {
     let table = table_of(py, &held, meta)?;
-    let open = open_options(py, &open)?;
-    let settings = FilmSettings { play_fps, quality, every, width, replace };
+    let settings = FilmSettings { replace: output.replaces(), ..film.0 };
+    let path = output.named(py)?.to_owned();
     let mut watch = Watch::new(progress);
     let outcome = py.detach(|| {
         table.check("nodes")?;
-        output::check(std::slice::from_ref(&output), &reads, replace).map_err(Error::Film)?;
-        overlay::film(&text(&input), &open, &table, &output, &settings, &mut watch)
+        output::check(std::slice::from_ref(&path), &output.reads, settings.replace).map_err(Error::Film)?;
+        overlay::film(&text(&input), &open.0, &table, &path, &settings, &mut watch)
     });
     let filmed = watch.done(py, outcome)?;
     Ok((filmed.frame.into_pyarray(py), filmed.time_s.into_pyarray(py)))
@@ -199,13 +186,12 @@ pub fn overlay_film<'py>(
 
 /// What is known of a recording before it is read through, as JSON.
 #[pyfunction]
-pub fn info(py: Python<'_>, input: PathBuf, open: OpenArguments) -> PyResult<String> {
-    let options = open_options(py, &open)?;
+pub fn info(py: Python<'_>, input: PathBuf, open: &PyOpenOptions) -> PyResult<String> {
     let mut watch = Watch::new(None);
     let known = py.detach(|| {
         let input = text(&input);
         let files = source::files(&input)?;
-        let mut source = pipeline::open(&input, &options, &mut watch)?;
+        let mut source = pipeline::open(&input, &open.0, &mut watch)?;
         let surveyed = pipeline::survey(&mut *source)?;
         let info = source.info();
         let (steps, is_whole) = surveyed.unwrap_or_default();

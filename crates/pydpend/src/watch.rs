@@ -10,9 +10,9 @@ use tracker::pipeline::{Candidates, Observer, Stage};
 
 use crate::errors::raise;
 
-/// Between two calls into Python.
+/// Least time between two calls into Python.
 const EVERY: Duration = Duration::from_millis(100);
-/// After which a stopped run leaves its table too; what is detected is kept beside the output.
+/// Time after which a stopped run leaves its table too; the detections are kept beside the output.
 const PATIENCE: Duration = Duration::from_millis(600);
 
 /// Calls `callback(stage, done, total)` and looks for signals.

@@ -1,4 +1,4 @@
-//! Threads that belong to the process that asks.
+//! Provides a thread pool that belongs to the process that asks.
 //!
 //! A fork copies the memory of a thread pool and none of its threads: work handed to such a pool waits for ever.
 //! rayon's global pool is built once and never anew, so nothing that Python can reach may use it: a parent that used
@@ -28,7 +28,7 @@ pub fn install<T: Send>(work: impl FnOnce() -> T + Send) -> T {
     }
 }
 
-/// How many threads [`install`] shares work out to.
+/// Number of threads that [`install`] shares work out to.
 #[must_use]
 pub fn count() -> usize {
     if rayon::current_thread_index().is_some() { rayon::current_num_threads() } else { cores() }

@@ -7,7 +7,7 @@
 //! text". Readers take the mark off again; so that they can tell it from a name's own, a name that looks marked already
 //! is marked once more, always.
 
-/// How text cells are written.
+/// Form of text cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Cells {
     /// As they are.

@@ -12,7 +12,7 @@ use crate::gaps::Gaps;
 use crate::message::Message;
 use crate::pixel_aspect::{AspectOrigin, PixelAspect};
 
-/// How the samples of one row are stored.
+/// Storage of the samples of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum PixelFormat {
     /// One byte per pixel.
@@ -127,7 +127,7 @@ impl fmt::Debug for Frame {
     }
 }
 
-/// Where a recording's rate comes from; the strongest claim first.
+/// Origin of a recording's rate; the strongest claim first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RateOrigin {
@@ -145,7 +145,7 @@ pub enum RateOrigin {
     Unknown,
 }
 
-/// What a recording says of its rate beside the time stamps of its frames.
+/// Claims of a recording about its rate, beside the time stamps of its frames.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct RateClaims {
     /// Rates that the container gives, the likeliest first: frames per second as numerator and denominator, both
@@ -166,7 +166,7 @@ pub struct CaptureClaim {
     pub rate_hz: f64,
 }
 
-/// What is known of a recording before it is read through. `None` is unknown.
+/// Facts of a recording that are known before it is read through. `None` is unknown.
 #[derive(Debug, Clone)]
 pub struct SourceInfo {
     /// The name as the user gave it, `-` for standard input.
@@ -207,7 +207,7 @@ pub struct SourceInfo {
     pub warnings: Vec<Message>,
 }
 
-/// How a recording ended, known once [`FrameSource::next_frame`] gave `None`.
+/// Ending of a recording, known once [`FrameSource::next_frame`] gave `None`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Ending {
     /// All that was declared was read.
@@ -225,7 +225,7 @@ pub enum Ending {
 
 /// A recording that is read forward, once. Never sought by frame number.
 pub trait FrameSource: Send {
-    /// What is known of the recording.
+    /// Facts of the recording.
     fn info(&self) -> &SourceInfo;
 
     /// The next frame in display order, or `None` at the end; then ask [`FrameSource::ending`].
@@ -235,7 +235,7 @@ pub trait FrameSource: Send {
     /// without a plane, a damaged end as `None` with [`Ending::Early`].
     fn next_frame(&mut self) -> Result<Option<Frame>>;
 
-    /// How the recording ended. Before its end: `Complete`.
+    /// Ending of the recording. Before its end: `Complete`.
     fn ending(&self) -> Ending;
 
     /// Time stamps of the frames in display order, without decoding any, and whether these are all: of a long

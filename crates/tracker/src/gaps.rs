@@ -1,12 +1,12 @@
-//! Frames that are not there between two that are, and frames that cannot be decoded.
+//! Counts the frames that lack between two that are there, and the frames that cannot be decoded.
 //!
 //! Owns: [`Gap`], [`Gaps`], [`Stretches`], how they are told. Must not: read anything.
 
 use serde::{Deserialize, Serialize};
 
-/// Places that are kept of those that are counted.
+/// Maximum number of places that are kept; more are only counted.
 const MOST_KEPT: usize = 1000;
-/// Places that a sentence names.
+/// Maximum number of places that a sentence names.
 const MOST_TOLD: usize = 8;
 
 /// Why frames are not there.
@@ -75,7 +75,7 @@ impl Gaps {
         self.lost_places > 0
     }
 
-    /// Those between frames of `range`.
+    /// The gaps between frames of `range`.
     pub fn within(&self, range: &std::ops::Range<u64>) -> Self {
         let mut within = Self::default();
         let inside = |g: &&Gap| match g.after {
@@ -183,7 +183,7 @@ fn listed(parts: &[String]) -> String {
     }
 }
 
-/// What of a recording is not there: frames that cannot be decoded, and gaps.
+/// Damage of a recording: frames that cannot be decoded, and gaps.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Damage {
     /// Frames that are there but cannot be decoded.

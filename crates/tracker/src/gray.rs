@@ -1,8 +1,8 @@
-//! A frame's brightness in 8 bits, for pictures and for looking at what moves.
+//! Converts a frame to its brightness in 8 bits, for pictures and for looking at what moves.
 //!
 //! Owns: [`gray8`]. Must not: serve measurement where a recording has more than 8 bits.
 
-use crate::error::{Error, Fault, Result};
+use crate::error::{Error, Fault, FaultKind, Result};
 use crate::frame::{Frame, PixelFormat};
 
 /// Samples of a frame by their upper 8 bits, row by row; zeros where it could not be decoded.
@@ -13,10 +13,13 @@ pub fn gray8(frame: &Frame) -> Result<Vec<u8>> {
     let (w, h) = (frame.width as usize, frame.height as usize);
     let Some(bytes) = frame.bytes()? else { return Ok(vec![0; w * h]) };
     let short = || {
-        Error::Source(Fault::new(
-            format!("frame {}", frame.index),
-            format!("{} bytes are too few for {w} x {h} px", bytes.len()),
-        ))
+        Error::Source(
+            Fault::new(
+                format!("frame {}", frame.index),
+                format!("{} bytes are too few for {w} x {h} px", bytes.len()),
+            )
+            .of_kind(FaultKind::Damaged),
+        )
     };
     let down = frame.depth_bits.saturating_sub(8);
     let shown = |v: u32| (v >> down).min(255) as u8;

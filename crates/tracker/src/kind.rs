@@ -1,4 +1,4 @@
-//! What a file or folder is, by what is in it: for a user who gave it to the wrong command.
+//! Tells what a file or folder is by what is in it: for a user who gave it to the wrong command.
 //!
 //! Knows the names of the columns and keys in every file of both programs, and nothing of what they mean. Owns:
 //! [`Kind`], [`kind_of`], [`misplaced`], [`expect`]. Must not: read more than a beginning (or a Parquet file's end), or refuse what
@@ -10,12 +10,12 @@ use std::path::{Path, PathBuf};
 
 use ::parquet::file::reader::{FileReader, SerializedFileReader};
 
-use crate::error::{Error, Fault, Result};
+use crate::error::{Error, Fault, FaultKind, Result};
 use crate::message::{Message, Step};
 use crate::name::shell_word;
 use crate::packed::{first_part, is_packed, unpacking};
 
-/// What a file or folder is.
+/// Kinds of files and folders.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// A film of any container.
@@ -82,7 +82,7 @@ impl Kind {
         Self::Unknown,
     ];
 
-    /// Its name in Python.
+    /// Name of the kind in Python.
     pub fn name(self) -> &'static str {
         match self {
             Self::Film => "film",
@@ -107,7 +107,7 @@ impl Kind {
         }
     }
 
-    /// What it is called, with its article.
+    /// Noun of the kind, with its article.
     pub fn noun(self) -> &'static str {
         match self {
             Self::Film => "a film",
@@ -281,7 +281,8 @@ pub fn misplaced(path: &Path, wanted: &[Kind]) -> Option<Fault> {
     let (last, before) = nouns.split_last()?;
     let expected =
         if before.is_empty() { (*last).to_owned() } else { format!("{} or {last}", before.join(", ")) };
-    let fault = Fault::new(path.display(), format!("it is {}, not {expected}", kind.noun()));
+    let fault = Fault::new(path.display(), format!("it is {}, not {expected}", kind.noun()))
+        .of_kind(FaultKind::Unsupported);
     let inside = if kind == Kind::RunFolder { wanted.iter().find_map(|w| part_of(path, *w)) } else { None };
     Some(match inside {
         Some((what, file)) => fault.advice(format!("Give its {what}, {}", file.display())),
@@ -300,7 +301,7 @@ pub fn expect(path: &Path, wanted: &[Kind], part: fn(Fault) -> Error) -> Result<
 /// Bytes that are looked at.
 const BEGINNING: u64 = 1 << 16;
 
-/// What a file or folder is, by what is in it.
+/// The kind of a file or folder, by what is in it.
 pub fn kind_of(path: &Path) -> Kind {
     if path.is_dir() {
         return kind_of_folder(path);

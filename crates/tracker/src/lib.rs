@@ -9,6 +9,33 @@
 //!
 //! Image coordinates: x right, y down, pixel centres at integers, the first pixel is (0, 0). Times are integer
 //! ticks with a time base until they are written.
+//!
+//! A film of a known scene is written and its markers are followed, without any setting:
+//!
+//! ```
+//! use tracker::pipeline::{RunSettings, Silent, run};
+//! use tracker::synth::{Film, WriteOptions, preset, write};
+//!
+//! # let folder = tempfile::tempdir().unwrap();
+//! # let path = folder.path().join("drop.mraw");
+//! let mut scene = preset("clean", 1)?;
+//! scene.frames = 100;
+//! write(&Film::new(&scene)?, &path, &WriteOptions::default(), &mut |_| Ok(()))?;
+//!
+//! let settings = RunSettings { input: path.display().to_string(), collect: true, ..RunSettings::default() };
+//! let summary = run(&settings, &mut Silent)?;
+//! let rig = &summary.meta.rig;
+//! assert_eq!((summary.frames, rig.nodes.len(), rig.bodies.len()), (100, 9, 2));
+//! # Ok::<(), tracker::error::Error>(())
+//! ```
+//!
+//! Features: `ffmpeg` reads and writes compressed film, `opencv` decodes pictures, corrects lenses and draws, `cli` is the
+//! program; all are on by default. Without the first two, cameras' own files (Photron, NorPix) and TIFF stacks are read.
+
+#![cfg_attr(
+    not(all(feature = "ffmpeg", feature = "opencv")),
+    allow(dead_code, unused_imports, reason = "what only the left-out parts use")
+)]
 
 pub mod csv_text;
 pub mod detect;
@@ -23,6 +50,7 @@ pub mod moving;
 pub mod name;
 pub mod observation;
 pub mod output;
+#[cfg(feature = "opencv")]
 pub mod overlay;
 mod packed;
 pub mod peak_level;
@@ -32,6 +60,8 @@ pub mod residual;
 pub mod rig;
 pub(crate) mod rigid;
 pub mod score;
+pub mod setting_words;
+#[cfg(feature = "opencv")]
 pub mod setup;
 pub mod source;
 pub mod stop;

@@ -1,7 +1,25 @@
-//! A text that names settings as data, so that each front end can name them as its user writes them.
+//! Defines a text that names settings as data, so that each front end can name them as its user writes them.
 //!
 //! The library says `"Go on with " + Setting::Resume`; the program `tracker` prints `Go on with --resume`, Python
-//! raises `Go on with resume=True`. Owns: [`Setting`], [`Step`], [`Piece`], [`Message`],
+//! raises `Go on with resume=True`:
+//!
+//! ```
+//! use tracker::message::{FrontEnd, Setting};
+//!
+//! struct Flags;
+//! impl FrontEnd for Flags {
+//!     fn setting(&self, setting: Setting, _: Option<&str>) -> String {
+//!         format!("--{}", setting.name().replace('_', "-"))
+//!     }
+//!     fn step(&self, command: &str, _: &str) -> String {
+//!         command.to_owned()
+//!     }
+//! }
+//! let message = "Leave out " + Setting::AllowProtocol;
+//! assert_eq!(message.render(&Flags), "Leave out --allow-protocol");
+//! ```
+//!
+//! Owns: [`Setting`], [`Step`], [`Piece`], [`Message`],
 //! [`FrontEnd`]. Must not: know how a front
 //! end writes a setting.
 
@@ -9,7 +27,7 @@ use std::borrow::Cow;
 use std::fmt;
 use std::ops::Add;
 
-/// What a caller can set, under the name of the keyword in Python; the flag is that name with hyphens.
+/// Settings that a caller has, under the name of the keyword in Python; the flag is that name with hyphens.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Setting {
     /// Network addresses and devices are opened too; a switch.
@@ -18,6 +36,8 @@ pub enum Setting {
     Also,
     /// Bits per pixel of a film that is made.
     Bits,
+    /// How the centre of a marker is taken.
+    Centroid,
     /// Codec of a film that is made.
     Codec,
     /// What reads compressed film.
@@ -74,10 +94,11 @@ pub enum Setting {
 
 impl Setting {
     /// All of them.
-    pub const ALL: [Self; 29] = [
+    pub const ALL: [Self; 30] = [
         Self::AllowProtocol,
         Self::Also,
         Self::Bits,
+        Self::Centroid,
         Self::Codec,
         Self::Decoder,
         Self::Every,
@@ -106,12 +127,13 @@ impl Setting {
         Self::X264Preset,
     ];
 
-    /// Its name, in lower case with underscores.
+    /// Name of the setting, in lower case with underscores.
     pub fn name(self) -> &'static str {
         match self {
             Self::AllowProtocol => "allow_protocol",
             Self::Also => "also",
             Self::Bits => "bits",
+            Self::Centroid => "centroid",
             Self::Codec => "codec",
             Self::Decoder => "decoder",
             Self::Every => "every",
@@ -176,7 +198,7 @@ pub struct Message {
     pieces: Vec<Piece>,
 }
 
-/// How a front end writes what a message names.
+/// A front end's way of writing what a message names.
 pub trait FrontEnd {
     /// A setting: `--decoder opencv`, `decoder='opencv'`.
     fn setting(&self, setting: Setting, value: Option<&str>) -> String;

@@ -1,4 +1,4 @@
-//! Names of files as text: without loss on the way in, harmless on the way to a terminal.
+//! Converts names of files to text: without loss on the way in, harmless on the way to a terminal.
 //!
 //! Owns: [`text`], [`path`], [`shown`], [`shown_json`], [`shell_word`]. A name on a disk is bytes. One that is not UTF-8 is carried as
 //! text whose undecodable bytes are private characters, as Python carries them as surrogates.

@@ -6,7 +6,7 @@ use nalgebra::Vector2;
 
 use crate::pixel_aspect::PixelAspect;
 
-/// What is known of a node in a frame.
+/// State of a node in a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[repr(u8)]
 pub enum Status {

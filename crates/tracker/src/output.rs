@@ -1,4 +1,4 @@
-//! Files that are written: whole under their names or not at all, and never over what is read.
+//! Writes files whole under their names or not at all, and never over what is read.
 //!
 //! Owns: [`NewFile`], [`check`]. Must not: know what is in a file.
 
@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use tempfile::TempPath;
 
-use crate::error::Fault;
+use crate::error::{Fault, FaultKind};
 use crate::name::text;
 
 /// The folder that a file lies in.
@@ -153,7 +153,9 @@ pub fn check(outputs: &[PathBuf], inputs: &[PathBuf], replace: bool) -> Result<(
         }
         let same = |other: &&PathBuf| place(other).is_some_and(|p| Some(p) == place(output));
         if outputs[..i].iter().any(|other| same(&other)) {
-            return Err(Fault::new(name, "two outputs have this name").advice("Give each a name of its own"));
+            return Err(Fault::new(name, "two outputs have this name")
+                .of_kind(FaultKind::Setting)
+                .advice("Give each a name of its own"));
         }
         // A link that leads nowhere is there too.
         if !replace && output.symlink_metadata().is_ok() {

@@ -1,4 +1,4 @@
-//! Packed files and archives, by what they begin with, and the command that unpacks each.
+//! Tells packed files and archives by what they begin with, and the command that unpacks each.
 //!
 //! Owns: [`is_packed`], [`first_part`], [`unpacking`]. Must not: unpack.
 
@@ -8,7 +8,7 @@ use std::path::Path;
 
 use crate::name::shell_word;
 
-/// How a packed file is unpacked.
+/// Command that unpacks a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Command {
     /// This program writes the one file that is in it to its output.

@@ -12,6 +12,13 @@ use nalgebra::Vector2;
 use crate::message::{Message, Setting};
 
 /// Width to height of a pixel, in lowest terms.
+///
+/// ```
+/// use tracker::pixel_aspect::PixelAspect;
+///
+/// let pal: PixelAspect = "32:30".parse().unwrap();
+/// assert_eq!((pal.to_string().as_str(), pal.is_square()), ("16:15", false));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct PixelAspect {
@@ -19,15 +26,15 @@ pub struct PixelAspect {
     height: u32,
 }
 
-/// Pixels more than so many times as wide as high, or as high as wide, are those of no camera. The most that H.264 and
+/// Largest ratio of a pixel's sides that a camera may have. The most that H.264 and
 /// HEVC have a number for is 32:11; a field of a film that is 2:1 already has 4:1.
 pub const MOST_TIMES: u32 = 4;
 
-/// Ratios that differ by less than this part are the same: containers round the width at which a film is shown to whole
+/// Relative difference below which two ratios are the same: containers round the width at which a film is shown to whole
 /// pixels, one in some thousand.
 const SAME_PART: f64 = 2e-3;
 
-/// Where a recording's pixel aspect comes from.
+/// Origin of a recording's pixel aspect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum AspectOrigin {

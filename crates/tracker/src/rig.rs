@@ -3,6 +3,7 @@
 //! Owns: [`Rig`] and what makes one valid. Must not: look at a recording (`discover` does).
 
 use std::path::Path;
+use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
@@ -80,6 +81,18 @@ impl Region {
     }
 }
 
+impl FromStr for Region {
+    type Err = &'static str;
+
+    /// A rectangle, `X0,Y0,X1,Y1`.
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let numbers: Option<Vec<f64>> = text.split(',').map(|n| n.trim().parse().ok()).collect();
+        let corners =
+            numbers.and_then(|n| <[f64; 4]>::try_from(n).ok()).filter(|c| c.iter().all(|v| v.is_finite()));
+        corners.map(Region::Rectangle).ok_or("expected X0,Y0,X1,Y1, for example 100,50,539,429")
+    }
+}
+
 /// OpenCV's pinhole model with distortion, applied to centres, not to images.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -136,6 +149,7 @@ impl Rig {
         let content = std::fs::read_to_string(path).map_err(|e| {
             Error::Rig(
                 Fault::new(&name, format!("the rig file cannot be read ({e})"))
+                    .caused_by(&e)
                     .advice("Give a rig made by " + SETUP),
             )
         })?;
@@ -143,6 +157,26 @@ impl Rig {
     }
 
     /// Reads and checks the text of a rig file; `name` is for messages.
+    ///
+    /// ```
+    /// use tracker::rig::Rig;
+    ///
+    /// let text = r#"
+    ///     schema = 1
+    ///     image_px = [640, 480]
+    ///     body = [{ name = "upper" }]
+    ///     node = [
+    ///         { name = "n0", body = "upper", x_px = 320.0, y_px = 100.0 },
+    ///         { name = "n1", body = "upper", x_px = 320.0, y_px = 180.5 },
+    ///     ]
+    /// "#;
+    /// assert_eq!(Rig::parse(text, "rig.toml")?.nodes.len(), 2);
+    ///
+    /// let misspelt = text.replace("n1\", body = \"upper", "n1\", body = \"uper");
+    /// let said = Rig::parse(&misspelt, "rig.toml").unwrap_err().to_string();
+    /// assert!(said.starts_with("rig.toml") && said.contains("uper"), "{said}");
+    /// # Ok::<(), tracker::error::Error>(())
+    /// ```
     ///
     /// # Errors
     /// [`Error::Rig`] naming the line or key.
@@ -176,6 +210,7 @@ impl Rig {
         output::write(path, self.to_toml()?.as_bytes()).map_err(|e| {
             Error::Rig(
                 Fault::new(text(path), format!("the rig file cannot be written ({e})"))
+                    .caused_by(&e)
                     .advice("Check that the folder exists and may be written to"),
             )
         })

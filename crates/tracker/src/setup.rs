@@ -4,21 +4,19 @@
 
 use std::sync::Arc;
 
-use opencv::core::Mat;
-
 use crate::detect::{DetectSettings, Detection, Detector, Flags};
 use crate::discover::advice::advise;
 use crate::error::{Error, Fault, Place, Result};
 use crate::frame::Frame;
 use crate::message::Message;
-use crate::overlay;
+use crate::overlay::{self, Picture, still};
 use crate::pipeline::{self, Candidates, Existing, Observer, RunSettings, Stage};
 use crate::pixel_aspect::PixelAspect;
 use crate::rig::Rig;
 use crate::source::OpenOptions;
 use crate::table::RunEnding;
 
-/// What a recording shows.
+/// The rig of a recording, with the reference picture and warnings.
 #[derive(Debug)]
 pub struct Setup {
     /// Nodes, bodies, joints and the reference picture.
@@ -27,8 +25,8 @@ pub struct Setup {
     pub warnings: Vec<Message>,
     /// How the recording ended.
     pub ending: RunEnding,
-    /// The reference picture with the rig and all other detections drawn, 8-bit blue, green, red.
-    pub picture: Mat,
+    /// The reference picture with the rig and all other detections drawn.
+    pub picture: Picture,
 }
 
 /// Finds the rig of a recording, which is read through for it and once more up to the reference picture. The output and
@@ -77,7 +75,7 @@ pub fn find(settings: &RunSettings, observer: &mut dyn Observer) -> Result<Setup
     }
     let others = observer.candidates.all.iter().filter(|c| !c.followed).cloned().collect::<Vec<_>>();
     warnings.extend(others.iter().map(|c| format!("also moving, number {}", c.line()).into()));
-    let picture = overlay::still(&frame, &rig, &detections, &others)?;
+    let picture = still(&frame, &rig, &detections, &others)?;
     Ok(Setup { rig, warnings, ending: summary.meta.ending, picture })
 }
 
@@ -85,7 +83,11 @@ pub fn find(settings: &RunSettings, observer: &mut dyn Observer) -> Result<Setup
 ///
 /// # Errors
 /// Those of reading and of drawing; [`Error::Interrupted`] if the observer asks to stop.
-pub fn picture_of(settings: &RunSettings, found: &Candidates, observer: &mut dyn Observer) -> Result<Mat> {
+pub fn picture_of(
+    settings: &RunSettings,
+    found: &Candidates,
+    observer: &mut dyn Observer,
+) -> Result<Picture> {
     let (frame, _, aspect) = frame_at(settings, found.frame, false, observer)?;
     overlay::candidates(&frame, aspect, &found.all)
 }

@@ -4,7 +4,6 @@
 
 use std::path::Path;
 
-use opencv::prelude::MatTraitConst;
 use tracker::frame::TimeBase;
 use tracker::pipeline::{RunSettings, Silent, run};
 use tracker::score::{LIMIT_PX, Tracked, score};
@@ -254,7 +253,7 @@ fn setup_draws_the_rig_and_tells_what_to_change() {
     told("markers are saturated");
     told("is not at rest");
     told("merge in the picture when their bodies cross");
-    assert_eq!((found.picture.cols(), found.picture.rows()), (720, 720));
+    assert_eq!(found.picture.size_px(), [720, 720]);
 
     // One link, too fast for its camera, with two markers as far from the others.
     let mut scene = preset("clean", 2000).unwrap();

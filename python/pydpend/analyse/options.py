@@ -14,16 +14,18 @@ from pydpend.kinds import Kind, expect
 from pydpend.kinematics import parse_zero, roll_sigma
 from pydpend.model import check_model_called
 from pydpend.option_fields import choices_of, kind_of_value, meanings, option
+from pydpend.reading_options import ReadingOptions
 
 ESTIMATORS = ("rigid", "linkage", "pairwise")
 """How angles come from nodes."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(FitOptions):
+class Options(FitOptions, ReadingOptions):
     """What to analyse and how; the defaults need no thought.
 
-    Every parameter, a fit's (`FitOptions`) too, is a flag of the same name.
+    Every parameter is a flag of the same name, those of the fit (`FitOptions`) and of reading films (`ReadingOptions`)
+    too.
 
     Parameters
     ----------
@@ -31,10 +33,6 @@ class Options(FitOptions):
         Films, node tables or angles tables; several are trials of one pendulum.
     rig : str, optional
         Rig file for films; found in the film if not given.
-    fps : float, optional
-        Frames per second of recorded time, where a film does not know.
-    pixel_aspect : str, optional
-        Width to height of a film's pixels, e.g. ``16:15``, instead of what the film says.
     marker : tuple of str
         Place of a marker in a film, ``X,Y`` or ``X,Y@FRAME`` in px; once for each that is to be followed.
     markers : int, optional
@@ -43,12 +41,6 @@ class Options(FitOptions):
         Numbers of the picture of ``tracker setup`` that are to be followed too, with commas.
     same : tuple of str
         Two nodes of a film that are one marker, ``n1=n2``; once for each pair.
-    region : str, optional
-        Part of a film's picture in which markers are looked for, ``X0,Y0,X1,Y1`` in px.
-    threshold : float, optional
-        Threshold of markers in a film's units; learned if not given.
-    polarity : str
-        Whether a film's markers are brighter or darker than what is around them.
     encoder : str, optional
         Encoder file of the first recording: time_s and voltage_v (or an angle) as CSV, TDMS or NumPy.
     column : str, optional
@@ -86,8 +78,6 @@ class Options(FitOptions):
         apart.
     overlay : bool
         Draw what was found into the film, for the page. It takes about as long as tracking.
-    threads : int, optional
-        Threads for tracking; all cores if not given. Changes no result.
 
     Raises
     ------
@@ -97,15 +87,10 @@ class Options(FitOptions):
 
     inputs: tuple[str, ...] = ()
     rig: str | None = None
-    fps: float | None = None
-    pixel_aspect: str | None = None
     marker: tuple[str, ...] = ()
     markers: int | None = None
     also: str | None = None
     same: tuple[str, ...] = ()
-    region: str | None = None
-    threshold: float | None = None
-    polarity: str = option("auto", choices=("auto", "bright", "dark"))
     encoder: str | None = None
     column: str | None = None
     time_column: str | None = None
@@ -123,7 +108,6 @@ class Options(FitOptions):
     clockwise: bool = False
     unwrap: bool = False
     overlay: bool = True
-    threads: int | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -146,8 +130,8 @@ class Options(FitOptions):
             value = getattr(self, name)
             if value is not None and not value > 0:
                 raise OptionError(fault(Setting(name), f"{value:g} is not above 0", "Give a number above 0"))
-        if self.threads is not None and self.threads < 1:
-            raise OptionError(fault(Setting("threads"), f"{self.threads} is below 1", "Give 1 or more"))
+        for reads in (self.opened, self.detected, self.span):
+            reads()
         for name in ("calibration", "column", "time_column", "rate_hz", "unit"):
             if getattr(self, name) is not None and self.encoder is None:
                 raise OptionError(
@@ -166,7 +150,7 @@ class Options(FitOptions):
         dict of str to object
             Keywords and their values; nothing where nothing was said.
         """
-        names = ("marker", "markers", "also", "same", "region", "threshold", "polarity")
+        names = ("marker", "markers", "also", "same")
         plain = Options()
         said = {name: getattr(self, name) for name in names}
         return {name: value for name, value in said.items() if value != getattr(plain, name)}
@@ -256,8 +240,9 @@ def read_config(path: str | Path) -> Options:
 
 def all_options() -> list[Field[Any]]:
     """Every option: what is analysed and how films are read first, how the damping is fitted last."""
-    of_fit = {f.name for f in fields(FitOptions)}
-    return sorted(fields(Options), key=lambda f: f.name in of_fit)
+    part = dict.fromkeys((f.name for f in fields(ReadingOptions)), 1)
+    part |= dict.fromkeys((f.name for f in fields(FitOptions)), 2)
+    return sorted(fields(Options), key=lambda f: part.get(f.name, 0))
 
 
 def write_config(options: Options) -> str:

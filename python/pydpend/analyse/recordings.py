@@ -13,6 +13,7 @@ from pydpend.analyse.options import Options
 from pydpend.columns import column_names
 from pydpend.errors import OptionError, PydpendError, Setting, fault, listed
 from pydpend.kinds import expect, kind_of
+from pydpend.kinematics import parse_zero
 from pydpend.run_folder import FIT_FOLDER
 
 TABLES = (".parquet", ".csv", ".txt")
@@ -83,9 +84,6 @@ APPLIES: Mapping[str, tuple[str, ...]] = {
     "markers": ("film",),
     "also": ("film",),
     "same": ("film",),
-    "region": ("film",),
-    "threshold": ("film",),
-    "polarity": ("film",),
     "zero": ("film", "nodes"),
     "estimator": ("film", "nodes"),
     "bodies": ("film", "nodes"),
@@ -95,6 +93,7 @@ APPLIES: Mapping[str, tuple[str, ...]] = {
     "hanging_deg": ("angles",),
     "clockwise": ("angles",),
     "unwrap": ("angles",),
+    **dict.fromkeys(Options().reading_key(), ("film",)),
 }
 """Options and the kinds of input that they are of. Others are of all, or change no result."""
 
@@ -104,6 +103,8 @@ NOUNS = {"film": "a film", "nodes": "a node table", "angles": "an angles table"}
 def check_options(options: Options, found: tuple[Recording, ...]) -> None:
     """Raises OptionError for an option that does nothing with these inputs."""
     kinds = {r.kind for r in found}
+    if parse_zero(options.zero) is None:
+        kinds.add(recording_kind(Path(options.zero)))
     plain = Options()
     for option, of in APPLIES.items():
         if getattr(options, option) != getattr(plain, option) and not kinds & set(of):

@@ -191,8 +191,7 @@ def _plan_recording(
             [
                 r.digest,
                 known.option(options.rig),
-                options.fps,
-                options.pixel_aspect,
+                options.reading_key(),
                 *options.of_markers().items(),
             ],
             lambda into, tell, resume: stages.track(r, options, into, tell, resume),
@@ -216,6 +215,7 @@ def _plan_recording(
             options.estimator,
             options.zero,
             known.option(options.zero),
+            options.reading_key(),
             options.link_length_m,
         ],
         lambda into, tell, resume: stages.angles(r, options, here, into),

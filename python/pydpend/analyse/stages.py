@@ -61,10 +61,8 @@ def track(r: Recording, options: Options, into: Path, tell: Tell, resume: bool) 
     nodes = track_film(
         r.path,
         options.rig,
-        fps=options.fps,
-        pixel_aspect=options.pixel_aspect,
+        **options.reading(),
         **options.of_markers(),
-        threads=options.threads,
         output=RecordingFolder(into).file(RunFile.NODES),
         resume=resume,
         force=True,
@@ -116,14 +114,9 @@ def _hanging(r: Recording, options: Options, here: Path, into: Path) -> Any:
     folder = RecordingFolder(into)
     rig = folder.file(RunFile.ZERO_RIG)
     _nodes(here, r).rig.write(rig)
-    return track_film(
-        path,
-        rig,
-        fps=options.fps,
-        pixel_aspect=options.pixel_aspect,
-        output=folder.file(RunFile.ZERO),
-        progress=False,
-    )
+    # The frames are those of the recording that moves.
+    reading = options.reading() | {"frames": None}
+    return track_film(path, rig, **reading, output=folder.file(RunFile.ZERO), progress=False)
 
 
 def angles(r: Recording, options: Options, here: Path, into: Path) -> str:

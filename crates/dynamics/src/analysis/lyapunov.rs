@@ -7,7 +7,7 @@ use crate::parameters::{Field, Parameters};
 use crate::scalar::Dual;
 use crate::state::{Contact, State};
 
-/// What is asked.
+/// Settings of an exponent: how long, how often, how exactly.
 #[derive(Clone, Copy, Debug)]
 pub struct Growth {
     /// Time between two renormalisations of the tangent vector, s.

@@ -7,7 +7,7 @@ use crate::integrate::flight::Flight;
 use crate::parameters::Parameters;
 use crate::state::State;
 
-/// Points of each step at which the angle is examined.
+/// Number of points of each step at which the angle is examined.
 const LOOKS: u32 = 8;
 
 /// The condition `phi = angle (mod 2 pi)`.

@@ -8,7 +8,7 @@ use crate::terms::TERMS;
 
 pub use crate::integrate::flight::{Event, Failure, Settings};
 
-/// How a simulation ended.
+/// Ending of a simulation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ending {
     /// At the last time.

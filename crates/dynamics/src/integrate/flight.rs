@@ -7,16 +7,16 @@ use crate::parameters::{Field, Parameters};
 use crate::state::{Contact, State};
 use crate::terms::TERMS;
 
-/// State and the work taken out by each of [`TERMS`].
+/// Length of the integrated vector: the state and the work taken out by each of [`TERMS`].
 pub const SIZE: usize = 4 + TERMS.len();
-/// Points of each step at which contacts are examined, so that a joint that stops and turns back is not missed.
+/// Number of points of each step at which contacts are examined, so that a joint that stops and turns back is not missed.
 const LOOKS: u32 = 8;
-/// A rate below this has not crossed zero, rad/s: rounding of rates of order 10 that cancel.
+/// Largest rate that counts as not yet across zero, rad/s: rounding of rates of order 10 that cancel.
 const RATE_ZERO: f64 = 1e-13;
-/// Steps after which a run is given up.
+/// Maximum number of steps of a run.
 const MAX_STEPS: usize = 10_000_000;
 
-/// What a simulation is asked.
+/// Settings of a simulation.
 #[derive(Clone, Copy, Debug)]
 pub struct Settings {
     /// Local error allowed per step, relative to one radian, to the larger of the rate and 1 rad/s, and to the
@@ -95,7 +95,7 @@ pub struct Flight<'a> {
     idle: usize,
 }
 
-/// What one call of [`Flight::step`] did.
+/// One step of a motion, as [`Flight::step`] took it.
 pub struct Leg {
     /// When it began, s.
     pub from_s: f64,
@@ -239,7 +239,7 @@ impl<'a> Flight<'a> {
         scale
     }
 
-    /// Where the margin of `joint` is measured zero.
+    /// Value at which the margin of `joint` counts as zero.
     fn zero(&self, joint: usize) -> f64 {
         match self.contact[joint] {
             Contact::Slip(_) => -RATE_ZERO,
@@ -327,7 +327,7 @@ fn weight(p: &Parameters<f64>) -> f64 {
     if w > 0.0 { w } else { 1.0 }
 }
 
-/// Where `f` falls through zero between `a` (not below) and `b` (below).
+/// Place at which `f` falls through zero between `a` (not below) and `b` (below).
 fn bisect(mut a: f64, mut b: f64, f: impl Fn(f64) -> f64) -> f64 {
     for _ in 0..60 {
         let middle = 0.5 * (a + b);

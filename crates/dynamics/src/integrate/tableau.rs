@@ -1,11 +1,11 @@
 //! Lists the coefficients of DOP853: Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I (2nd ed., Springer
 //! 1993), program `dop853.f`. Rows are sparse: `(stage, coefficient)`.
 
-/// Stages of one step; the derivative at its end is stage [`STAGES`] (first same as last).
+/// Number of stages of one step; the derivative at its end is stage [`STAGES`] (first same as last).
 pub const STAGES: usize = 12;
-/// Stages with those of the dense output.
+/// Number of stages with those of the dense output.
 pub const ALL_STAGES: usize = 16;
-/// Terms of the dense output.
+/// Number of terms of the dense output.
 pub const DENSE: usize = 7;
 
 /// Nodes of the stages: the equations here do not depend on time, so they serve the tests only.

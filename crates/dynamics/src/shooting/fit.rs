@@ -102,7 +102,7 @@ pub fn fit(
     iteration.finish(status)
 }
 
-/// Where the iteration stands.
+/// State of the iteration.
 struct Iteration<'a> {
     problem: Problem<'a>,
     /// Whether any segment goes on from the one before it.

@@ -8,7 +8,7 @@ use crate::parameters::Parameters;
 use crate::scalar::{Dual, Real};
 use crate::state::State;
 
-/// Where the fit stands.
+/// Current values of all unknowns of a fit.
 #[derive(Clone, Debug)]
 pub struct Point {
     /// Parameters of the motion.

@@ -41,7 +41,7 @@ pub struct Segment {
     pub chained: bool,
 }
 
-/// Samples of each link a segment must have: two for the state, and enough to test it.
+/// Least number of samples of each link in a segment: two for the state, and enough to test it.
 pub const MIN_SAMPLES: usize = 6;
 
 /// Cuts `start_s..stop_s` of a recording into equal segments of about `length_s`. Segments with fewer than
@@ -75,7 +75,7 @@ pub fn cut(
     out
 }
 
-/// How tightly the end of a segment is tied to the start of the next.
+/// Tie between the end of a segment and the start of the next.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Slack {
     /// Standard deviations of the jump in `[phi1, phi2, w1, w2]`, relative to how well a segment's own samples
@@ -87,7 +87,7 @@ pub enum Slack {
     Learned(f64),
 }
 
-/// What is free, and when to stop.
+/// Settings of a fit: which parameters are free, and when it stops.
 #[derive(Clone, Debug)]
 pub struct Settings {
     /// Free parameters of the motion.
@@ -106,7 +106,7 @@ pub struct Settings {
     pub max_iterations: usize,
 }
 
-/// How far a fit has come, after each step.
+/// Progress of a fit, after each step.
 #[derive(Clone, Copy, Debug)]
 pub struct Progress {
     /// Steps taken.
@@ -117,7 +117,7 @@ pub struct Progress {
     pub chi2: f64,
 }
 
-/// How a fit ended.
+/// Ending of a fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Status {
     /// The next step would change nothing that matters.
@@ -130,7 +130,7 @@ pub enum Status {
     Stopped,
 }
 
-/// What cannot be fitted.
+/// Reason why a problem cannot be fitted.
 #[derive(Debug, thiserror::Error)]
 pub enum ShootingError {
     /// No segment has enough samples.

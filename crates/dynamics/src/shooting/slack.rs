@@ -6,6 +6,15 @@ use super::arrow::Eliminated;
 use super::linearise::{Local, Point};
 use super::system::{Problem, pseudo_inverse};
 
+/// Largest change of the slack, as a logarithm, at which the estimate has converged: a slack known to 2 % changes no standard
+/// error that is quoted to two digits.
+pub(super) const SLACK_TOLERANCE: f64 = 0.02;
+/// Maximum number of guesses at the slack; ten are enough where the data determine it.
+const MAX_GUESSES: usize = 40;
+/// Change of the logarithm of a weight over which a derivative is taken: far above rounding, far below curvature.
+const STEP: f64 = 0.02;
+
+/// Median; NaN of no values.
 fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
@@ -112,9 +121,6 @@ pub(super) fn learned(
     Some(now)
 }
 
-/// Change of the logarithm of a weight from which a derivative is taken: far above rounding, far below curvature.
-const STEP: f64 = 0.02;
-
 /// Observed variance of the jumps over the slack's square, not below zero: one common to the components `given`, 1 for the
 /// others, whose slack was learned.
 ///
@@ -147,11 +153,6 @@ pub(super) fn jump_variance_ratio(
     let common = if given.contains(&true) { found().unwrap_or(1.0) } else { 1.0 };
     given.map(|g| if g { common } else { 1.0 })
 }
-
-/// A slack known to 2 % changes no standard error that is quoted to two digits.
-pub(super) const SLACK_TOLERANCE: f64 = 0.02;
-/// Most guesses at the slack; ten are enough where it is determined.
-const MAX_GUESSES: usize = 40;
 
 /// Largest difference of two slacks, as a logarithm.
 pub(super) fn apart(a: [f64; 4], b: [f64; 4]) -> f64 {

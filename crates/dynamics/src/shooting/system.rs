@@ -22,12 +22,12 @@ pub(super) struct Problem<'a> {
 /// Least relative information that counts, tried in turn.
 const RIDGES: [f64; 4] = [1e-13, 1e-11, 1e-9, 1e-7];
 
-/// Most dampings tried in one step.
+/// Maximum number of dampings tried in one step.
 const TRIES: usize = 12;
 /// Relative error of the cost from the integration's rounding, grown by the motion.
 const ROUNDING: f64 = 1e-9;
 
-/// What a step did.
+/// Outcome of a step.
 pub(super) struct Step {
     /// Where it leads; `None` where the cost does not fall.
     pub(super) next: Option<Point>,

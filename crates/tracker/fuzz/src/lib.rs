@@ -20,6 +20,8 @@ pub mod output;
 pub mod pixel_aspect;
 #[path = "../../src/rig.rs"]
 pub mod rig;
+#[path = "../../src/setting_words.rs"]
+pub mod setting_words;
 #[path = "../../src/timing/mod.rs"]
 pub mod timing;
 

@@ -20,8 +20,7 @@ use super::lens::Undistort;
 use super::levels::Levels;
 use super::marker::LARGEST_MISFIT;
 use super::pixels::Pixels;
-use super::settings::{Centroid, DetectSettings};
-use super::side::Side;
+use super::settings::{Centroid, DetectSettings, Polarity};
 use crate::error::{Error, Fault, Place, Result};
 use crate::frame::Frame;
 
@@ -71,7 +70,8 @@ impl Detector {
         let plan = Plan::new(&levels, &spans, height);
         let lens = settings.lens.as_ref().map(Undistort::new).transpose()?;
         let sides = levels.pixel_aspect.sides();
-        let table = levels.marker.map(|m| EdgeTable::new(m.radius_px, m.blur_px, sides));
+        let marker = levels.marker.filter(|_| settings.centroid == Centroid::Disc);
+        let table = marker.map(|m| EdgeTable::new(m.radius_px, m.blur_px, sides));
         Ok(Self {
             levels,
             sides,
@@ -114,7 +114,7 @@ impl Detector {
             ));
         }
         match self.centroid {
-            Centroid::Weighted => self.weighted(&pixels, out),
+            Centroid::Disc | Centroid::Weighted => self.discs(&pixels, out),
             Centroid::Contour => self.contour(&pixels, out)?,
         }
         if let Some(lens) = &mut self.lens {
@@ -126,9 +126,10 @@ impl Detector {
         Ok(())
     }
 
-    fn weighted(&mut self, pixels: &Pixels<'_>, out: &mut Vec<Detection>) {
+    /// The fit of a disc to each blob, or its intensity-weighted mean where there is no table to fit with.
+    fn discs(&mut self, pixels: &Pixels<'_>, out: &mut Vec<Detection>) {
         // Step 1: blobs beyond the threshold.
-        self.labeller.find(pixels, &self.plan, self.levels.side, &mut self.blobs);
+        self.labeller.find(pixels, &self.plan, self.levels.polarity, &mut self.blobs);
         self.tallest = self.blobs.iter().map(|b| b.y1 - b.y0 + 1).max().unwrap_or(0);
         let [least, most] = self.levels.area_px;
         for i in 0..self.blobs.len() {
@@ -144,7 +145,7 @@ impl Detector {
             }
             let avoid = self.neighbours(i);
             let centre = self.centre(pixels, blob, avoid);
-            out.push(detection(blob, &centre, &self.levels));
+            out.push(detection(blob, &centre, &self.levels, self.table.is_some()));
         }
     }
 
@@ -237,14 +238,14 @@ impl Detector {
                 pixels.read(y, s.start as usize, &mut self.row);
                 let at = y * pixels.width + s.start as usize;
                 for (m, &v) in self.mask[at..].iter_mut().zip(&self.row) {
-                    *m = u8::from(match self.levels.side {
-                        Side::Bright => v >= s.threshold,
-                        Side::Dark => v <= s.threshold,
+                    *m = u8::from(match self.levels.polarity {
+                        Polarity::Bright => v >= s.threshold,
+                        Polarity::Dark => v <= s.threshold,
                     });
                 }
             }
         }
-        self.labeller.find(pixels, &self.plan, self.levels.side, &mut self.blobs);
+        self.labeller.find(pixels, &self.plan, self.levels.polarity, &mut self.blobs);
         let [least, most] = self.levels.area_px;
         for contour in contour_centres(&self.mask, pixels.width, pixels.height)? {
             // The blob it goes round says the rest.
@@ -258,7 +259,7 @@ impl Detector {
                 continue;
             }
             let centre = self.window.weighted(pixels, &self.spans, blob, &self.levels);
-            let whole = detection(blob, &centre, &self.levels);
+            let whole = detection(blob, &centre, &self.levels, false);
             // Rounding the outline to pixels dominates: 1/12 px^2 for each of its pixels, shared among them.
             let outline = (4.0 * std::f64::consts::PI * area).sqrt().max(1.0);
             out.push(Detection {
@@ -285,7 +286,8 @@ fn is_sound(d: &Detection) -> bool {
 fn disc_fit<'a>(table: &'a EdgeTable, levels: &Levels) -> DiscFit<'a> {
     // In much noise more pixels beside the edge are worth their time.
     let band_px = if levels.high_contrast() { BAND_PX } else { NOISY_BAND_PX };
-    let model = DiscModel { table, noise: levels.noise, side: levels.side, saturation: levels.saturation };
+    let model =
+        DiscModel { table, noise: levels.noise, polarity: levels.polarity, saturation: levels.saturation };
     DiscFit { model, band_px, usual_chi2: levels.marker.map_or(1.0, |m| m.chi2) }
 }
 
@@ -302,7 +304,7 @@ fn centre_of(f: &Fitted) -> Centre {
     }
 }
 
-fn detection(blob: &Blob, centre: &Centre, levels: &Levels) -> Detection {
+fn detection(blob: &Blob, centre: &Centre, levels: &Levels, fits_discs: bool) -> Detection {
     let sides = levels.pixel_aspect.sides();
     Detection {
         x_px: centre.x_px,
@@ -312,6 +314,6 @@ fn detection(blob: &Blob, centre: &Centre, levels: &Levels) -> Detection {
         area_px: blob.area as f32,
         peak: centre.peak as f32,
         elongation: blob.elongation(sides) as f32,
-        flags: shape::judge(blob, centre, levels),
+        flags: shape::judge(blob, centre, levels, fits_discs),
     }
 }

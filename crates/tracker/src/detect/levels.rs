@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::learn::background::Background;
 use super::marker::Marker;
 use super::noise::Noise;
-use super::side::Side;
+use super::settings::Polarity;
 use crate::pixel_aspect::PixelAspect;
 
 /// Contrast, in standard deviations of the background's noise, above which a misfit of one pixel shows.
@@ -16,8 +16,9 @@ const HIGH_CONTRAST_SIGMA: f64 = 30.0;
 /// What was learned of a recording. Written into the table's metadata.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Levels {
-    /// Polarity.
-    pub side: Side,
+    /// Polarity; `side` in files.
+    #[serde(rename = "side")]
+    pub polarity: Polarity,
     /// Width and height of the frames, px.
     pub image_px: [u32; 2],
     /// Width to height of a pixel.
@@ -59,6 +60,6 @@ impl Levels {
     /// The threshold at a place, raw units: a pixel of a bright marker is at least this, of a dark one at most.
     pub fn threshold(&self, x_px: f64, y_px: f64) -> f64 {
         self.fixed_threshold
-            .unwrap_or_else(|| self.background.at(x_px, y_px) + self.side.sign() * self.height)
+            .unwrap_or_else(|| self.background.at(x_px, y_px) + self.polarity.sign() * self.height)
     }
 }

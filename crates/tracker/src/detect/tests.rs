@@ -120,7 +120,7 @@ fn discs_bright_and_dark_in_8_and_16_bits_are_all_found_without_settings() {
             .collect();
         let settings = DetectSettings::default();
         let levels = learn(&frames, &settings);
-        assert_eq!(levels.side, if height > 0.0 { Side::Bright } else { Side::Dark });
+        assert_eq!(levels.polarity, if height > 0.0 { Polarity::Bright } else { Polarity::Dark });
         for (i, frame) in frames.iter().enumerate() {
             let truth = scattered(1000 + i as u64, 12, 6.0, height);
             let found = detect(frame, &levels, &settings);

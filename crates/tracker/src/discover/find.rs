@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::arrange::Found;
 use super::sample::Sample;
 use super::{arrange, bodies, lone, sample};
-use crate::error::{Error, Fault, Result};
+use crate::error::{Error, Fault, FaultKind, Result};
 use crate::message::{Message, Setting};
 use crate::pixel_aspect::PixelAspect;
 use crate::rig::Rig;
@@ -28,6 +28,11 @@ pub struct Discovery {
     pub warnings: Vec<Message>,
 }
 
+/// A recording in which no rig is found.
+fn nothing_found(problem: impl Into<Message>, advice: Message) -> Error {
+    Error::Rig(Fault::new("recording", problem).of_kind(FaultKind::NothingFound).advice(advice))
+}
+
 /// Finds the rig of a recording of `image_px` (width, height) pixels; its places are in these.
 ///
 /// # Errors
@@ -35,16 +40,16 @@ pub struct Discovery {
 pub fn discover(store: &DetectionStore, image_px: [u32; 2], stop: &Stop) -> Result<Discovery> {
     let sample = Sample::take(store, stop)?;
     if sample.frames.is_empty() {
-        return Err(Error::Rig(
-            Fault::new("recording", "no markers are seen in any frame")
-                .advice("Look at a frame and set " + Setting::Threshold + " or " + Setting::Polarity),
+        return Err(nothing_found(
+            "no markers are seen in any frame",
+            "Look at a frame and set " + Setting::Threshold + " or " + Setting::Polarity,
         ));
     }
     let mut warnings = Vec::new();
     if sample.at_rest {
-        return Err(Error::Rig(
-            Fault::new("recording", "nothing moves, so bodies cannot be told apart")
-                .advice("Give a rig with " + Setting::Rig + ", or a longer recording"),
+        return Err(nothing_found(
+            "nothing moves, so bodies cannot be told apart",
+            "Give a rig with " + Setting::Rig + ", or a longer recording",
         ));
     }
     let mut sample = sample;
@@ -56,22 +61,17 @@ pub fn discover(store: &DetectionStore, image_px: [u32; 2], stop: &Stop) -> Resu
         lone::pair_up(&mut found, stop)?;
     }
     if found.is_empty() {
-        return Err(Error::Rig(
-            Fault::new("recording", "no marker can be followed")
-                .advice("Point at each with " + Setting::Marker + ", or give a rig with " + Setting::Rig),
+        return Err(nothing_found(
+            "no marker can be followed",
+            "Point at each with " + Setting::Marker + ", or give a rig with " + Setting::Rig,
         ));
     }
     if let Some((a, b)) = bodies::alike(&links, stop)? {
         let (a, b) =
             (place_words(&found[a], store.pixel_aspect()), place_words(&found[b], store.pixel_aspect()));
-        return Err(Error::Rig(
-            Fault::new(
-                "recording",
-                format!("two bodies have the same marker layout, {a} and {b}: they cannot be told apart"),
-            )
-            .advice(
-                "Move a marker of one of them by some pixels, or say which is which with " + Setting::Rig,
-            ),
+        return Err(nothing_found(
+            format!("two bodies have the same marker layout, {a} and {b}: they cannot be told apart"),
+            "Move a marker of one of them by some pixels, or say which is which with " + Setting::Rig,
         ));
     }
     let aspect = store.pixel_aspect();

@@ -10,7 +10,7 @@ use nalgebra::{Isometry2, Vector2};
 use opencv::core::{Mat, Point, Scalar};
 use opencv::imgproc;
 
-use super::picture::{colour, failed};
+use super::picture::{Picture, colour, failed};
 use crate::error::Result;
 use crate::frame::Frame;
 use crate::observation::{Observation, Status};
@@ -19,7 +19,7 @@ use crate::rigid::body::{Holder, Mechanism};
 use crate::rigid::forecast::{Motion, PredictionError, hung_at};
 use crate::rigid::pose::{Pair, fit_pose, place};
 
-/// Frames that a trail is long.
+/// Length of a trail in frames.
 const TRAIL: usize = 40;
 /// Bits of a pixel that OpenCV's drawing takes as fractions.
 const SHIFT: i32 = 3;
@@ -118,7 +118,7 @@ impl Overlay {
     }
 
     /// Takes a frame's places over without a picture of it: motion and trails go on. Poses of the bodies.
-    pub fn follow(&mut self, frame: u64, row: &[Observation]) -> Vec<Option<Isometry2<f64>>> {
+    pub(super) fn follow(&mut self, frame: u64, row: &[Observation]) -> Vec<Option<Isometry2<f64>>> {
         for (trail, o) in self.trails.iter_mut().zip(row) {
             if o.x_px.is_finite() {
                 trail.push_back(self.rig.pixel_aspect.to_square(Vector2::new(o.x_px, o.y_px)));
@@ -130,11 +130,16 @@ impl Overlay {
         self.poses(frame as f64, row)
     }
 
-    /// One frame with everything drawn: 8-bit blue, green, red. `row` is in the order of the rig's nodes.
+    /// One frame with everything drawn. `row` is in the order of the rig's nodes.
     ///
     /// # Errors
     /// [`Error::Film`] if the frame is not of the rig's size or drawing fails.
-    pub fn draw(&mut self, frame: &Frame, time_s: Option<f64>, row: &[Observation]) -> Result<Mat> {
+    pub fn draw(&mut self, frame: &Frame, time_s: Option<f64>, row: &[Observation]) -> Result<Picture> {
+        self.drawn(frame, time_s, row).map(Picture)
+    }
+
+    /// The same as OpenCV has it: blue, green, red.
+    pub(super) fn drawn(&mut self, frame: &Frame, time_s: Option<f64>, row: &[Observation]) -> Result<Mat> {
         let poses = self.follow(frame.index, row);
         let mut picture = colour(frame, self.size)?;
         let bodies = self.rig.node_bodies();
@@ -347,7 +352,7 @@ mod tests {
     #[test]
     fn marks_differ_from_bright_and_from_dark_ground() {
         for ground in [0_u8, 128, 255] {
-            let picture = still(&frame(ground), &rig(), &[], &[]).unwrap();
+            let picture = still(&frame(ground), &rig(), &[], &[]).unwrap().0;
             // On the ring of n0 something is brighter than the dark rim and something darker than the colour.
             let mut far = 0;
             for y in 28..53 {
@@ -365,7 +370,7 @@ mod tests {
         for width in [64_u32, 128, 256] {
             let mut row = vec![Observation::MISSING; 2];
             row[1] = Observation { x_px: 90.0, y_px: 70.0, status: Status::Seen, ..row[1] };
-            let picture = Overlay::of_width(&rig(), width).draw(&frame(128), None, &row).unwrap();
+            let picture = Overlay::of_width(&rig(), width).drawn(&frame(128), None, &row).unwrap();
             assert_eq!((picture.cols(), picture.rows()), (width as i32, width as i32 * 96 / 128));
             // Above and below the marker there is its ring and nothing else.
             let zoom = f64::from(width) / 128.0;

@@ -20,7 +20,7 @@ use crate::source::{self, OpenOptions};
 use crate::synth::encode::{Codec, VideoSettings, VideoWriter};
 use crate::table::NodeTable;
 
-/// How the film with the drawings is written.
+/// Settings of the film with the drawings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FilmSettings {
     /// Frames a second at which it plays.
@@ -61,7 +61,7 @@ impl FilmSettings {
     }
 }
 
-/// What is in the film.
+/// Frames and times of the pictures of a film.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Filmed {
     /// Of each picture the frame's index in the recording.
@@ -146,7 +146,7 @@ pub fn film(
             (0..n).map(|k| table.rows.observation(t, k, n).unwrap_or(Observation::MISSING)).collect();
         if t % settings.every == 0 {
             let time_s = table.rows.time_s[t];
-            let picture = overlay.draw(&frame, Some(time_s), &row)?;
+            let picture = overlay.drawn(&frame, Some(time_s), &row)?;
             writer.write_i420(&planes(&picture)?)?;
             filmed.frame.push(table.rows.frame[t]);
             filmed.time_s.push(time_s);

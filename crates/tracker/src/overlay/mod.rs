@@ -3,11 +3,13 @@
 //! Owns: [`Overlay`], [`still`], [`candidates`], [`film`]. Must not: track: it draws what a table says.
 
 mod draw;
+#[cfg(feature = "ffmpeg")]
 mod film;
 mod picture;
 mod stills;
 
 pub use draw::Overlay;
+#[cfg(feature = "ffmpeg")]
 pub use film::{FilmSettings, Filmed, film};
-pub use picture::{rgb, save, size};
+pub use picture::Picture;
 pub use stills::{candidates, still};

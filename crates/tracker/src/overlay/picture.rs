@@ -1,6 +1,6 @@
-//! Converts frames to OpenCV's pictures, and pictures to bytes and files.
+//! Converts frames to pictures in colour, and pictures to bytes and files.
 //!
-//! Owns: [`colour`], [`rgb`], [`size`], [`save`]. Must not: draw.
+//! Owns: [`Picture`], [`colour`]. Must not: draw.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use opencv::core::{Mat, Size, Vector};
 use opencv::prelude::*;
 use opencv::{imgcodecs, imgproc};
 
-use crate::error::{Error, Fault, Result};
+use crate::error::{Error, Fault, FaultKind, Result};
 use crate::frame::Frame;
 use crate::gray::gray8;
 use crate::name::text;
@@ -60,37 +60,46 @@ fn blue_green_red(luma: &[u8], [blue, red]: &[Vec<u8>; 2], width: usize) -> Vec<
     out
 }
 
-/// Samples red, green, blue, pixel by pixel and row by row.
-///
-/// # Errors
-/// [`Error::Film`] if OpenCV fails.
-pub fn rgb(picture: &Mat) -> Result<Vec<u8>> {
-    let mut out = Mat::default();
-    imgproc::cvt_color_def(picture, &mut out, imgproc::COLOR_BGR2RGB).map_err(failed)?;
-    Ok(out.data_bytes().map_err(failed)?.to_vec())
-}
+/// A picture in colour, 8 bits for each of red, green and blue.
+#[derive(Debug)]
+pub struct Picture(pub(super) Mat);
 
-/// Rows and columns.
-pub fn size(picture: &Mat) -> [usize; 2] {
-    [picture.rows(), picture.cols()].map(|n| n.unsigned_abs() as usize)
-}
-
-/// Writes a picture; its kind is known by the ending of `path`.
-///
-/// # Errors
-/// [`Error::Film`] if the ending is not known or the file cannot be written.
-pub fn save(picture: &Mat, path: &Path) -> Result<()> {
-    let name = text(path);
-    let ending = path.extension().map_or_else(String::new, |e| format!(".{}", text(e)));
-    let mut bytes: Vector<u8> = Vector::new();
-    let done = imgcodecs::imencode_def(&ending, picture, &mut bytes).unwrap_or(false);
-    if !done {
-        return Err(Error::Film(
-            Fault::new(&name, format!("pictures cannot be written as {ending:?}")).advice("Name it .png"),
-        ));
+impl Picture {
+    /// Samples red, green, blue, pixel by pixel and row by row.
+    ///
+    /// # Errors
+    /// [`Error::Film`] if OpenCV fails.
+    pub fn rgb(&self) -> Result<Vec<u8>> {
+        let mut out = Mat::default();
+        imgproc::cvt_color_def(&self.0, &mut out, imgproc::COLOR_BGR2RGB).map_err(failed)?;
+        Ok(out.data_bytes().map_err(failed)?.to_vec())
     }
-    output::write(path, bytes.as_slice())
-        .map_err(|e| Error::Film(Fault::new(&name, format!("the picture cannot be written ({e})"))))
+
+    /// Width and height, px.
+    pub fn size_px(&self) -> [usize; 2] {
+        [self.0.cols(), self.0.rows()].map(|n| n.unsigned_abs() as usize)
+    }
+
+    /// Writes the picture; its kind is known by the ending of `path`.
+    ///
+    /// # Errors
+    /// [`Error::Film`] if the ending is not known or the file cannot be written.
+    pub fn save(&self, path: &Path) -> Result<()> {
+        let name = text(path);
+        let ending = path.extension().map_or_else(String::new, |e| format!(".{}", text(e)));
+        let mut bytes: Vector<u8> = Vector::new();
+        let done = imgcodecs::imencode_def(&ending, &self.0, &mut bytes).unwrap_or(false);
+        if !done {
+            return Err(Error::Film(
+                Fault::new(&name, format!("pictures cannot be written as {ending:?}"))
+                    .of_kind(FaultKind::Unsupported)
+                    .advice("Name it .png"),
+            ));
+        }
+        output::write(path, bytes.as_slice()).map_err(|e| {
+            Error::Film(Fault::new(&name, format!("the picture cannot be written ({e})")).caused_by(&e))
+        })
+    }
 }
 
 pub(super) fn failed(e: opencv::Error) -> Error {

@@ -1,4 +1,4 @@
-//! Stills: the reference picture with a rig, and what was found of what moves, each with its number and its path.
+//! Draws stills: the reference picture with a rig, and what was found of what moves, each with its number and its path.
 //!
 //! Owns: [`still`], [`candidates`]. Must not: choose.
 
@@ -6,7 +6,7 @@ use nalgebra::Vector2;
 use opencv::core::Mat;
 
 use super::draw::Overlay;
-use super::picture::colour;
+use super::picture::{Picture, colour};
 use crate::detect::Detection;
 use crate::error::Result;
 use crate::frame::Frame;
@@ -15,12 +15,11 @@ use crate::pipeline::Candidate;
 use crate::pixel_aspect::PixelAspect;
 use crate::rig::{RIG_SCHEMA, Rig};
 
-/// The reference picture with the rig drawn, marks on detections that are no node, and numbers on what else moves: 8-bit blue,
-/// green, red.
+/// The reference picture with the rig drawn, marks on detections that are no node, and numbers on what else moves.
 ///
 /// # Errors
 /// [`crate::error::Error::Film`] if the frame is not of the rig's size or drawing fails.
-pub fn still(frame: &Frame, rig: &Rig, detections: &[Detection], moving: &[Candidate]) -> Result<Mat> {
+pub fn still(frame: &Frame, rig: &Rig, detections: &[Detection], moving: &[Candidate]) -> Result<Picture> {
     let mut row = vec![Observation::MISSING; rig.nodes.len()];
     for (o, n) in row.iter_mut().zip(&rig.nodes) {
         o.x_px = n.x_px;
@@ -30,7 +29,7 @@ pub fn still(frame: &Frame, rig: &Rig, detections: &[Detection], moving: &[Candi
         o.status = Status::Seen;
     }
     let mut overlay = Overlay::new(rig);
-    let mut picture = overlay.draw(frame, None, &row)?;
+    let mut picture = overlay.drawn(frame, None, &row)?;
     for d in detections {
         let p = overlay.square([d.x_px, d.y_px]);
         if rig.nodes.iter().all(|n| (overlay.square([n.x_px, n.y_px]) - p).norm() > 3.0) {
@@ -38,14 +37,14 @@ pub fn still(frame: &Frame, rig: &Rig, detections: &[Detection], moving: &[Candi
         }
     }
     draw(&mut picture, &overlay, moving)?;
-    Ok(picture)
+    Ok(Picture(picture))
 }
 
-/// A frame with candidates drawn into it: 8-bit blue, green, red.
+/// A frame with candidates drawn into it.
 ///
 /// # Errors
 /// [`crate::error::Error::Film`] if drawing fails.
-pub fn candidates(frame: &Frame, aspect: PixelAspect, all: &[Candidate]) -> Result<Mat> {
+pub fn candidates(frame: &Frame, aspect: PixelAspect, all: &[Candidate]) -> Result<Picture> {
     let empty = Rig {
         schema: RIG_SCHEMA,
         image_px: [frame.width, frame.height],
@@ -62,7 +61,7 @@ pub fn candidates(frame: &Frame, aspect: PixelAspect, all: &[Candidate]) -> Resu
     let mut picture = colour(frame, overlay.size)?;
     draw(&mut picture, &overlay, all)?;
     overlay.write(&mut picture, &format!("frame {}", frame.index), overlay.corner(), [255.0; 3])?;
-    Ok(picture)
+    Ok(Picture(picture))
 }
 
 fn draw(picture: &mut Mat, overlay: &Overlay, all: &[Candidate]) -> Result<()> {

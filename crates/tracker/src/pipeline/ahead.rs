@@ -1,4 +1,4 @@
-//! The source on a thread of its own, some frames ahead and no more.
+//! Reads a source on a thread of its own, some frames ahead and no more.
 //!
 //! Owns: [`Ahead`], [`Batch`], its size. Must not: look at pixels.
 
@@ -17,7 +17,7 @@ use crate::gaps::Gaps;
 const BATCH_BYTES: usize = 1 << 20;
 /// Frames in a batch, where they are small.
 const MOST_FRAMES: usize = 64;
-/// Batches that wait for detection at most.
+/// Maximum number of batches that wait for detection.
 const WAITING: usize = 8;
 
 /// Frames in order, of which the first is the `first`-th of all that are read, from 0.
@@ -26,7 +26,7 @@ pub struct Batch {
     pub frames: Vec<Frame>,
 }
 
-/// How reading ended.
+/// Ending of the reading.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct End {
     /// How the recording ended.
@@ -51,7 +51,9 @@ impl Ahead {
         let reader = std::thread::Builder::new()
             .name("source".into())
             .spawn(move || read(source, &frames, &sender, &stopped))
-            .map_err(|e| Error::Source(Fault::new("source", format!("no thread could be started ({e})"))))?;
+            .map_err(|e| {
+                Error::Source(Fault::new("source", format!("no thread could be started ({e})")).caused_by(&e))
+            })?;
         Ok(Self { batches, stop, reader })
     }
 

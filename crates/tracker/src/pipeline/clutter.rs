@@ -1,4 +1,4 @@
-//! Whether most of what stands out in a recording is its background.
+//! Decides whether most of what stands out in a recording is its background.
 //!
 //! Owns: [`is_cluttered`]. Must not: find bodies.
 
@@ -6,20 +6,20 @@ use crate::detect::Detection;
 use crate::error::Result;
 use crate::store::DetectionStore;
 
-/// Frames that are looked at.
+/// Number of frames that are looked at.
 const FRAMES: usize = 25;
-/// Detections of a frame that are looked at.
+/// Maximum number of detections of a frame that are looked at.
 const MOST_DETECTIONS: usize = 300;
-/// A detection stands still if one is as near as this in nearly all frames, px: noise, and the camera's shake.
+/// Distance within which a detection stands at the same place in another frame, px: noise, and the camera's shake.
 const SAME_PLACE_PX: f64 = 1.5;
-/// Part of the frames in which it must be there. Markers rest too, but not in so many.
+/// Part of the frames in which a detection must be at the same place to stand still. Markers rest too, but in fewer frames.
 const STANDING_PART: f64 = 0.85;
-/// A mechanism may carry as many markers that hardly move.
+/// Least number of detections that stand still: a mechanism may carry fewer markers that hardly move.
 const LEAST_STANDING: usize = 12;
 /// Part of the detections that must stand still.
 const CLUTTER_PART: f64 = 0.6;
 
-/// Detections of a frame from which on their sizes tell: as many markers of one mechanism are made alike.
+/// Least number of detections in a frame whose sizes are compared: so many markers of one mechanism are made alike.
 const MANY: usize = 15;
 /// Ratio of the upper to the lower quartile of areas from which on detections are not made alike.
 const UNLIKE: f64 = 3.0;

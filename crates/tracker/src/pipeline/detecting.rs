@@ -1,4 +1,4 @@
-//! Detection in the frames of a recording on several threads, its results in the order of the recording.
+//! Detects in the frames of a recording on several threads, with results in the order of the recording.
 //!
 //! Owns: [`Detectors`], [`detect_all`]. Must not: know how a marker is detected.
 
@@ -20,7 +20,7 @@ use crate::source::cores;
 use crate::store::{DetectionStore, FrameStamp};
 use crate::table::SourceFacts;
 
-/// How long to wait for frames before looking whether the user wants to stop.
+/// Longest wait for frames before it is asked whether the user wants to stop.
 const PATIENCE: Duration = Duration::from_millis(50);
 
 /// A detector for each thread. Each keeps its scratch memory; none remembers a frame.
@@ -44,7 +44,7 @@ impl Detectors {
     }
 }
 
-/// What was found in a batch.
+/// Detections of a batch.
 #[derive(Default)]
 struct Found {
     first: usize,
@@ -142,6 +142,7 @@ pub fn detect_all(
                 stop.store(true, Ordering::Relaxed);
                 return Err(Error::Argument(
                     Fault::of(Setting::Threads, format!("thread {i} could not be started ({e})"))
+                        .caused_by(&e)
                         .advice("Ask for fewer"),
                 ));
             }

@@ -1,4 +1,4 @@
-//! From detections to the table: the rig is found if it is not given, markers are followed, rows are written.
+//! Makes the table from detections: finds the rig if none is given, follows the markers, writes the rows.
 
 use std::sync::atomic::Ordering;
 
@@ -15,7 +15,7 @@ use super::state;
 use super::summary::RunSummary;
 use super::times::times;
 use crate::discover::{Discovery, discover};
-use crate::error::{Error, Fault, Result};
+use crate::error::{Error, Fault, FaultKind, Result};
 use crate::frame::Ending;
 use crate::gaps::Damage;
 use crate::message::{Message, Setting};
@@ -235,15 +235,17 @@ impl Run<'_> {
         let fault = match (&self.settings.frames, ending) {
             (_, Some(Ending::Early { reason, .. })) => {
                 Fault::new(&self.settings.input, format!("not one frame could be read ({reason})"))
+                    .of_kind(FaultKind::Damaged)
                     .advice("Copy the recording again")
             }
             (Some(frames), _) => {
                 Fault::new(&self.settings.input, format!("it ends before frame {}", frames.start))
+                    .of_kind(FaultKind::Setting)
                     .advice("Give a range of frames that are there")
             }
-            (None, _) => {
-                Fault::new(&self.settings.input, "it has no frames").advice("Copy the recording again")
-            }
+            (None, _) => Fault::new(&self.settings.input, "it has no frames")
+                .of_kind(FaultKind::Damaged)
+                .advice("Copy the recording again"),
         };
         Error::Source(fault)
     }

@@ -1,4 +1,4 @@
-//! The one way through: source, detect, track, table, in that order, for every front end.
+//! Calls source, detect, track and table in that order, for every front end.
 
 mod ahead;
 mod candidates;
@@ -23,7 +23,7 @@ pub use observer::{Observer, Silent, Stage};
 pub use opening::open;
 pub(crate) use opening::{learn, sample};
 pub use run::run;
-pub use settings::{Existing, RunSettings};
+pub use settings::{Existing, RunSettings, frame_range};
 pub use state::partial_path;
 pub use summary::RunSummary;
 pub use times::{survey, times};

@@ -11,7 +11,7 @@ use super::opening::{Attended, on_threads, open};
 use super::request::fits;
 use super::settings::RunSettings;
 use super::summary::RunSummary;
-use crate::detect::{Centroid, DetectSettings, Polarity, Threshold};
+use crate::detect::{Centroid, DetectSettings, Threshold};
 use crate::error::{Error, Fault, Result};
 use crate::frame::SourceInfo;
 use crate::message::{Message, Setting};
@@ -29,7 +29,7 @@ const LEAST_CONFIDENCE: f64 = 0.2;
 /// Part of the decoded frames in which one marker at least must be seen for the rig to be believed.
 const LEAST_SEEN: f64 = 0.5;
 
-/// What came of looking at what moves.
+/// Outcome of looking at what moves.
 pub(super) enum Outcome {
     /// It is followed.
     Followed(Box<RunSummary>),
@@ -69,7 +69,7 @@ fn is_single(rig: &Rig) -> bool {
 fn is_understood(detect: &DetectSettings) -> bool {
     let said = DetectSettings {
         region: None,
-        polarity: Polarity::Auto,
+        polarity: None,
         threshold: Threshold::Auto,
         pixel_aspect: DetectSettings::default().pixel_aspect,
         ..detect.clone()
@@ -91,8 +91,11 @@ pub(super) fn check(settings: &RunSettings) -> Result<()> {
         return refuse("it is looked for in the whole recording, which can be read once only", "Give a file");
     }
     if !is_understood(&settings.detect) {
-        let contour = settings.detect.centroid == Centroid::Contour;
-        let what = if contour { "contours" } else { "limits of area and lenses" };
+        let what = match settings.detect.centroid {
+            Centroid::Disc => "limits of area and lenses",
+            Centroid::Weighted => "centres by intensity",
+            Centroid::Contour => "contours",
+        };
         return refuse(
             &format!("{what} are for markers that stand out, not for what moves"),
             "Leave one of them out",
@@ -172,11 +175,7 @@ fn limits(settings: &RunSettings, info: &SourceInfo, shrink: usize) -> Limits {
     Limits {
         region: settings.detect.region.clone().or(of_rig),
         shrink,
-        sign: match settings.detect.polarity {
-            Polarity::Auto => None,
-            Polarity::Bright => Some(1.0),
-            Polarity::Dark => Some(-1.0),
-        },
+        sign: settings.detect.polarity.map(|polarity| polarity.sign() as f32),
         level: match settings.detect.threshold {
             Threshold::Auto => None,
             // Work pictures have the upper 8 bits.
@@ -410,6 +409,7 @@ fn missed_words(missed: Missed, scale: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::detect::Polarity;
 
     fn plain() -> RunSettings {
         RunSettings { input: env!("CARGO_MANIFEST_DIR").into(), ..RunSettings::default() }
@@ -420,7 +420,7 @@ mod tests {
         assert!(applies(&plain()));
         let with = |detect| RunSettings { detect, ..plain() };
         let plain = DetectSettings::default;
-        assert!(applies(&with(DetectSettings { polarity: Polarity::Dark, ..plain() })));
+        assert!(applies(&with(DetectSettings { polarity: Some(Polarity::Dark), ..plain() })));
         assert!(!applies(&with(DetectSettings { min_area_px: Some(5.0), ..plain() })));
         assert!(!applies(&with(DetectSettings { threshold: Threshold::Raw(5.0), ..plain() })));
     }

@@ -1,10 +1,10 @@
-//! Who watches a run: progress, and the wish to stop.
+//! Defines who watches a run: progress, and the wish to stop.
 //!
 //! Owns: [`Observer`], [`Stage`]. Must not: hold a clock; observers may.
 
 use super::candidates::Candidates;
 
-/// What a run is doing.
+/// Stage of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stage {
     /// Opening the recording.

@@ -1,4 +1,4 @@
-//! Opening a recording and looking at its first frames, which may wait for a pipe that nobody feeds.
+//! Opens a recording and looks at its first frames, which may wait for a pipe that nobody feeds.
 //!
 //! Owns: [`open`]. Must not: read a recording through.
 
@@ -16,7 +16,7 @@ use crate::message::Setting;
 use crate::source::{self, OpenOptions, cores};
 use crate::stop::Stop;
 
-/// How long to wait before looking whether the user wants to stop.
+/// Longest wait before it is asked whether the user wants to stop.
 const PATIENCE: Duration = Duration::from_millis(50);
 
 /// Opens a recording as [`source::open`] does; the observer may give up waiting.
@@ -74,7 +74,9 @@ impl Attended {
                 outcome
             });
             let worker = begun.map_err(|e| {
-                Error::Argument(Fault::new("threads", format!("no thread could be started ({e})")))
+                Error::Argument(
+                    Fault::new("threads", format!("no thread could be started ({e})")).caused_by(&e),
+                )
             })?;
             while let Err(RecvTimeoutError::Timeout) = receiver.recv_timeout(PATIENCE) {
                 observer.progress(self.done.load(Ordering::Relaxed));
@@ -108,7 +110,9 @@ fn watched<T: Send + 'static>(
             // The receiver is gone if the user did not wait.
             let _ = sender.send(work());
         })
-        .map_err(|e| Error::Source(Fault::new("source", format!("no thread could be started ({e})"))))?;
+        .map_err(|e| {
+            Error::Source(Fault::new("source", format!("no thread could be started ({e})")).caused_by(&e))
+        })?;
     loop {
         match receiver.recv_timeout(PATIENCE) {
             Ok(outcome) => return outcome,

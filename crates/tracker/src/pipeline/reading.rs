@@ -1,4 +1,4 @@
-//! A recording on its way into detections: begun anew or gone on with, and read through.
+//! Reads a recording through into detections, from its beginning or from where an earlier run stopped.
 //!
 //! Owns: [`Run`], what is learned before detection. Must not: look for a rig or follow markers.
 
@@ -20,7 +20,7 @@ use crate::source::threads_note;
 use crate::store::DetectionStore;
 use crate::table::{Fingerprint, SourceFacts};
 
-/// Frames looked at before detection.
+/// Number of frames that are looked at before detection.
 const SAMPLES: usize = 12;
 
 /// A run between its steps.

@@ -1,4 +1,4 @@
-//! What is asked of a recording, and whether it can be: before anything is read, and once the recording is open.
+//! Checks what is asked of a recording: before anything is read, and once the recording is open.
 //!
 //! Owns: [`check`], [`Request`], [`already_done`]. Must not: read frames.
 
@@ -8,7 +8,7 @@ use super::settings::{Existing, RunSettings};
 use super::state::{State, anew, partial_path};
 use super::summary::{MOVING, RunSummary};
 use crate::detect::DetectSettings;
-use crate::error::{Error, Fault, Place, Result};
+use crate::error::{Error, Fault, FaultKind, Place, Result};
 use crate::frame::SourceInfo;
 use crate::message::{SETUP, Setting};
 use crate::name::text;
@@ -46,13 +46,14 @@ pub(super) fn check(settings: &RunSettings) -> Result<Vec<PathBuf>> {
     if Spool::is_at(&partial)? && !replace {
         return Err(Error::Table(
             Fault::new(text(&partial), "an earlier run was stopped and can go on")
+                .of_kind(FaultKind::Exists)
                 .advice("Go on with " + Setting::Resume + ", or begin anew with " + Setting::Force),
         ));
     }
     Ok(files)
 }
 
-/// What is asked of a recording, once it is open.
+/// A request to a recording that is open.
 pub(super) struct Request {
     /// None where the recording cannot be read again.
     pub files: Vec<PathBuf>,
@@ -91,6 +92,7 @@ pub(super) fn already_done(settings: &RunSettings, request: &Request) -> Result<
                 text(output),
                 format!("its run was stopped, but its state {} is gone", text(&partial)),
             )
+            .of_kind(FaultKind::Missing)
             .advice(anew()),
         ));
     }

@@ -1,4 +1,4 @@
-//! The steps of a run, in their order.
+//! Runs the steps of a run in their order.
 //!
 //! Owns: [`run`]. Must not: print, read a clock, or do any of the steps' work.
 

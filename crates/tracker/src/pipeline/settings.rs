@@ -1,6 +1,6 @@
-//! What a run is asked for.
+//! Defines the settings of a run.
 //!
-//! Owns: [`RunSettings`], [`Existing`]. Must not: look at a recording.
+//! Owns: [`RunSettings`], [`Existing`], [`frame_range`]. Must not: look at a recording.
 
 use std::ops::Range;
 use std::path::PathBuf;
@@ -13,7 +13,7 @@ use crate::rig::Rig;
 use crate::source::{Interlaced, OpenOptions};
 use crate::wanted::Wanted;
 
-/// What to do where the output is there already.
+/// Treatment of an output that is there already.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Existing {
     /// Refuse.
@@ -25,7 +25,20 @@ pub enum Existing {
     Resume,
 }
 
-/// What to run.
+/// The frames of `A..B`, `A..` or `..B`: from A up to but not B.
+///
+/// # Errors
+/// What was expected.
+pub fn frame_range(text: &str) -> Result<Range<u64>, String> {
+    let form = "expected A..B, for example 0..1000";
+    let (start, end) = text.split_once("..").ok_or(form)?;
+    let number = |t: &str, none: u64| {
+        if t.is_empty() { Ok(none) } else { t.parse().map_err(|_| format!("{t:?} is not a frame; {form}")) }
+    };
+    Ok(number(start, 0)?..number(end, u64::MAX)?)
+}
+
+/// Settings of a run.
 #[derive(Debug, Clone, Default)]
 pub struct RunSettings {
     /// The recording, as [`crate::source::open`] takes it.

@@ -1,4 +1,4 @@
-//! What a run leaves beside its output until the table is whole, so that a killed one can go on.
+//! Writes and reads the state that a run leaves beside its output until the table is whole, so that a killed run can go on.
 //!
 //! Owns: the name of that file, the header in it, what must agree for a run to go on. The detections in it are
 //! what a finished table is made of, whether one run made them or several: so the table's bytes are the same.
@@ -11,8 +11,8 @@ use sha2::{Digest, Sha256};
 
 use super::ahead::End;
 use super::settings::RunSettings;
-use crate::detect::{DetectSettings, Levels};
-use crate::error::{Error, Fault, Place, Result};
+use crate::detect::{Centroid, DetectSettings, Levels};
+use crate::error::{Error, Fault, FaultKind, Place, Result};
 use crate::frame::{Ending, RateOrigin};
 use crate::gaps::Gaps;
 use crate::message::{Message, Setting};
@@ -34,17 +34,17 @@ pub fn partial_path(output: &Path) -> PathBuf {
     output.with_file_name(name)
 }
 
-/// When the files of the recording were written, in the identity of a run.
+/// Key of the times at which the recording's files were written, in the identity of a run.
 const TIMES: &str = "recording's times";
 
-/// What must be the same for a run to go on: recording, detection, range of frames, program.
+/// Identity of a run, which must be the same for it to go on: recording, detection, range of frames, program.
 pub struct State {
     identity: Value,
     /// When the recording's files were changed, see [`Fingerprint::changes`]; `None` where it has none.
     pub changes: Option<String>,
 }
 
-/// What an earlier run left.
+/// State that an earlier run left.
 pub struct Earlier {
     pub spool: Spool,
     pub levels: Levels,
@@ -56,6 +56,17 @@ pub struct Earlier {
 struct Header {
     identity: Value,
     levels: Levels,
+}
+
+/// What was asked of an earlier run, whose centres by discs may be called by the word of before.
+fn in_words_of_today(before: &Value) -> Value {
+    let mut before = before.clone();
+    if let Some(word) = before.pointer_mut("/detection settings/centroid")
+        && let Ok(centroid) = serde_json::from_value::<Centroid>(word.clone())
+    {
+        *word = json!(centroid);
+    }
+    before
 }
 
 /// What tells one recording from another. Its rate, known for certain only when it was read through, follows from
@@ -105,6 +116,7 @@ impl State {
 
     /// Whether nothing differs from what was; `what` begins the message.
     fn same(&self, before: &Value, path: &Path, what: &str) -> Result<()> {
+        let before = in_words_of_today(before);
         let Some(object) = self.identity.as_object() else { return Ok(()) };
         match object.iter().find(|&(key, value)| before.get(key) != Some(value)) {
             None => Ok(()),
@@ -133,7 +145,9 @@ impl State {
         let (spool, head) = Spool::resume(&path)?;
         let header: Header = serde_json::from_str(&head).map_err(|e| {
             Error::Table(
-                Fault::new(text(&path), format!("its header is of another program ({e})")).advice(anew()),
+                Fault::new(text(&path), format!("its header is of another program ({e})"))
+                    .of_kind(FaultKind::Damaged)
+                    .advice(anew()),
             )
         })?;
         self.same(&header.identity, &path, "the earlier run had another")?;
@@ -185,7 +199,9 @@ pub fn finished(end: &End) -> Result<Finished> {
 fn read_end(words: &str, path: &Path) -> Result<End> {
     let words: EndingText = serde_json::from_str(words).map_err(|e| {
         Error::Table(
-            Fault::new(text(path), format!("its last record is of another program ({e})")).advice(anew()),
+            Fault::new(text(path), format!("its last record is of another program ({e})"))
+                .of_kind(FaultKind::Damaged)
+                .advice(anew()),
         )
     })?;
     let ending = match words.early {
@@ -204,7 +220,24 @@ pub fn remove(output: &Path) -> Result<()> {
     std::fs::remove_file(&path).map_err(|e| {
         Error::Table(
             Fault::new(text(&path), format!("no run needs this any more, and it cannot be removed ({e})"))
+                .caused_by(&e)
                 .advice("Remove it yourself"),
         )
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_run_of_before_is_known_by_its_older_word_for_the_centre() {
+        let asked = |word: &str| json!({"detection settings": {"centroid": word}, "fps": 500.0});
+        let today = |word: &str| in_words_of_today(&asked(word));
+        assert_eq!(today("weighted"), asked("disc"));
+        for word in ["disc", "contour", "intensity_weighted", "no word of ours"] {
+            assert_eq!(today(word), asked(word));
+        }
+        assert_eq!(in_words_of_today(&json!({"fps": 1.0})), json!({"fps": 1.0}));
+    }
 }

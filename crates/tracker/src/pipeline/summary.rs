@@ -1,4 +1,4 @@
-//! What came of a run: [`RunSummary`].
+//! Holds the summary of a run: [`RunSummary`].
 
 use crate::message::Message;
 use crate::table::{NodeSummary, NodeTable, TableMeta};
@@ -6,7 +6,7 @@ use crate::table::{NodeSummary, NodeTable, TableMeta};
 /// Key of the table's settings under which is said what was followed in place of markers.
 pub(super) const MOVING: &str = "moving";
 
-/// What came of a run.
+/// Summary of a run.
 #[derive(Debug, Clone)]
 pub struct RunSummary {
     /// What the table says of itself.

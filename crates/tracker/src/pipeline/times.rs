@@ -1,4 +1,4 @@
-//! What the frames' times are, from the time stamps of a whole recording or of as much as was looked at.
+//! Decides what the frames' times are, from the time stamps of a whole recording or of as much as was looked at.
 //!
 //! Owns: [`times`], [`survey`]. Must not: decode.
 

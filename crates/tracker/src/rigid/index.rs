@@ -1,4 +1,4 @@
-//! A spatial index over one frame's detections answers which are nearest to a place.
+//! Indexes one frame's detections by place (k-d tree): which are nearest to a place.
 //!
 //! Owns: [`DetectionIndex`]. It is a k-d tree (kiddo's immutable one, which takes any number of equal coordinates).
 
@@ -15,7 +15,7 @@ pub struct DetectionIndex<'a> {
 }
 
 impl<'a> DetectionIndex<'a> {
-    /// Below this many the straight search beats building a tree.
+    /// Number of detections below which a straight search beats building a tree.
     const STRAIGHT: usize = 24;
 
     /// The detections as they are; those with a place that is not finite are never found.
@@ -37,7 +37,7 @@ impl<'a> DetectionIndex<'a> {
         Self { detections, tree, widest_px }
     }
 
-    /// How many detections there are.
+    /// Number of detections.
     pub fn len(&self) -> usize {
         self.detections.len()
     }

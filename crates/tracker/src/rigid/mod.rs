@@ -1,4 +1,4 @@
-//! Planar rigid bodies: their poses, joints and motion, and how one is found among detections.
+//! Fits, predicts and finds planar rigid bodies: their poses, joints and motion.
 //!
 //! Owns: the modules below. Must not: follow a body through a recording (`track` does), or know of pixels' values.
 

@@ -52,7 +52,7 @@ pub struct PoseHypothesis {
     pub chi2: f64,
 }
 
-/// What a search found.
+/// Outcome of a search.
 #[derive(Debug, Default)]
 pub struct Found {
     /// Hypotheses with different detections, the best first.
@@ -81,6 +81,7 @@ pub struct Search<'a> {
     pub pairs: usize,
 }
 
+/// An angle brought into -pi to pi, rad.
 fn turned(a: f64) -> f64 {
     let t = a.rem_euclid(std::f64::consts::TAU);
     if t > PI { t - std::f64::consts::TAU } else { t }
@@ -110,6 +111,7 @@ impl Search<'_> {
         f64::from(self.index.get(d).area_px) < LEAST_PART * self.link.area_px[j].0
     }
 
+    /// Standard uncertainty of a detection of node `j` before it is known which, px: that of the least exact one.
     fn usual_sigma(&self, j: usize) -> f64 {
         let own = self.index.widest_px();
         (own * own + self.link.slack_px[j].powi(2) + self.floor_px.powi(2)).sqrt()
@@ -199,6 +201,7 @@ impl Search<'_> {
         (inliers > 0 && self.allowed(&fit.pose)).then_some(PoseHypothesis { fit, picks, inliers, chi2 })
     }
 
+    /// Points of the body and their places: the anchors, and the whole detections.
     fn pairs(&self, picks: &[Option<usize>]) -> Vec<Pair> {
         let mut pairs: Vec<Pair> = self
             .anchors
@@ -294,6 +297,7 @@ impl Search<'_> {
         found
     }
 
+    /// Two anchors far enough apart to fix the pose alone.
     fn far_anchors(&self) -> Option<(Anchor, Anchor)> {
         let a = *self.anchors.first()?;
         let b = self.anchors[1..]
@@ -347,6 +351,7 @@ impl Search<'_> {
         }
     }
 
+    /// Refines a pose and keeps what comes of it, if the window allows it and no hypothesis with the same detections is there.
     fn test(&self, pose: Isometry2<f64>, about: Vector2<f64>, slack_rad: f64, found: &mut Found) {
         if let Some(w) = &self.window {
             // The seed's own uncertainty widens the window here; the fitted pose is held to it.

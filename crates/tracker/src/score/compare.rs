@@ -6,10 +6,10 @@ use super::result::{AngleError, FULL, HALF, Match, Reacquisition, Score, Tracked
 use crate::error::{Error, Fault, Result};
 use crate::synth::Truth;
 
-/// Wrong identities that are named in a [`Score`].
+/// Maximum number of wrong identities that a [`Score`] names.
 const FIRST_WRONG: usize = 10;
 
-/// What became of the nodes' identities.
+/// Correctness of the nodes' identities.
 #[derive(Default)]
 struct Identities {
     wrong: u64,

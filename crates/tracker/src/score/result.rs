@@ -6,9 +6,9 @@ use serde::Serialize;
 
 use crate::table::NodeTable;
 
-/// A marker of which less is seen need not be found.
+/// Visible part of a marker below which it need not be found.
 pub const HALF: f64 = 0.5;
-/// A marker is fully visible when no more than this is missing; supersampled parts are known to 0.01.
+/// Visible part from which on a marker is fully visible; supersampled parts are known to 0.01.
 pub const FULL: f64 = 0.99;
 
 /// Places from a node table.
@@ -46,7 +46,7 @@ pub struct Match {
     pub coverage: f64,
 }
 
-/// How long markers that came back were not seen.
+/// Delay with which markers that came back were seen again.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Reacquisition {
     /// Times that a marker became fully visible again.

@@ -5,12 +5,12 @@
 use std::fs;
 
 use super::OpenOptions;
-use super::ffmpeg::formats::is_address;
-use crate::error::{Error, Fault, Result};
+use super::ffmpeg::formats::is_protocol;
+use crate::error::{Error, Fault, FaultKind, Result};
 use crate::message::Setting;
 use crate::name::path;
 
-/// What a name stands for.
+/// Kinds of things that a name stands for.
 pub(crate) enum Input {
     /// A file that can be read again.
     File(String),
@@ -50,13 +50,16 @@ impl Input {
     fn address(name: &str, options: &OpenOptions) -> Result<Self> {
         if !is_address(name) {
             return Err(Error::Source(
-                Fault::new(name, "no such file").advice("Check the name and the folder you are in"),
+                Fault::new(name, "no such file")
+                    .of_kind(FaultKind::Missing)
+                    .advice("Check the name and the folder you are in"),
             ));
         }
         let scheme = name.split([':', ',']).next().unwrap_or(name);
         if !options.allow_protocol {
             return Err(Error::Source(
                 Fault::new(name, format!("an address ({scheme}:), and these are not opened unasked"))
+                    .of_kind(FaultKind::Setting)
                     .advice("Add " + Setting::AllowProtocol + " if you trust it"),
             ));
         }
@@ -70,4 +73,10 @@ pub(crate) fn is_read_once(name: &str) -> bool {
         Ok(facts) => !facts.is_file() && !facts.is_dir(),
         Err(_) => name == "-" || is_address(name),
     }
+}
+
+/// Whether a name begins with one of FFmpeg's protocols, other than that for files, or looks as addresses do.
+fn is_address(name: &str) -> bool {
+    let is_scheme = |s: &str| !s.is_empty() && s.chars().all(|c| c.is_ascii_alphanumeric());
+    name.split_once("://").is_some_and(|(scheme, _)| is_scheme(scheme)) || is_protocol(name)
 }

@@ -4,12 +4,20 @@
 
 mod cine;
 mod clock;
+#[cfg(feature = "ffmpeg")]
+mod ffmpeg;
+#[cfg(not(feature = "ffmpeg"))]
+#[path = "without_ffmpeg.rs"]
 mod ffmpeg;
 mod images;
 mod input;
 mod mraw;
 mod norpix;
 mod open;
+#[cfg(all(feature = "ffmpeg", feature = "opencv"))]
+mod opencv;
+#[cfg(not(all(feature = "ffmpeg", feature = "opencv")))]
+#[path = "without_opencv.rs"]
 mod opencv;
 mod options;
 mod orientation;

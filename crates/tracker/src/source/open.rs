@@ -8,7 +8,7 @@ use std::path::PathBuf;
 
 use super::input::Input;
 use super::{Decoder, OpenOptions, cine, ffmpeg, images, mraw, norpix, opencv};
-use crate::error::{Error, Fault, Result};
+use crate::error::{Error, Fault, FaultKind, Result};
 use crate::frame::FrameSource;
 use crate::kind::{self, Kind};
 use crate::message::Setting;
@@ -40,6 +40,25 @@ pub fn files(name: &str) -> Result<Vec<PathBuf>> {
 /// Opens a recording by what its first bytes say it is, whatever its name; `-` is standard input. A name that is not
 /// UTF-8 is given as [`crate::name::text`] makes it.
 ///
+/// ```
+/// # use tracker::synth::{Film, WriteOptions, preset, write};
+/// use tracker::source::{OpenOptions, open};
+///
+/// # let folder = tempfile::tempdir().unwrap();
+/// # let path = folder.path().join("drop.mraw");
+/// # let scene = tracker::synth::Scene { frames: 5, ..preset("clean", 1)? };
+/// # write(&Film::new(&scene)?, &path, &WriteOptions::default(), &mut |_| Ok(()))?;
+/// # let name = path.display().to_string();
+/// let mut recording = open(&name, &OpenOptions::default())?;
+/// let time_base = recording.info().time_base;
+/// let mut times_s = Vec::new();
+/// while let Some(frame) = recording.next_frame()? {
+///     times_s.push(time_base.seconds(frame.ticks));
+/// }
+/// assert_eq!(times_s, [0.0, 0.002, 0.004, 0.006, 0.008]);
+/// # Ok::<(), tracker::error::Error>(())
+/// ```
+///
 /// # Errors
 /// [`Error::Source`] if there is no such file or nothing here reads it; [`Error::Argument`] for options that
 /// make no sense.
@@ -49,6 +68,7 @@ pub fn open(name: &str, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
         if options.decoder == Decoder::Opencv {
             return Err(Error::Source(
                 Fault::new(name, "pictures are read without OpenCV's decoder")
+                    .of_kind(FaultKind::Unsupported)
                     .advice("Leave out " + Setting::Decoder.set_to("opencv")),
             ));
         }
@@ -77,6 +97,7 @@ pub fn open(name: &str, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
             return match options.decoder {
                 Decoder::Opencv => Err(Error::Source(
                     Fault::new(name, format!("OpenCV does not read {}", source.info().container))
+                        .of_kind(FaultKind::Unsupported)
                         .advice("Leave out " + Setting::Decoder.set_to("opencv")),
                 )),
                 _ => Ok(source),
@@ -91,6 +112,7 @@ pub fn open(name: &str, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
         Input::File(_) => Ok(Box::new(opencv::OpencvSource::open(name, &input, &source, options)?)),
         _ => Err(Error::Source(
             Fault::new(name, "OpenCV's decoder reads files only")
+                .of_kind(FaultKind::Unsupported)
                 .advice("Leave out " + Setting::Decoder.set_to("opencv")),
         )),
     }
@@ -100,14 +122,18 @@ pub fn open(name: &str, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
 fn first_bytes(name: &str) -> Result<Vec<u8>> {
     let unreadable = |e: std::io::Error| {
         Error::Source(
-            Fault::new(name, format!("the file cannot be read ({e})")).advice("Check its permissions"),
+            Fault::new(name, format!("the file cannot be read ({e})"))
+                .caused_by(&e)
+                .advice("Check its permissions"),
         )
     };
     let mut bytes = Vec::new();
     File::open(path(name)).map_err(unreadable)?.take(4096).read_to_end(&mut bytes).map_err(unreadable)?;
     if bytes.is_empty() {
         return Err(Error::Source(
-            Fault::new(name, "the file is empty").advice("Check that it was copied whole"),
+            Fault::new(name, "the file is empty")
+                .of_kind(FaultKind::Damaged)
+                .advice("Check that it was copied whole"),
         ));
     }
     Ok(bytes)

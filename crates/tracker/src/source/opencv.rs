@@ -16,7 +16,7 @@ use opencv::videoio::{self, VideoCapture};
 use super::ffmpeg::{FfmpegSource, display_times};
 use super::orientation::Orientation;
 use super::{Input, OpenOptions};
-use crate::error::{Error, Fault, Result};
+use crate::error::{Error, Fault, FaultKind, Result};
 use crate::frame::{Ending, Frame, FrameSource, PixelFormat, SourceInfo};
 use crate::message::Setting;
 
@@ -50,6 +50,7 @@ impl OpencvSource {
                     name,
                     format!("{} bits per pixel, and OpenCV's decoder keeps 8", known.depth_bits),
                 )
+                .of_kind(FaultKind::Unsupported)
                 .advice("Leave out " + Setting::Decoder.set_to("opencv")),
             ));
         }
@@ -83,6 +84,7 @@ fn open(name: &str, orientation: Orientation) -> Result<VideoCapture> {
     let failed = |why: String| {
         Error::Source(
             Fault::new(name, format!("OpenCV does not open it{why}"))
+                .of_kind(FaultKind::Unsupported)
                 .advice("Leave out " + Setting::Decoder.set_to("opencv")),
         )
     };
@@ -158,6 +160,7 @@ impl FrameSource for OpencvSource {
             if self.next == 0 {
                 return Err(Error::Source(
                     Fault::new(&self.info.name, "OpenCV decodes no frame of it")
+                        .of_kind(FaultKind::Damaged)
                         .advice("Leave out " + Setting::Decoder.set_to("opencv")),
                 ));
             }

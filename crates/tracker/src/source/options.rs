@@ -1,7 +1,8 @@
 //! Defines the options of reading a recording.
 
-use crate::message::Message;
+use crate::message::{Message, Setting};
 use crate::pixel_aspect::{AspectOrigin, PixelAspect};
+use crate::setting_words::words;
 
 /// Which decoder reads compressed film.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
@@ -16,7 +17,7 @@ pub enum Decoder {
     Opencv,
 }
 
-/// How interlaced film is read, whose pictures hold two fields filmed one after the other.
+/// Treatment of interlaced film, whose pictures hold two fields filmed one after the other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Interlaced {
@@ -27,7 +28,18 @@ pub enum Interlaced {
     AsFrames,
 }
 
-/// What a user may say about reading a recording. The default says nothing.
+words!(Decoder, Setting::Decoder, [
+    "auto" => Decoder::Auto,
+    "ffmpeg" => Decoder::Ffmpeg,
+    "opencv" => Decoder::Opencv,
+]);
+
+words!(Interlaced, Setting::Interlaced, [
+    "refuse" => Interlaced::Refuse,
+    "as-frames" => Interlaced::AsFrames,
+]);
+
+/// Options of reading a recording. The default says nothing.
 #[derive(Debug, Clone, Default)]
 pub struct OpenOptions {
     /// Frames per second of recorded time; replaces all time stamps of the recording.
@@ -56,11 +68,11 @@ impl OpenOptions {
     }
 }
 
-/// Threads for each core at most. Threads that wait for the disk are worth having beside those that compute; with more
+/// Maximum number of threads for each core. Threads that wait for the disk are worth having beside those that compute; with more
 /// than four for each core nothing is faster, and each takes memory.
 const THREADS_PER_CORE: usize = 4;
 
-/// How many threads `threads` stands for: 0 is one for each core, and no more than a few for each are begun.
+/// Number of threads that `threads` stands for: 0 is one for each core, and no more than a few for each are begun.
 pub(crate) fn cores(threads: usize) -> usize {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     match threads {

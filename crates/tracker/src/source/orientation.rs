@@ -1,10 +1,10 @@
-//! How a recording says that its pictures are to be turned before they are looked at.
+//! Turns and mirrors pictures as a recording says before they are looked at.
 //!
 //! Owns: [`Orientation`]. Must not: know where a recording says it.
 
 use crate::message::Message;
 
-/// How the picture must be turned to be seen as it was filmed: first transposed, then mirrored.
+/// Turn that shows a picture as it was filmed: first transposed, then mirrored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Orientation {
     /// Rows become columns.

@@ -12,13 +12,13 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use rustix::fs::{Advice, fadvise};
 
-use crate::error::{Error, Fault, Place, Result};
+use crate::error::{Error, Fault, FaultKind, Place, Result};
 use crate::frame::Bytes;
 
-/// Bytes that the system is asked to have ready; it is asked anew when half of them are read.
+/// Bytes that the system is asked to have ready, anew when half of them are read.
 const AHEAD_BYTES: u64 = 32 << 20;
 
-/// How samples lie in the file, where that is not how detection takes them.
+/// Storage of samples in the file, where detection does not take them so.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Stored {
     /// As detection takes them: bytes, little-endian pairs, or packed.
@@ -136,9 +136,11 @@ impl Shared {
     fn fault(&self, index: u64, error: &std::io::Error) -> Fault {
         let fault = if error.kind() == ErrorKind::UnexpectedEof {
             Fault::new(&self.name, "the file became shorter while it was read")
+                .of_kind(FaultKind::Damaged)
                 .advice("Wait until no other program writes to it, and run again")
         } else {
             Fault::new(&self.name, format!("the file cannot be read ({error})"))
+                .caused_by(error)
                 .advice("Copy it to a local disk")
         };
         fault.at(Place::Frame(index))

@@ -11,7 +11,7 @@ use std::os::unix::fs::{FileExt, MetadataExt};
 use std::path::{Path, PathBuf};
 
 use super::block::{BLOCK_FRAMES, Block};
-use crate::error::{Error, Fault, Place, Result};
+use crate::error::{Error, Fault, FaultKind, Place, Result};
 use crate::message::Setting;
 use crate::name::text;
 
@@ -27,7 +27,7 @@ const SYNC_BYTES: u64 = 4 << 20;
 /// A payload longer than this is damage, not a block: 256 frames of 100,000 detections are 0.85 GB.
 const LONGEST_PAYLOAD: u32 = 1 << 30;
 
-/// How a recording ended, as the pipeline writes it; the spool does not read it.
+/// Ending of a recording, as the pipeline writes it; the spool does not read it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Finished {
     /// Text, JSON of the pipeline's making.
@@ -78,6 +78,7 @@ impl Spool {
         let unreadable = |e: std::io::Error| {
             Error::Table(
                 Fault::new(&name, format!("the state of the earlier run cannot be read ({e})"))
+                    .caused_by(&e)
                     .advice("Check its permissions"),
             )
         };
@@ -156,6 +157,7 @@ impl Spool {
         let damaged = |name: &str| {
             Error::Table(
                 Fault::new(name, "its beginning is damaged, so nothing of the earlier run can be kept")
+                    .of_kind(FaultKind::Damaged)
                     .advice("Run without " + Setting::Resume),
             )
         };
@@ -277,6 +279,7 @@ impl Spool {
         frames_of(&payload).and_then(|frames| Block::decode(&payload[4..], frames)).ok_or_else(|| {
             Error::Table(
                 Fault::new(&self.name, "a block of detections has changed on disk")
+                    .of_kind(FaultKind::Damaged)
                     .at(Place::Byte(start))
                     .advice("Run again without " + Setting::Resume),
             )
@@ -324,7 +327,9 @@ fn lock(file: &File, name: &str) -> Result<()> {
     match file.try_lock() {
         Ok(()) => Ok(()),
         Err(std::fs::TryLockError::WouldBlock) => Err(Error::Table(
-            Fault::new(name, "another run is writing it").advice("Wait for it or choose another output"),
+            Fault::new(name, "another run is writing it")
+                .of_kind(FaultKind::Exists)
+                .advice("Wait for it or choose another output"),
         )),
         // A file system without locks (some network ones): two runs at once are then the user's care.
         Err(std::fs::TryLockError::Error(e)) if e.kind() == ErrorKind::Unsupported => Ok(()),
@@ -372,7 +377,7 @@ fn fill(reader: &mut impl Read, bytes: &mut [u8]) -> std::io::Result<bool> {
 }
 
 fn read_fault(name: &str, e: &std::io::Error, at: u64) -> Error {
-    Error::Table(Fault::new(name, format!("it cannot be read ({e})")).at(Place::Byte(at)))
+    Error::Table(Fault::new(name, format!("it cannot be read ({e})")).caused_by(e).at(Place::Byte(at)))
 }
 
 fn write_fault(name: &str, e: &std::io::Error) -> Error {
@@ -382,5 +387,5 @@ fn write_fault(name: &str, e: &std::io::Error) -> Error {
         }
         _ => "Choose a folder that can be written".into(),
     };
-    Error::Table(Fault::new(name, format!("it cannot be written ({e})")).advice(advice))
+    Error::Table(Fault::new(name, format!("it cannot be written ({e})")).caused_by(e).advice(advice))
 }

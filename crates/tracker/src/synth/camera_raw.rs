@@ -64,7 +64,7 @@ impl MrawWriter {
         let bytes = pack(samples, self.deep, self.bits, &mut self.packed);
         self.pixels
             .write_all(bytes)
-            .map_err(|e| Error::Film(Fault::new(&self.name, format!("writing failed ({e})"))))
+            .map_err(|e| Error::Film(Fault::new(&self.name, format!("writing failed ({e})")).caused_by(&e)))
     }
 
     /// Ends the pair.

@@ -10,6 +10,16 @@
 //!
 //! A frame's time is the middle of its exposure. Everything random comes from the scene's seed and the frame's
 //! index, so frames may be made in any order and by any number of threads. The noise model is in [`noise`].
+//!
+//! ```
+//! use tracker::synth::{Film, preset};
+//!
+//! let film = Film::new(&preset("noisy", 3)?)?;
+//! let (mut samples, truth) = (Vec::new(), film.truth(10));
+//! film.render(10, &mut samples);
+//! assert_eq!((samples.len(), truth.nodes.len()), (720 * 720, 9));
+//! # Ok::<(), tracker::error::Error>(())
+//! ```
 
 mod camera_raw;
 mod canvas;

@@ -160,7 +160,7 @@ struct LinkDrive {
     place: Option<[Spline; 2]>,
 }
 
-/// All links of a scene, ready to be asked where they are.
+/// The links of a scene, with the pose of each at any time.
 #[derive(Debug, Clone)]
 pub(crate) struct Mechanism {
     links: Vec<LinkDrive>,

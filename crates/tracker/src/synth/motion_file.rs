@@ -8,7 +8,7 @@ use arrow::datatypes::{DataType, Float64Type};
 use parquet::arrow::arrow_reader::{ArrowReaderOptions, ParquetRecordBatchReaderBuilder};
 
 use super::motion::MotionTable;
-use crate::error::{Error, Fault, Place, Result};
+use crate::error::{Error, Fault, FaultKind, Place, Result};
 use crate::kind::{self, Kind};
 
 impl MotionTable {
@@ -26,6 +26,7 @@ impl MotionTable {
             _ => {
                 return Err(Error::Film(
                     Fault::new(&name, "a motion is read from .csv or .parquet")
+                        .of_kind(FaultKind::Unsupported)
                         .advice("Give the table one of these endings"),
                 ));
             }

@@ -144,7 +144,7 @@ pub struct MotionFile {
     pub start_s: Option<f64>,
 }
 
-/// How a link turns if no table says it.
+/// Motion of a link that no table gives.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, tag = "kind", rename_all = "snake_case")]
 pub enum LinkMotion {
@@ -331,6 +331,7 @@ impl Scene {
         let text = std::fs::read_to_string(path).map_err(|e| {
             Error::Film(
                 Fault::new(&name, format!("the scene cannot be read ({e})"))
+                    .caused_by(&e)
                     .advice("Give a scene in TOML, e.g. one that " + PRINT_SCENE + " prints"),
             )
         })?;

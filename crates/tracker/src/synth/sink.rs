@@ -10,13 +10,13 @@ use super::camera_raw::{MrawWriter, pair};
 use super::encode::{Codec, ImageKind, VideoSettings, VideoWriter, cannot_write, encode_image};
 use super::film::Film;
 use super::write_options::{WriteOptions, codec_of, ending};
-use crate::error::{Error, Fault, Place, Result};
+use crate::error::{Error, Fault, FaultKind, Place, Result};
 use crate::name::{self, text};
 use crate::output::{self, NewFile};
 
 type Pages = tiff::encoder::TiffEncoder<BufWriter<File>>;
 
-/// What frames are written to.
+/// Target of the frames that are written.
 pub(super) enum Sink {
     Video(VideoWriter),
     Mraw(MrawWriter),
@@ -69,9 +69,11 @@ impl Sink {
         }
         let Some(kind) = image_kind(&ending) else {
             return Err(Error::Film(
-                Fault::new(&name, format!("no film is written to a file that ends in {ending:?}")).advice(
-                    "Choose .mp4, .mov, .mkv, .avi, .mraw, .y4m, .tif, or images such as frames/%05d.png",
-                ),
+                Fault::new(&name, format!("no film is written to a file that ends in {ending:?}"))
+                    .of_kind(FaultKind::Unsupported)
+                    .advice(
+                        "Choose .mp4, .mov, .mkv, .avi, .mraw, .y4m, .tif, or images such as frames/%05d.png",
+                    ),
             ));
         };
         if numbered(&name, 0).is_some() {

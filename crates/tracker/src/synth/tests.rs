@@ -5,9 +5,11 @@ use super::*;
 use crate::frame::TimeBase;
 use rayon::prelude::*;
 
+/// The first four lines of every scene here.
+const HEAD: &str = "schema = 1\nimage_px = [64, 48]\nframes = 10\nrate_hz = 1000.0\n";
+
 fn scene(text: &str) -> Scene {
-    let head = "schema = 1\nimage_px = [64, 48]\nframes = 10\nrate_hz = 1000.0\n";
-    Scene::parse(&format!("{head}{text}"), "test").unwrap()
+    Scene::parse(&format!("{HEAD}{text}"), "test").unwrap()
 }
 
 const ONE_DISC: &str = r#"
@@ -245,8 +247,7 @@ fn rates_are_exact_fractions() {
 
 #[test]
 fn faults_in_scenes_are_named() {
-    let head = "schema = 1\nimage_px = [64, 48]\nframes = 10\nrate_hz = 1000.0\n";
-    let message = |text: &str| Scene::parse(&format!("{head}{text}"), "s.toml").unwrap_err().to_string();
+    let message = |text: &str| Scene::parse(&format!("{HEAD}{text}"), "s.toml").unwrap_err().to_string();
     assert!(
         message("colour = 3\n").starts_with("s.toml, line 5: unknown field `colour`"),
         "{}",

@@ -39,7 +39,7 @@ pub struct FrameTruth {
 }
 
 impl Film {
-    /// What is true of a frame.
+    /// Truth of a frame.
     pub fn truth(&self, index: u64) -> FrameTruth {
         let scene = &self.scene;
         let size = scene.image_px.map(f64::from);

@@ -28,7 +28,7 @@ use parquet::file::properties::WriterProperties;
 use super::film::Film;
 use super::truth::FrameTruth;
 use crate::csv_text::{Cells, read_cell, split};
-use crate::error::{Error, Fault, Place, Result};
+use crate::error::{Error, Fault, FaultKind, Place, Result};
 use crate::kind::{self, Kind};
 use crate::message::FILM_TRUTH;
 use crate::name::text;
@@ -69,6 +69,7 @@ impl TruthWriter {
         if !matches!(ending, Some("csv" | "parquet")) {
             return Err(Error::Film(
                 Fault::new(&name, "the truth is written to .parquet or .csv")
+                    .of_kind(FaultKind::Unsupported)
                     .advice("Give the file one of these endings"),
             ));
         }
@@ -234,6 +235,7 @@ impl Truth {
             _ => {
                 return Err(Error::Film(
                     Fault::new(&name, "the truth is read from .parquet or .csv")
+                        .of_kind(FaultKind::Unsupported)
                         .advice("Give the table that " + FILM_TRUTH + " wrote"),
                 ));
             }

@@ -1,4 +1,4 @@
-//! Which options a film's form has: one that does nothing is refused.
+//! Defines the options of writing a film, and refuses one that does nothing for its form.
 
 use std::path::{Path, PathBuf};
 
@@ -8,7 +8,7 @@ use crate::error::{Error, Fault, Result};
 use crate::message::Setting;
 use crate::name::text;
 
-/// How a film is written. The default follows the name's ending.
+/// Options of writing a film. The default follows the name's ending.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct WriteOptions {
     /// Codec of a video file.
@@ -45,7 +45,7 @@ pub const X264_PRESETS: [&str; 10] = [
     "placebo",
 ];
 
-/// What the frames of a film become.
+/// Form of the file or files of a film.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Form {
     Video(Codec),

@@ -8,7 +8,7 @@ use super::check::{Before, first_fault};
 use super::shared::{GROUP_ROWS, json_beside};
 use super::{NodeTable, Rows, TableMeta, csv, csv_read, parquet, parquet_read, row_fault};
 use crate::csv_text::Cells;
-use crate::error::{Error, Fault, Result};
+use crate::error::{Error, Fault, FaultKind, Result};
 use crate::kind::{self, Kind};
 use crate::name::text;
 use crate::observation::Observation;
@@ -35,6 +35,7 @@ impl Form {
             Some("csv") => Ok(Form::Csv),
             _ => Err(Error::Table(
                 Fault::new(text(path), "unknown extension, expected .parquet or .csv")
+                    .of_kind(FaultKind::Unsupported)
                     .advice("Name it .parquet or .csv"),
             )),
         }

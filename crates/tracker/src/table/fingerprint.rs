@@ -36,7 +36,9 @@ fn hex(hash: Sha256) -> String {
 
 fn unreadable(path: &Path, e: &io::Error) -> Error {
     Error::Source(
-        Fault::new(text(path), format!("the file cannot be read ({e})")).advice("Check its permissions"),
+        Fault::new(text(path), format!("the file cannot be read ({e})"))
+            .caused_by(e)
+            .advice("Check its permissions"),
     )
 }
 

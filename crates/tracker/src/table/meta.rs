@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::Fingerprint;
-use crate::error::{Error, Fault, Place, Result};
+use crate::error::{Error, Fault, FaultKind, Place, Result};
 use crate::frame::{RateOrigin, SourceInfo, TimeBase};
 use crate::gaps::Damage;
 use crate::message::TRACK;
@@ -23,7 +23,7 @@ use crate::timing::Timing;
 /// Version of the table's form. A file with a higher one is refused.
 pub const SCHEMA_VERSION: u32 = 1;
 
-/// What is known of the recording. `None` is unknown.
+/// Facts of the recording. `None` is unknown.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SourceFacts {
     /// Name of the file without its folder, `-` for standard input.
@@ -111,7 +111,7 @@ fn first_mib(path: &Path) -> Option<String> {
     Some(Sha256::digest(&bytes).iter().map(|b| format!("{b:02x}")).collect())
 }
 
-/// How the run ended that made the table.
+/// Ending of the run that made the table.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", tag = "kind")]
 pub enum RunEnding {
@@ -132,7 +132,7 @@ pub enum RunEnding {
     Interrupted,
 }
 
-/// All that is known of where a table comes from.
+/// Origin of a table: rig, recording, settings, ending.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TableMeta {
     /// Version of the table's form.
@@ -204,6 +204,7 @@ impl TableMeta {
                         name,
                         format!("its schema version is {v}, this program reads version {SCHEMA_VERSION}"),
                     )
+                    .of_kind(FaultKind::Unsupported)
                     .advice("Use a newer tracker, or write the table again with this one"),
                 ));
             }
@@ -256,6 +257,7 @@ impl TableMeta {
                 serde_json::from_str(&text).map_err(|e| {
                     Error::Table(
                         Fault::new(name, format!("its metadata are damaged ({e})"))
+                            .of_kind(FaultKind::Damaged)
                             .at(Place::Key(format!("pydpend.{key}")))
                             .advice("Run " + TRACK + " again"),
                     )

@@ -1,4 +1,4 @@
-//! The node table: one row per frame and node, ordered by frame, then node. Schema version 1.
+//! Defines, writes and reads the node table: one row per frame and node, ordered by frame, then node. Schema version 1.
 //!
 //! | column | type | meaning |
 //! |---|---|---|

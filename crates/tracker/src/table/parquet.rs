@@ -27,7 +27,7 @@ use crate::error::{Error, Fault, Result};
 use crate::output::NewFile;
 use crate::rig::Rig;
 
-/// Before each key of the metadata.
+/// Prefix of each key of the metadata.
 pub(super) const KEY_PREFIX: &str = "pydpend.";
 
 /// The Arrow form of the table. Sixteen bits for names: a rig of 100,000 markers does not exist.

@@ -24,7 +24,7 @@ use rayon::prelude::*;
 use super::parquet::KEY_PREFIX;
 use super::shared::read_fault;
 use super::{COLUMNS, NodeTable, Rows, STATUS_WORDS, TableMeta, row_fault};
-use crate::error::{Error, Fault, Place, Result};
+use crate::error::{Error, Fault, FaultKind, Place, Result};
 use crate::message::TRACK;
 
 pub(super) fn read_meta(path: &Path) -> Result<TableMeta> {
@@ -100,6 +100,7 @@ fn open(path: &Path) -> Result<(Shared, ArrowReaderMetadata, TableMeta)> {
     let metadata = load(&file).map_err(|e| {
         Error::Table(
             Fault::new(path.display(), format!("it is not a whole Parquet file ({e})"))
+                .of_kind(FaultKind::Damaged)
                 .advice("It may be cut off: copy it again, or run " + TRACK + " again"),
         )
     })?;
@@ -147,6 +148,7 @@ pub(super) fn read(path: &Path) -> Result<NodeTable> {
             .ok_or_else(|| {
                 Error::Table(
                     Fault::new(&name, format!("row group {g} says {rows} rows, its columns say otherwise"))
+                        .of_kind(FaultKind::Damaged)
                         .advice("It is damaged: copy it again, or run " + TRACK + " again"),
                 )
             })?;
@@ -177,6 +179,7 @@ pub(super) fn read(path: &Path) -> Result<NodeTable> {
         let damaged = |e: String| {
             Error::Table(
                 Fault::new(&name, format!("row group {g} cannot be read ({e})"))
+                    .of_kind(FaultKind::Damaged)
                     .at(Place::Row(first_rows[g] as u64))
                     .advice("It is damaged: copy it again, or run " + TRACK + " again"),
             )

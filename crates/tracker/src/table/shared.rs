@@ -1,4 +1,4 @@
-//! Shares between the writers and readers of both forms what they have in common.
+//! Holds what the writers and readers of both forms of a table have in common.
 //!
 //! Owns: the length of a row group, the name of a CSV's metadata file, the errors of reading and of writing a table.
 
@@ -21,7 +21,9 @@ pub(super) fn json_beside(path: &Path) -> PathBuf {
 
 pub(super) fn read_fault(path: &Path, e: &std::io::Error) -> Error {
     Error::Table(
-        Fault::new(text(path), format!("it cannot be read ({e})")).advice("Give a table written by " + TRACK),
+        Fault::new(text(path), format!("it cannot be read ({e})"))
+            .caused_by(e)
+            .advice("Give a table written by " + TRACK),
     )
 }
 
@@ -33,5 +35,5 @@ pub(super) fn write_fault(path: &Path, e: &std::io::Error) -> Error {
         ErrorKind::InvalidFilename => "Choose a shorter name".into(),
         _ => "Choose a folder that can be written".into(),
     };
-    Error::Table(Fault::new(text(path), format!("it cannot be written ({e})")).advice(advice))
+    Error::Table(Fault::new(text(path), format!("it cannot be written ({e})")).caused_by(e).advice(advice))
 }

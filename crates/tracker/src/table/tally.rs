@@ -8,7 +8,7 @@ use super::NodeTable;
 use crate::observation::{Observation, Status};
 use crate::rig::Rig;
 
-/// What became of one node over a recording.
+/// Summary of one node over a recording.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NodeSummary {
     /// Its name.

@@ -1,4 +1,4 @@
-//! From frames to their times in s: [`Clock`].
+//! Converts frames to their times in s: [`Clock`].
 
 use crate::frame::TimeBase;
 

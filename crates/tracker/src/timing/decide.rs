@@ -8,11 +8,11 @@ use super::steps::{Standstill, Steps};
 use super::words;
 use crate::frame::{RateClaims, RateOrigin, TimeBase};
 
-/// Up to this rate films are made for players; cameras for motion are faster.
+/// Greatest rate of films made for players, Hz; cameras for motion are faster.
 const PLAYERS_RATE_HZ: f64 = 60.0;
-/// Capture tags further from the stamps' rate than this, relatively, say another rate.
+/// Relative difference up to which a capture tag and the stamps say the same rate.
 const SAME_RATE: f64 = 0.02;
-/// A tag that makes a recording faster by more than this is a mistake: no camera plays 1000 times slower.
+/// Largest ratio of the capture rate to the player's; a tag beyond is a mistake, as no camera plays 1000 times slower.
 const MOST_SLOWING: f64 = 1000.0;
 
 /// Decides what the times of frames with these stamps are. `steps` never fall.

@@ -1,10 +1,10 @@
-//! What is known of the frames' times: [`Timing`].
+//! Holds what is known of the frames' times: [`Timing`].
 
 use serde::{Deserialize, Serialize};
 
 use crate::frame::RateOrigin;
 
-/// What the frames' times were found to be.
+/// Kind of the frames' times, as found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum TimingKind {
@@ -28,7 +28,7 @@ pub enum Doubt {
     Player,
 }
 
-/// What became of a camera's tag of its capture rate.
+/// Fate of a camera's tag of its capture rate.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Captured {
     /// The tag's name.
@@ -39,7 +39,7 @@ pub struct Captured {
     pub used: bool,
 }
 
-/// What the frames' times are, and how well they are known.
+/// The frames' times, and how well they are known.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Timing {
     /// What the times are.

@@ -1,4 +1,4 @@
-//! The even grid that rounded time stamps come from, if they come from one.
+//! Finds the even grid that rounded time stamps come from, if they come from one.
 //!
 //! Owns: [`fit`]. Stamps of a grid, rounded in whatever way, lie in a strip along a line `ticks = a + step * k` that
 //! is less than one tick high; which steps such a strip allows is exact from the hull of the points.
@@ -8,23 +8,23 @@ use super::steps::Steps;
 use super::strip::{ROUNDED, Strip};
 use crate::frame::TimeBase;
 
-/// A strip this high holds what was rounded twice.
+/// Height of the strip that holds what was rounded twice, ticks.
 const ROUNDED_TWICE: f64 = 1.5;
-/// All stamps within one tick of the grid: the highest strip that is believed.
+/// Height of the highest strip that is believed, ticks: all stamps are within one tick of the grid.
 const WITHIN_A_TICK: f64 = 2.0 + 1e-9;
 /// A round number is taken for the rate if such numbers are this many times further apart than what the stamps leave
 /// open: by chance one lies there once in so many films.
 const RARE: f64 = 10.0;
 /// Rates of television, whose whole number is over 1.001.
 const TELEVISION: [u64; 8] = [24, 30, 48, 60, 72, 96, 120, 240];
-/// A grid with gaps is told from chance by steps of so many ticks, in ticks.
+/// Length of the steps by which a grid with gaps is told from chance, ticks.
 const CLEAR_STEP: f64 = 8.0;
 /// Rates that differ by less, relatively, are told apart by what is likelier and not by the stamps: a camera of a whole
 /// tick per frame left frames out, or another camera has a rate so near to that.
 const NEAR_RATE: f64 = 0.01;
 /// So many gaps of a grid of whole ticks may by chance be as far apart as the rounding of another rate would put them.
 const FEW_GAPS: usize = 2;
-/// Fewest frames in which time stamps at the ends may be off the grid.
+/// Least number of frames in which time stamps at the ends may be off the grid.
 const FRAMES_FOR_STRAY: u64 = 6;
 
 /// Time from frame to frame.

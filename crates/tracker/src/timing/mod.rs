@@ -1,4 +1,4 @@
-//! What the frames' times are: the recording's time stamps, or the even grid that they were rounded from.
+//! Decides what the frames' times are: the recording's time stamps, or the even grid that they were rounded from.
 //!
 //! A container keeps whole ticks; Matroska's are 1 ms, so stamps of 600 frames a second are up to 0.5 ms wrong. Whether
 //! they lie on a grid is known at the end of a recording, and rows are written after it. Nothing here reads anything.

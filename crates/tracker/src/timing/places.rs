@@ -1,4 +1,4 @@
-//! Where on an even grid each frame is, if some lack.
+//! Finds where on an even grid each frame is, if some lack.
 //!
 //! Owns: the ways to find [`Places`]. Must not: choose between grids.
 
@@ -11,13 +11,13 @@ pub(super) type Places = Vec<u64>;
 /// Place of the first frame after each gap among those that are there, and frames that lack up to there.
 pub(crate) type Gaps = Vec<(u64, u64)>;
 
-/// Steps, in ticks, from which a gap shows in one step alone.
+/// Length of a step from which on a gap shows in one step alone, ticks.
 const PLAIN_STEP: f64 = 2.5;
 /// Part of all steps that must be the commonest, for all others to be gaps of it.
 const EVEN: f64 = 0.75;
 /// Frames after a gap that tell how many lack in it, where a frame is less than a tick.
 const LOOKED_AHEAD: usize = 256;
-/// Numbers of frames that may lack in one gap which are tried.
+/// Maximum number of frames lacking in one gap that is tried.
 const MOST_TRIED: i64 = 64;
 
 /// The gaps between frames in these places.

@@ -1,4 +1,4 @@
-//! Rates as fractions, so that times are exact.
+//! Writes rates as fractions, so that times are exact.
 
 /// Greatest denominator of a rate's fraction.
 const MAX_DENOMINATOR: u64 = 1_000_000;

@@ -1,4 +1,4 @@
-//! Time stamps of a recording in little memory: equal steps in a row are one entry.
+//! Keeps the time stamps of a recording in little memory: equal steps in a row are one entry.
 
 /// A frame that is not after the one before it, where the stamps are no grid's.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,8 +1,8 @@
-//! Points of a line, rounded: the strip along a line that holds all of them.
+//! Computes the strip along a line that holds all points of a line after rounding.
 //!
 //! Owns: [`Strip`]. Which slopes a strip of some height allows is exact from the hull of the points.
 
-/// A strip this high holds whatever rounding to whole ticks does, in ticks; equal to it is one step too far.
+/// Height below which a strip holds whatever rounding to whole ticks does, ticks.
 pub(super) const ROUNDED: f64 = 1.0 - 1e-9;
 
 /// Points (k, ticks) seen from above and from below: the hull that holds all of them.
@@ -14,7 +14,7 @@ pub(super) struct Strip {
     lower: Vec<(i64, i64)>,
 }
 
-/// How many ticks later `b` is than `a`. Stamps of damaged files may be as far apart as numbers go.
+/// Number of ticks by which `b` is later than `a`. Stamps of damaged files may be as far apart as numbers go.
 pub(super) fn ticks_between(a: i64, b: i64) -> f64 {
     (i128::from(b) - i128::from(a)) as f64
 }
@@ -55,7 +55,7 @@ impl Strip {
         (low, high)
     }
 
-    /// How high a strip of this slope must be to hold all points.
+    /// Height of the strip of this slope that holds all points, ticks.
     pub(super) fn height(&self, step: f64) -> f64 {
         let (low, high) = self.heights(step);
         high - low

@@ -1,12 +1,12 @@
-//! What a person is told of the frames' times.
+//! Tells a person of the frames' times.
 
 use super::facts::{Doubt, Timing, TimingKind};
 use crate::frame::RateOrigin;
 use crate::message::{Message, Setting};
 
-/// Rounding is worth a word from this share of the time between frames.
+/// Least rounding that is worth a word, as a share of the time between frames.
 const COARSE: f64 = 1e-3;
-/// A variable rate is worth a word from this share of it.
+/// Least variation of the rate that is worth a word, as a share of the rate.
 const UNEVEN: f64 = 1e-3;
 /// The rate of slow motion that a doubt is explained by, frames per second.
 const SLOW_MOTION_HZ: f64 = 240.0;

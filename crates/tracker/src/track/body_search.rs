@@ -4,7 +4,7 @@
 
 use std::f64::consts::PI;
 
-use nalgebra::Vector2;
+use nalgebra::{Isometry2, Vector2};
 
 use super::bodies::Bodies;
 use super::false_matches::{CHANCE_ANYWHERE, expected_false_matches};
@@ -147,8 +147,12 @@ impl Bodies {
 
     /// How far a hypothesis is from a body's newest pose: the farthest of its nodes, px.
     fn moved_px(&self, b: usize, s: &PoseHypothesis) -> f64 {
-        let Some(before) = self.motions[b].newest_pose() else { return f64::INFINITY };
-        let far = |&t: &Vector2<f64>| (place(&s.fit.pose, t) - place(&before, t)).norm();
+        self.motions[b].newest_pose().map_or(f64::INFINITY, |before| self.apart_px(b, &s.fit.pose, &before))
+    }
+
+    /// How far two poses of a body are apart: the farthest of its nodes, px.
+    fn apart_px(&self, b: usize, one: &Isometry2<f64>, other: &Isometry2<f64>) -> f64 {
+        let far = |&t: &Vector2<f64>| (place(one, t) - place(other, t)).norm();
         self.mechanism.links[b].template.iter().map(far).fold(0.0, f64::max)
     }
 
@@ -206,8 +210,7 @@ impl Bodies {
             && let Some(o) = self.forecast(twin, time, &[])
         {
             // Both were just seen: nearest neighbours, by a clear margin.
-            let far = |&t: &Vector2<f64>| (place(&s.fit.pose, t) - place(&w.pose, t)).norm();
-            let own_px = self.mechanism.links[b].template.iter().map(far).fold(0.0, f64::max);
+            let own_px = self.apart_px(b, &s.fit.pose, &w.pose);
             let other_px = (s.fit.pose.translation.vector - o.pose.translation.vector).norm();
             return TWIN_RATIO * own_px < other_px;
         }

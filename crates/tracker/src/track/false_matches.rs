@@ -42,7 +42,8 @@ pub fn expected_false_matches(
     let hit = (density * PI * radius * radius).min(1.0);
     let base = 2 - search.anchors.len().min(2);
     let gate = search.window.map_or(f64::INFINITY, |w| w.origin_px + w.angle_rad * reach + radius);
-    // Pairs of detections that lie in the window as two nodes of a body that hangs on nothing.
+    // Pairs of unrelated detections that pass for two nodes of a body that hangs on nothing: the first lies anywhere in the
+    // window (pi gate^2), the second at the distance of the nodes, in a strip 2 gate long and 2 radius wide.
     let by_pairs =
         (n * n.saturating_sub(1) / 2) as f64 * (density * PI * gate * gate) * (density * 4.0 * radius * gate);
     if s.inliers > base {
@@ -59,7 +60,7 @@ pub fn expected_false_matches(
     let area_known = s.picks.iter().zip(&link.whole_px).any(|(p, &whole)| p.is_some() && whole > 0.0);
     let lone_gate = if area_known { WHOLE_GATE_PX } else { LONE_GATE_PX };
     match base {
-        // One node on its circle about the anchor.
+        // One node on its circle about the anchor: an arc 2 reach turn long and 2 radius wide.
         1 if n > 1 && turn * reach > lone_gate => f64::INFINITY,
         1 => n as f64 * density * 4.0 * radius * reach * turn,
         // One or two nodes of a body that hangs on nothing.
@@ -68,16 +69,18 @@ pub fn expected_false_matches(
     }
 }
 
+/// Binomial coefficient.
 fn choose(n: usize, k: usize) -> f64 {
     (0..k).map(|i| (n - i) as f64 / (i + 1) as f64).product()
 }
 
-/// A body's nodes as detections at their places in it.
+/// Detections as a body's own nodes would give them, at their places in the body.
 fn drawn(link: &Link) -> Vec<Detection> {
     let star = |t: &Vector2<f64>| Detection { x_px: t.x, y_px: t.y, sigma_px: 0.05, ..Default::default() };
     link.template.iter().map(star).collect()
 }
 
+/// A search for a body with no expectation of where it is.
 fn anywhere<'a>(
     link: &'a Link,
     anchors: &'a [Anchor],

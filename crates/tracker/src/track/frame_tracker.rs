@@ -52,7 +52,7 @@ impl FrameTracker {
         let given: Vec<bool> = seen.iter().map(|s| s.fit.is_some()).collect();
         let mut undecided: Vec<Vec<(PoseHypothesis, f64)>> = (0..n).map(|_| Vec::new()).collect();
         let mut settled = vec![false; n];
-        // Twice: a body that was found can hold its neighbours.
+        // Step 1: each body by itself, twice, since a body that was found can hold its neighbours.
         for round in 0..2 {
             for k in 0..n {
                 let b = self.bodies.mechanism.order[k];
@@ -74,6 +74,7 @@ impl FrameTracker {
                 }
             }
         }
+        // Step 2: hypotheses that nothing decided are followed until their motion decides.
         for k in 0..n {
             let b = self.bodies.mechanism.order[k];
             if seen[b].fit.is_some() {
@@ -95,9 +96,11 @@ impl FrameTracker {
                 settled[b] = true;
             }
         }
+        // Step 3: nodes that another thing hides in part.
         for &b in self.bodies.mechanism.order.iter().filter(|&&b| !given[b]) {
             find_occluded(&self.bodies.mechanism, b, index, &mut free, &mut seen);
         }
+        // Step 4: the poses that were found go into the bodies' motions.
         for b in 0..n {
             if let Some(f) = &seen[b].fit
                 && !given[b]

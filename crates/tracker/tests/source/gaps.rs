@@ -108,16 +108,19 @@ fn empty_slots(bytes: &[u8], empty: &[usize]) -> Vec<u8> {
     out
 }
 
+/// AVI of JPEG pictures and of raw ones, and arguments that make it.
+const AVIS: [(&str, &[&str]); 2] = [
+    ("j.avi", &["-c:v", "mjpeg", "-pix_fmt", "yuvj420p"]),
+    ("r.avi", &["-c:v", "rawvideo", "-pix_fmt", "gray"]),
+];
+
 #[test]
 fn empty_slots_of_an_avi_are_frames_that_the_recorder_dropped() {
     if !have_ffmpeg() {
         return;
     }
     let folder = tempfile::tempdir().unwrap();
-    for (name, codec) in [
-        ("j.avi", &["-c:v", "mjpeg", "-pix_fmt", "yuvj420p"][..]),
-        ("r.avi", &["-c:v", "rawvideo", "-pix_fmt", "gray"]),
-    ] {
+    for (name, codec) in AVIS {
         let path = encode(folder.path(), name, COUNT, codec);
         let bytes = std::fs::read(&path).unwrap();
         assert_eq!(chunks(&bytes).len(), COUNT);
@@ -136,10 +139,7 @@ fn an_avi_with_broken_chunks_keeps_all_other_frames_in_their_places_and_times() 
         return;
     }
     let folder = tempfile::tempdir().unwrap();
-    for (name, codec) in [
-        ("j.avi", &["-c:v", "mjpeg", "-pix_fmt", "yuvj420p"][..]),
-        ("r.avi", &["-c:v", "rawvideo", "-pix_fmt", "gray"]),
-    ] {
+    for (name, codec) in AVIS {
         let path = encode(folder.path(), name, COUNT, codec);
         let whole = std::fs::read(&path).unwrap();
         let places = chunks(&whole);

@@ -1,4 +1,4 @@
-//! The command line as a whole. Each subcommand has its own file with its `Args` and its `run`; here they are listed.
+//! Defines the command line as a whole: lists the subcommands, each of which has a file with its `Args` and its `run`.
 //!
 //! Must not: touch the disk.
 

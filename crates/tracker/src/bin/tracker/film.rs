@@ -11,6 +11,7 @@ use tracker::synth::encode::Codec;
 use tracker::synth::{Film, MotionTable, PRESETS, Scene, WriteOptions, film_files, preset, write};
 
 use crate::print;
+use crate::reading::word;
 use crate::watch::Watch;
 
 /// Make a film of markers on links, with its truth: to try a marker layout, a light and a frame rate before the rig
@@ -50,9 +51,10 @@ pub struct Args {
     /// Frames per second; replaces the scene's.
     #[arg(long, value_name = "F")]
     fps: Option<f64>,
-    /// Codec of a video file; by the ending if not given.
-    #[arg(long, value_enum, requires = "output")]
-    codec: Option<CodecName>,
+    /// Codec of a video file: h264 (small, lossy, plays everywhere), ffv1 (without loss, 8 to 16 bit), mjpeg (pictures,
+    /// lossy) or raw (uncompressed); by the ending if not given.
+    #[arg(long, value_parser = word::<Codec>(), requires = "output")]
+    codec: Option<Codec>,
     /// H.264: constant rate factor, 0 (no loss) to 51; MJPEG: 1 (best) to 31.
     #[arg(long, value_name = "Q", requires = "output")]
     quality: Option<u32>,
@@ -76,18 +78,6 @@ pub struct Args {
     quiet: bool,
 }
 
-#[derive(Debug, Clone, Copy, clap::ValueEnum)]
-enum CodecName {
-    /// Small, lossy, plays everywhere.
-    H264,
-    /// Without loss, 8 to 16 bit.
-    Ffv1,
-    /// JPEG pictures, lossy.
-    Mjpeg,
-    /// Uncompressed.
-    Raw,
-}
-
 impl Args {
     fn scene(&self) -> anyhow::Result<Scene> {
         let mut scene = match (&self.scene, &self.preset) {
@@ -99,15 +89,6 @@ impl Args {
         scene.frames = self.frame_count.unwrap_or(scene.frames);
         scene.rate_hz = self.fps.unwrap_or(scene.rate_hz);
         Ok(scene)
-    }
-
-    fn codec(&self) -> Option<Codec> {
-        self.codec.map(|c| match c {
-            CodecName::H264 => Codec::H264,
-            CodecName::Ffv1 => Codec::Ffv1,
-            CodecName::Mjpeg => Codec::Mjpeg,
-            CodecName::Raw => Codec::Raw,
-        })
     }
 }
 
@@ -131,7 +112,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     let Some(output) = &args.output else { return Ok(ExitCode::SUCCESS) };
     let options = WriteOptions {
-        codec: args.codec(),
+        codec: args.codec,
         quality: args.quality,
         x264_preset: args.x264_preset.clone(),
         gray_only: args.gray_only,

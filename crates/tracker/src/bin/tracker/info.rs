@@ -12,14 +12,14 @@ use tracker::name::{shown, text};
 use tracker::peak_level::peak_level;
 use tracker::pipeline;
 use tracker::pixel_aspect::AspectOrigin;
-use tracker::source::{Interlaced, OpenOptions, open};
+use tracker::source::{Interlaced, open};
 use tracker::timing::{Steps, Timing, notes, rate_words, times_words};
 
 use crate::print;
-use crate::reading::DecodeArgs;
+use crate::reading::OpenArgs;
 use crate::words::CommandLine;
 
-/// Frames whose time stamps are shown.
+/// Number of frames whose time stamps are shown.
 const FIRST: usize = 5;
 /// Most bytes of frames that are looked at side by side; at least one is.
 const BATCH_BYTES: usize = 32 << 20;
@@ -35,14 +35,11 @@ pub struct Args {
     /// Decode all frames, count them and look for the brightest pixel
     #[arg(long)]
     count: bool,
-    /// Frames a second of recorded time, instead of what the recording claims
-    #[arg(long, value_name = "F")]
-    fps: Option<f64>,
     #[command(flatten)]
-    decode: DecodeArgs,
+    open: OpenArgs,
 }
 
-/// What reading some or all frames told.
+/// Facts from reading some or all frames.
 struct Seen {
     /// Time stamps of the first frames.
     first: Vec<i64>,
@@ -57,7 +54,7 @@ struct Seen {
     ending: Option<Ending>,
 }
 
-/// What the recording's times are.
+/// Times of the recording.
 struct Times {
     timing: Timing,
     first_s: Vec<f64>,
@@ -67,7 +64,7 @@ struct Times {
 /// Runs the subcommand.
 pub fn run(args: Args, front: &CommandLine) -> anyhow::Result<ExitCode> {
     // What film is can be told of interlaced film too.
-    let options = args.decode.options(args.fps, OpenOptions::default().threads, Interlaced::AsFrames);
+    let options = args.open.options(Interlaced::AsFrames);
     let mut source = open(&text(&args.input), &options)?;
     let seen = look(&mut *source, args.count)?;
     let times = times(&*source, &seen)?;

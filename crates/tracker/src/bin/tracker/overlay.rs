@@ -10,10 +10,10 @@ use tracker::error::Error;
 use tracker::name::text;
 use tracker::output;
 use tracker::overlay::{self, FilmSettings};
-use tracker::source::OpenOptions;
+use tracker::source::Interlaced;
 use tracker::table::{read_table, table_files};
 
-use crate::reading::{DecodeArgs, InterlacedArgs};
+use crate::reading::OpenArgs;
 use crate::watch::Watch;
 
 /// Draw nodes, names, bodies, trails and gaps into the recording
@@ -39,9 +39,7 @@ pub struct Args {
     #[arg(long, value_name = "PX")]
     width: Option<u32>,
     #[command(flatten)]
-    decode: DecodeArgs,
-    #[command(flatten)]
-    interlaced: InterlacedArgs,
+    open: OpenArgs,
     /// Replace files that are there already
     #[arg(long)]
     force: bool,
@@ -65,7 +63,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     };
     overlay::film(
         &text(&args.input),
-        &args.decode.options(None, OpenOptions::default().threads, args.interlaced.setting()),
+        &args.open.options(Interlaced::default()),
         &table,
         &args.output,
         &settings,

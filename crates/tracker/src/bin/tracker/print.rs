@@ -1,4 +1,4 @@
-//! What is printed: names and texts out of files never reach a terminal as they are.
+//! Prints results and messages: names and texts out of files never reach a terminal as they are.
 //!
 //! Must not: print anything unasked.
 

@@ -1,92 +1,81 @@
-//! The arguments of every subcommand that reads a recording, so that one option has one name and one meaning.
+//! Defines the arguments of every subcommand that reads a recording, so that one option has one name and one meaning.
 
 use std::ops::Range;
 
-use tracker::detect::{DetectSettings, Polarity, Threshold};
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use tracker::detect::{Centroid, DetectSettings, PolaritySetting, Threshold};
+use tracker::pipeline::{RunSettings, frame_range};
 use tracker::pixel_aspect::PixelAspect;
 use tracker::rig::Region;
+use tracker::setting_words::Worded;
 use tracker::source::{Decoder, Interlaced, OpenOptions};
 use tracker::wanted::{Pointed, Wanted};
 
-/// How a recording is opened.
+/// Arguments of opening a recording: of every subcommand that reads one.
 #[derive(Debug, Clone, clap::Args)]
-pub struct DecodeArgs {
+pub struct OpenArgs {
+    /// Frames a second of recorded time, instead of what the recording claims
+    #[arg(long, value_name = "F")]
+    fps: Option<f64>,
     /// What reads compressed film
-    #[arg(long, default_value = "auto", value_enum)]
-    decoder: DecoderArg,
+    #[arg(long, default_value = "auto", value_parser = word::<Decoder>())]
+    decoder: Decoder,
+    /// How interlaced film is read, whose pictures hold two fields: not at all, or each picture as one
+    #[arg(long, value_parser = word::<Interlaced>())]
+    interlaced: Option<Interlaced>,
     /// Width to height of a pixel, for example 16:15, instead of what the recording says
     #[arg(long, value_name = "W:H")]
     pixel_aspect: Option<PixelAspect>,
     /// Open network addresses and devices too
     #[arg(long)]
     allow_protocol: bool,
+    /// Threads; 0 is one for each core. The result is the same for any number
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    threads: usize,
 }
 
-impl DecodeArgs {
-    pub fn options(&self, fps: Option<f64>, threads: usize, interlaced: Interlaced) -> OpenOptions {
+impl OpenArgs {
+    /// The options. `interlaced` is how interlaced film is read where nothing was said.
+    pub fn options(&self, interlaced: Interlaced) -> OpenOptions {
         OpenOptions {
-            fps,
+            fps: self.fps,
             pixel_aspect: self.pixel_aspect,
-            decoder: match self.decoder {
-                DecoderArg::Auto => Decoder::Auto,
-                DecoderArg::Ffmpeg => Decoder::Ffmpeg,
-                DecoderArg::Opencv => Decoder::Opencv,
-            },
-            interlaced,
+            decoder: self.decoder,
+            interlaced: self.interlaced.unwrap_or(interlaced),
             allow_protocol: self.allow_protocol,
-            threads,
+            threads: self.threads,
             colour: false,
         }
     }
 }
 
-/// What is done with film whose pictures hold two fields.
-#[derive(Debug, Clone, Copy, clap::Args)]
-pub struct InterlacedArgs {
-    /// How interlaced film is read, whose pictures hold two fields: not at all, or each picture as one
-    #[arg(long, default_value = "refuse", value_enum)]
-    interlaced: InterlacedArg,
-}
-
-impl InterlacedArgs {
-    pub fn setting(self) -> Interlaced {
-        match self.interlaced {
-            InterlacedArg::Refuse => Interlaced::Refuse,
-            InterlacedArg::AsFrames => Interlaced::AsFrames,
-        }
-    }
-}
-
-/// Which frames are followed, and what in them is a marker.
+/// Arguments of detection: of every subcommand that looks for markers.
 #[derive(Debug, Clone, clap::Args)]
-pub struct FollowArgs {
-    /// Frames a second of recorded time, instead of what the recording claims
-    #[arg(long, value_name = "F")]
-    pub fps: Option<f64>,
+pub struct DetectArgs {
     /// Frames to follow, from A up to but not B; either may be left out
-    #[arg(long, value_name = "A..B", value_parser = frames)]
-    pub frames: Option<Range<u64>>,
+    #[arg(long, value_name = "A..B", value_parser = frame_range)]
+    frames: Option<Range<u64>>,
     /// Threshold in the recording's units, or `auto`
-    #[arg(long, default_value = "auto", value_name = "auto|N", value_parser = threshold, allow_hyphen_values = true)]
+    #[arg(long, default_value = "auto", value_name = "auto|N", allow_hyphen_values = true)]
     threshold: Threshold,
     /// Whether markers are brighter or darker than what is around them
-    #[arg(long, default_value = "auto", value_enum)]
-    polarity: PolarityArg,
-    /// Threads; 0 is one for each core. The result is the same for any number
-    #[arg(long, default_value_t = 0, value_name = "N")]
-    pub threads: usize,
-    /// Part of the picture in which markers are looked for: first and last column and row, in px
-    #[arg(long, value_name = "X0,Y0,X1,Y1", value_parser = region, allow_hyphen_values = true)]
-    region: Option<Rectangle>,
-    #[command(flatten)]
-    wanted: WantedArgs,
-    #[command(flatten)]
-    decode: DecodeArgs,
-    #[command(flatten)]
-    interlaced: InterlacedArgs,
+    #[arg(long, default_value = "auto", value_parser = word::<PolaritySetting>())]
+    polarity: PolaritySetting,
+    /// How a centre is taken: by the disc that fits, by intensity, or by OpenCV's contours as in the paper
+    #[arg(long, default_value = "disc", value_parser = word::<Centroid>())]
+    centroid: Centroid,
+    /// Part of the image in which markers are looked for: first and last column and row
+    #[arg(long, value_name = "X0,Y0,X1,Y1", allow_hyphen_values = true)]
+    region: Option<Region>,
+    /// Least area of a marker in px; learned if not given
+    #[arg(long, value_name = "PX")]
+    min_area_px: Option<f64>,
+    /// Greatest area of a marker in px; learned if not given
+    #[arg(long, value_name = "PX")]
+    max_area_px: Option<f64>,
 }
 
-/// What is to be followed.
+/// Arguments of what is to be followed.
 #[derive(Debug, Clone, clap::Args)]
 struct WantedArgs {
     /// Follow what is at this place of this frame (the first if none is given); once for each marker
@@ -104,85 +93,100 @@ struct WantedArgs {
 }
 
 type Pair = [String; 2];
-type Rectangle = [f64; 4];
 
-impl FollowArgs {
-    pub fn wanted(&self) -> Wanted {
-        let WantedArgs { marker, markers, also, same } = self.wanted.clone();
+impl WantedArgs {
+    fn wanted(&self) -> Wanted {
+        let Self { marker, markers, also, same } = self.clone();
         Wanted { marker, markers, also, same }
     }
+}
 
-    pub fn open(&self) -> OpenOptions {
-        self.decode.options(self.fps, self.threads, self.interlaced.setting())
-    }
+/// Arguments of opening and detection together.
+#[derive(Debug, Clone, clap::Args)]
+pub struct ReadArgs {
+    #[command(flatten)]
+    detect: DetectArgs,
+    #[command(flatten)]
+    wanted: WantedArgs,
+    #[command(flatten)]
+    open: OpenArgs,
+}
 
-    pub fn detect(&self) -> DetectSettings {
-        DetectSettings {
-            threshold: self.threshold,
-            polarity: match self.polarity {
-                PolarityArg::Auto => Polarity::Auto,
-                PolarityArg::Bright => Polarity::Bright,
-                PolarityArg::Dark => Polarity::Dark,
+impl ReadArgs {
+    /// A run that reads `input` so.
+    pub fn settings(&self, input: String) -> RunSettings {
+        let open = self.open.options(Interlaced::default());
+        RunSettings {
+            input,
+            frames: self.detect.frames.clone(),
+            detect: DetectSettings {
+                threshold: self.detect.threshold,
+                polarity: self.detect.polarity,
+                centroid: self.detect.centroid,
+                region: self.detect.region.clone(),
+                min_area_px: self.detect.min_area_px,
+                max_area_px: self.detect.max_area_px,
+                ..DetectSettings::default()
             },
-            region: self.region.map(Region::Rectangle),
-            ..DetectSettings::default()
+            wanted: self.wanted.wanted(),
+            threads: open.threads,
+            open,
+            ..RunSettings::default()
         }
     }
 }
 
-#[derive(Debug, Clone, Copy, clap::ValueEnum)]
-enum PolarityArg {
-    Auto,
-    Bright,
-    Dark,
+/// Reads a word of a setting.
+pub fn word<T: Worded + Send + Sync>() -> impl TypedValueParser<Value = T> {
+    let words = T::WORDS.iter().map(|(word, _)| *word);
+    PossibleValuesParser::new(words).try_map(|word| T::from_word(&word).map_err(|fault| fault.to_string()))
 }
 
-#[derive(Debug, Clone, Copy, clap::ValueEnum)]
-enum DecoderArg {
-    Auto,
-    Ffmpeg,
-    Opencv,
-}
-
-#[derive(Debug, Clone, Copy, clap::ValueEnum)]
-enum InterlacedArg {
-    Refuse,
-    AsFrames,
-}
-
-/// `A..B`, `A..` or `..B`.
-fn frames(text: &str) -> Result<Range<u64>, String> {
-    let form = "expected A..B, for example 0..1000";
-    let (start, end) = text.split_once("..").ok_or(form)?;
-    let number = |t: &str, none: u64| {
-        if t.is_empty() { Ok(none) } else { t.parse().map_err(|_| format!("{t:?} is not a frame; {form}")) }
-    };
-    Ok(number(start, 0)?..number(end, u64::MAX)?)
-}
-
+/// Two names of nodes.
 fn pair(text: &str) -> Result<Pair, String> {
     let form = "expected two names of nodes, for example n1=n2";
     let (a, b) = text.split_once('=').ok_or(form)?;
     if a.is_empty() || b.is_empty() { Err(form.into()) } else { Ok([a.to_owned(), b.to_owned()]) }
 }
 
-fn region(text: &str) -> Result<Rectangle, String> {
-    let form = "expected X0,Y0,X1,Y1, for example 100,50,400,300";
-    let values: Vec<f64> = text.split(',').map_while(|t| t.trim().parse().ok()).collect();
-    let values: Rectangle = values.try_into().map_err(|_| form)?;
-    if values.iter().all(|v| v.is_finite()) && text.split(',').count() == 4 {
-        Ok(values)
-    } else {
-        Err(form.into())
-    }
-}
+#[cfg(test)]
+mod tests {
+    use clap::{Args, Command, CommandFactory};
 
-fn threshold(text: &str) -> Result<Threshold, String> {
-    if text == "auto" {
-        return Ok(Threshold::Auto);
+    use super::*;
+    use crate::args::Cli;
+
+    /// The flags of some arguments.
+    fn flags<A: Args>() -> Vec<String> {
+        flags_of(&A::augment_args(Command::new("all")))
     }
-    match text.parse::<f64>() {
-        Ok(value) if value.is_finite() => Ok(Threshold::Raw(value)),
-        _ => Err("expected auto or a number in the recording's units".into()),
+
+    fn flags_of(command: &Command) -> Vec<String> {
+        command.get_arguments().filter_map(|a| a.get_long()).map(str::to_owned).collect()
+    }
+
+    #[test]
+    fn every_command_takes_every_option_of_what_it_reads() {
+        let whole = Cli::command();
+        let (mut opens, mut detects) = (Vec::new(), Vec::new());
+        for command in whole.get_subcommands() {
+            let has = flags_of(command);
+            let takes = |flags: Vec<String>| {
+                let missing: Vec<String> = flags.iter().filter(|f| !has.contains(f)).cloned().collect();
+                // A flag such as --fps may mean another thing where nothing is read.
+                (missing.len() < flags.len() - 1).then_some(missing)
+            };
+            for (list, flags) in [
+                (&mut opens, flags::<OpenArgs>()),
+                (&mut detects, [flags::<DetectArgs>(), flags::<WantedArgs>()].concat()),
+            ] {
+                if let Some(missing) = takes(flags) {
+                    assert!(missing.is_empty(), "{} lacks {missing:?}", command.get_name());
+                    list.push(command.get_name().to_owned());
+                }
+            }
+        }
+        assert_eq!(opens, ["info", "setup", "track", "overlay"]);
+        assert_eq!(detects, ["setup", "track"]);
     }
 }

@@ -1,4 +1,4 @@
-//! A command line that cannot be understood, in one line: what is wrong, and the choices or the nearest word.
+//! Explains in one line a command line that cannot be understood: what is wrong, and the choices or the nearest word.
 
 use std::error::Error;
 use std::num::{IntErrorKind, ParseFloatError, ParseIntError};

@@ -9,13 +9,12 @@ use std::process::ExitCode;
 
 use tracker::error::Error;
 use tracker::name::text;
-use tracker::pipeline::RunSettings;
 use tracker::source;
 use tracker::table::RunEnding;
-use tracker::{output, overlay, setup};
+use tracker::{output, setup};
 
 use crate::print;
-use crate::reading::FollowArgs;
+use crate::reading::ReadArgs;
 use crate::unclear;
 use crate::watch::Watch;
 use crate::words::CommandLine;
@@ -32,7 +31,7 @@ pub struct Args {
     #[arg(long, value_name = "PICTURE.png")]
     picture: Option<PathBuf>,
     #[command(flatten)]
-    follow: FollowArgs,
+    read: ReadArgs,
     /// Replace files that are there already
     #[arg(long)]
     force: bool,
@@ -47,15 +46,7 @@ pub fn run(args: Args, front: &CommandLine) -> anyhow::Result<ExitCode> {
     let input = text(&args.input);
     let outputs = [args.output.clone(), picture.clone()];
     output::check(&outputs, &source::files(&input)?, args.force).map_err(Error::Rig)?;
-    let settings = RunSettings {
-        input,
-        open: args.follow.open(),
-        frames: args.follow.frames.clone(),
-        detect: args.follow.detect(),
-        wanted: args.follow.wanted(),
-        threads: args.follow.threads,
-        ..RunSettings::default()
-    };
+    let settings = args.read.settings(input);
     let mut watch = Watch::new(args.quiet);
     let found = setup::find(&settings, &mut watch);
     if let Err(Error::Detect(_) | Error::Rig(_)) = &found {
@@ -64,7 +55,7 @@ pub fn run(args: Args, front: &CommandLine) -> anyhow::Result<ExitCode> {
     let found = found?;
     watch.finish();
     let rig = found.rig;
-    overlay::save(&found.picture, &picture)?;
+    found.picture.save(&picture)?;
     rig.write(&args.output)?;
     for warning in &found.warnings {
         print::say(format!("note: {}", front.say(warning)));

@@ -7,7 +7,6 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use tracker::csv_text::Cells;
-use tracker::detect::{Centroid, DetectSettings};
 use tracker::error::Error;
 use tracker::name::{shown, text};
 use tracker::pipeline::{Existing, RunSettings, RunSummary, partial_path, run as run_pipeline};
@@ -15,7 +14,7 @@ use tracker::rig::Rig;
 use tracker::table::RunEnding;
 
 use crate::print;
-use crate::reading::FollowArgs;
+use crate::reading::ReadArgs;
 use crate::unclear;
 use crate::watch::{INTERRUPTED, Watch};
 use crate::words::CommandLine;
@@ -31,11 +30,8 @@ pub struct Args {
     /// Nodes, bodies and joints, as `tracker setup` writes them; found in the recording if not given
     #[arg(long, value_name = "RIG.toml")]
     rig: Option<PathBuf>,
-    /// How a centre is taken: by intensity, or by OpenCV's contours as in the paper
-    #[arg(long, default_value = "weighted", value_enum)]
-    centroid: CentroidArg,
     #[command(flatten)]
-    follow: FollowArgs,
+    read: ReadArgs,
     /// Go on where an earlier run stopped
     #[arg(long, conflicts_with = "force")]
     resume: bool,
@@ -53,37 +49,19 @@ pub struct Args {
     quiet: bool,
 }
 
-#[derive(Debug, Clone, Copy, clap::ValueEnum)]
-enum CentroidArg {
-    Weighted,
-    Contour,
-}
-
 impl Args {
     fn settings(&self) -> tracker::error::Result<RunSettings> {
         Ok(RunSettings {
-            input: text(&self.input),
             output: Some(self.output.clone()),
             existing: match (self.resume, self.force) {
                 (true, _) => Existing::Resume,
                 (_, true) => Existing::Replace,
                 _ => Existing::Refuse,
             },
-            collect: false,
             rig: self.rig.as_deref().map(Rig::read).transpose()?,
-            open: self.follow.open(),
-            frames: self.follow.frames.clone(),
-            detect: DetectSettings {
-                centroid: match self.centroid {
-                    CentroidArg::Weighted => Centroid::Weighted,
-                    CentroidArg::Contour => Centroid::Contour,
-                },
-                ..self.follow.detect()
-            },
-            wanted: self.follow.wanted(),
-            threads: self.follow.threads,
             cells: if self.safe_csv { Cells::Safe } else { Cells::Plain },
             reads: self.rig.iter().cloned().collect(),
+            ..self.read.settings(text(&self.input))
         })
     }
 }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use tracker::name::text;
 use tracker::pipeline::RunSettings;
-use tracker::{output, overlay, setup, source};
+use tracker::{output, setup, source};
 
 use crate::print;
 use crate::watch::Watch;
@@ -25,7 +25,7 @@ pub fn tell(settings: &RunSettings, picture: &Path, replace: bool, watch: &mut W
             output::check(&[picture.to_owned()], &files, replace).map_err(tracker::error::Error::Film)
         })
         .and_then(|()| setup::picture_of(settings, &found, watch))
-        .and_then(|drawn| overlay::save(&drawn, picture));
+        .and_then(|drawn| drawn.save(picture));
     watch.finish();
     match written {
         Ok(()) => {

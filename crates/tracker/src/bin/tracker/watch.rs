@@ -1,4 +1,4 @@
-//! A run as a person at a terminal sees it: a bar with rate and remaining time, ctrl-c, and what is printed.
+//! Shows a run to a person at a terminal: a bar with rate and remaining time, ctrl-c, and what is printed.
 //!
 //! Owns: [`listen`], [`Watch`]. The first ctrl-c (or a termination signal) stops a run, which closes its table if that is
 //! done at once; the second leaves the table too. A command that has nothing to close ends at the first.
@@ -12,14 +12,14 @@ use anyhow::Context;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use tracker::pipeline::{Candidates, Observer, Stage};
 
-/// How often the user asked to stop.
+/// Number of times that the user asked to stop.
 static ASKED: AtomicUsize = AtomicUsize::new(0);
-/// When the user first did.
+/// Time at which the user first asked to stop.
 static FIRST: OnceLock<Instant> = OnceLock::new();
-/// Whether somebody looks at it.
+/// Whether somebody looks at the run.
 static WATCHED: AtomicBool = AtomicBool::new(false);
 
-/// How long a run that was stopped may take to close its table.
+/// Longest time that a stopped run may take to close its table.
 const PATIENCE: Duration = Duration::from_millis(800);
 
 /// Exit status of what the user stopped.

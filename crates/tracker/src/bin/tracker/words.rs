@@ -1,4 +1,4 @@
-//! What the library says, in the words of the command line: settings are flags, steps are commands to type.
+//! Writes the library's messages in the words of the command line: settings are flags, steps are commands to type.
 
 use tracker::message::{FrontEnd, Message, Setting};
 

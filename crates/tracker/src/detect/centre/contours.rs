@@ -6,15 +6,8 @@ use opencv::core::{CV_8UC1, Mat, Point, Vector};
 use opencv::imgproc::{self, CHAIN_APPROX_NONE, RETR_EXTERNAL};
 use opencv::prelude::*;
 
+use super::contour::Contour;
 use crate::error::{Error, Fault, Result};
-
-/// A contour's centre and area by `moments`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Contour {
-    pub x_px: f64,
-    pub y_px: f64,
-    pub area_px: f64,
-}
 
 fn failed(e: opencv::Error) -> Error {
     Error::Detect(Fault::new("OpenCV", e.to_string()))

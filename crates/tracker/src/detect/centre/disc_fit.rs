@@ -13,7 +13,7 @@ use std::array::from_fn;
 use super::disc::Disc;
 use super::edge_pixels::{Patch, Ring};
 use super::normal_equations::{DiscModel, Factor, MOVING, Normal, STILL};
-use crate::detect::side::Side;
+use crate::detect::settings::Polarity;
 use crate::detect::simd::lanes::LANES;
 
 /// A fitted disc.
@@ -92,7 +92,7 @@ impl DiscFit<'_> {
     }
 
     fn settle<const N: usize>(&self, patch: &Patch<'_>, start: &Start, ring: &mut Ring) -> Option<Fitted> {
-        let sign = self.model.side.sign();
+        let sign = self.model.polarity.sign();
         let Disc { x_px: x, y_px: y, radius_px: first_radius } = start.disc;
         let [path_x, path_y] = start.smear_px;
         // Where the pixels were chosen, and for a path of which length.
@@ -179,7 +179,7 @@ impl DiscFit<'_> {
         let (outer, inner) = (r + reach, (r - reach).max(0.0));
         ring.choose(patch, [cx, cy], inner, outer);
         let filled = ring.used.next_multiple_of(LANES);
-        if self.model.side == Side::Dark {
+        if self.model.polarity == Polarity::Dark {
             ring.value[..filled].iter_mut().for_each(|v| *v = -*v);
         }
         if avoid.iter().any(Option::is_some) {
@@ -194,7 +194,7 @@ impl DiscFit<'_> {
             }
         }
         if let Some(limit) = self.model.saturation {
-            let limit = (limit * self.model.side.sign()) as f32;
+            let limit = (limit * self.model.polarity.sign()) as f32;
             for (v, live) in ring.value[..ring.used].iter_mut().zip(&ring.live) {
                 ring.saturated += u32::from(*v >= limit && *live > 0.0);
                 *v = v.min(limit);

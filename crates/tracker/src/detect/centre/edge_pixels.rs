@@ -19,6 +19,7 @@ pub(crate) struct Patch<'a> {
     pub sides: [f64; 2],
 }
 
+/// Numbers of the pixels in a vector, from its first.
 const STEPS: [f32; LANES] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
 
 /// The edge table's values for eight pixels of a ring, kept so that look-up and accumulation are two loops: a processor
@@ -32,17 +33,18 @@ pub(crate) struct EdgeLookup {
     pub(super) sums: [[f32; LANES]; 6],
 }
 
-/// Pixels around an edge: place relative to the first guess of the centre, value, and 1 where it counts.
+/// Pixels of a ring about the edge of a disc, one array for each quantity: place relative to the first guess of the centre
+/// (in units of the square of a pixel's area), value (raw units), and 1 where the pixel counts, else 0.
 #[derive(Debug, Default)]
 pub(crate) struct Ring {
     pub x: Vec<f32>,
     pub y: Vec<f32>,
     pub value: Vec<f32>,
     pub live: Vec<f32>,
-    /// How many there are; those that fill up the last eight do not count.
+    /// Number of pixels; those that fill up the last vector do not count.
     pub used: usize,
     pub saturated: u32,
-    /// What is found of eight pixels on the way to the normal equations.
+    /// Lookups in the edge table, a vector of pixels each: scratch of the normal equations.
     pub eights: Vec<EdgeLookup>,
 }
 
@@ -52,6 +54,7 @@ impl Ring {
         work(Choose { patch, centre, inner, outer, ring: self });
     }
 
+    /// Empties the ring and makes room for `most` pixels.
     fn begin(&mut self, most: usize) {
         for lanes in [&mut self.x, &mut self.y, &mut self.value, &mut self.live] {
             if lanes.len() < most {
@@ -82,7 +85,7 @@ impl Ring {
     }
 }
 
-/// Takes pixels by their distance from a centre.
+/// The job of [`Ring::choose`].
 struct Choose<'a> {
     patch: &'a Patch<'a>,
     centre: [f64; 2],

@@ -1,5 +1,10 @@
 //! Finds the centre of a blob: the fit of a disc, the centroid by intensity, or the paper's contour.
 
+mod contour;
+#[cfg(feature = "opencv")]
+pub(super) mod contours;
+#[cfg(not(feature = "opencv"))]
+#[path = "without_contours.rs"]
 pub(super) mod contours;
 pub(super) mod disc;
 pub(super) mod disc_fit;

@@ -7,7 +7,7 @@ use std::array::from_fn;
 use super::edge_pixels::{EdgeLookup, Ring};
 use super::edge_table::EdgeTable;
 use crate::detect::noise::Noise;
-use crate::detect::side::Side;
+use crate::detect::settings::Polarity;
 use crate::detect::simd::lanes::{Eight, Job, LANES, work};
 
 /// Number of free parameters of a disc that stands still, and of one that moves during the exposure.
@@ -18,12 +18,13 @@ pub(crate) const MOVING: usize = 7;
 /// cannot be told from a line.
 const PATH_STEP_PX: f64 = 0.45;
 const MAX_PATH_SAMPLES: usize = 32;
+
 /// The model of a disc's pixels: the edge's coverage, the noise of a sample, and the value at which samples saturate.
 #[derive(Clone, Copy)]
 pub(crate) struct DiscModel<'a> {
     pub table: &'a EdgeTable,
     pub noise: Noise,
-    pub side: Side,
+    pub polarity: Polarity,
     /// Raw units; `None` where no sample saturates.
     pub saturation: Option<f64>,
 }
@@ -31,18 +32,18 @@ pub(crate) struct DiscModel<'a> {
 impl DiscModel<'_> {
     /// Whether a value is at the end of the recording's range on the markers' side.
     pub fn saturated(&self, value: f64) -> bool {
-        self.saturation.is_some_and(|limit| match self.side {
-            Side::Bright => value >= limit,
-            Side::Dark => value <= limit,
+        self.saturation.is_some_and(|limit| match self.polarity {
+            Polarity::Bright => value >= limit,
+            Polarity::Dark => value <= limit,
         })
     }
 }
 
-/// `line_k * line_l * weight` for k <= l, where a line is the model's derivative by one of its numbers, or last
-/// the residual.
+/// Sums of `line_k * line_l * weight` for k <= l, where a line holds the model's derivative by one parameter for each
+/// pixel, and the last line the residual: the upper triangle of the normal equations with their right-hand side.
 const PRODUCTS: usize = (MOVING + 1) * (MOVING + 2) / 2;
 
-/// Where the product of lines k <= l is.
+/// Index of the product of lines k <= l of N parameters in that triangle, stored row by row.
 const fn place(k: usize, l: usize, n: usize) -> usize {
     k * (n + 1) - k * (k + 1) / 2 + l
 }
@@ -151,7 +152,7 @@ impl<const N: usize> Factor<N> {
     }
 }
 
-/// What the normal equations are made of.
+/// The job that sums the normal equations over a ring.
 struct Equations<'a, const N: usize> {
     model: &'a DiscModel<'a>,
     ring: &'a mut Ring,
@@ -167,7 +168,7 @@ impl<const N: usize> Job for Equations<'_, N> {
         let Self { model, ring, p } = self;
         let all = |v: f32| V::splat(token, v);
         let of = |v: &[f32; LANES]| V::load(token, v);
-        let sign = model.side.sign() as f32;
+        let sign = model.polarity.sign() as f32;
         let [x, y, r, base, height]: [f32; 5] = from_fn(|i| p[i] as f32);
         let limit = model.saturation.map_or(f32::INFINITY, |l| l as f32 * sign);
         let n = ring.used.div_ceil(LANES);

@@ -50,8 +50,9 @@ fn wrong_size(f: &Fitted, levels: &Levels) -> f64 {
     (f.radius_px - m.radius_px) / (4.5 * sigma).max(0.01 * m.radius_px)
 }
 
-/// Flags of a blob: saturated, at a border, more than one marker, less than one.
-pub(crate) fn judge(blob: &Blob, centre: &Centre, levels: &Levels) -> Flags {
+/// Flags of a blob: saturated, at a border, more than one marker, less than one. Where discs are fitted to whole markers
+/// (`fits_discs`), a blob that no disc fits is none.
+pub(crate) fn judge(blob: &Blob, centre: &Centre, levels: &Levels, fits_discs: bool) -> Flags {
     let mut flags = 0;
     if centre.saturated >= SATURATED_PIXELS {
         flags |= Flags::SATURATED;
@@ -69,7 +70,7 @@ pub(crate) fn judge(blob: &Blob, centre: &Centre, levels: &Levels) -> Flags {
         let slack = (4.0 * marker.radius_spread).max(0.5 * edge).max(LEAST_AREA_SLACK);
         let noise = levels.noise.variance(levels.noise.dark).sqrt() / levels.contrast;
         let ratio = area / whole;
-        let misfit = centre.fitted.is_none_or(|f| misfit(&f, levels));
+        let misfit = centre.fitted.map_or(fits_discs, |f| misfit(&f, levels));
         let size = centre.fitted.map_or(0.0, |f| wrong_size(&f, levels));
         if (ratio > MERGED_AREA
             && (misfit || blob.elongation(levels.pixel_aspect.sides()) > MERGED_ELONGATION))

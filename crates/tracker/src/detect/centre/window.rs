@@ -12,7 +12,7 @@ use crate::detect::label::components::Blob;
 use crate::detect::label::mask::Spans;
 use crate::detect::levels::Levels;
 use crate::detect::pixels::Pixels;
-use crate::detect::side::Side;
+use crate::detect::settings::Polarity;
 use crate::detect::simd::lanes::{Eight, Job, LANES, work};
 
 /// A centre and what was seen on the way to it.
@@ -331,7 +331,7 @@ impl Window {
     /// blob; in three rounds, each about the centre of the one before.
     pub fn weighted(&mut self, pixels: &Pixels<'_>, spans: &Spans, blob: &Blob, levels: &Levels) -> Centre {
         self.load(pixels, blob, MARGIN);
-        let sign = levels.side.sign();
+        let sign = levels.polarity.sign();
         let [mut cx, mut cy] = blob.mean();
         let reach = blob.axes(self.sides).map(|v| 2.0 * v.sqrt());
         let radius = reach[0] + 2.0;
@@ -377,9 +377,9 @@ impl Window {
                     sy += h * dy;
                     q += 0.5 * d * levels.noise.variance(v);
                     result.peak = result.peak.max(h);
-                    result.saturated += u32::from(levels.saturation.is_some_and(|l| match levels.side {
-                        Side::Bright => v >= l,
-                        Side::Dark => v <= l,
+                    result.saturated += u32::from(levels.saturation.is_some_and(|l| match levels.polarity {
+                        Polarity::Bright => v >= l,
+                        Polarity::Dark => v <= l,
                     }));
                 }
             }

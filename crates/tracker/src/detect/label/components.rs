@@ -7,7 +7,7 @@
 use super::plan::{CELL_PX, Plan, Segment};
 use super::prefilter::{MASK_BITS, Prefilter, Sample};
 use crate::detect::pixels::Pixels;
-use crate::detect::side::Side;
+use crate::detect::settings::Polarity;
 use crate::frame::PixelFormat;
 
 /// What one pass adds up about a connected set of pixels beyond the threshold.
@@ -125,14 +125,14 @@ pub(crate) struct Labeller {
 
 impl Labeller {
     /// Appends the blobs of a frame to `out` (cleared first), in order of their first pixel.
-    pub fn find(&mut self, pixels: &Pixels<'_>, plan: &Plan, side: Side, out: &mut Vec<Blob>) {
+    pub fn find(&mut self, pixels: &Pixels<'_>, plan: &Plan, polarity: Polarity, out: &mut Vec<Blob>) {
         out.clear();
         self.parents.clear();
         self.blobs.clear();
         self.above.clear();
         self.here.clear();
         let mut prefilter = std::mem::take(&mut self.prefilter);
-        prefilter.find(pixels, plan, side);
+        prefilter.find(pixels, plan, polarity);
         let mut row = None;
         let mut ahead = prefilter.marks().skip(AHEAD);
         for (y, column) in prefilter.marks() {
@@ -149,7 +149,13 @@ impl Labeller {
                 let (start, end) = (s.start.max(left), s.end.min(right));
                 if start < end {
                     let edge = (s.edge.0 && start == s.start, s.edge.1 && end == s.end);
-                    self.scan(pixels, y as usize, Segment { start, end, edge, ..*s }, plan.edge_rows, side);
+                    self.scan(
+                        pixels,
+                        y as usize,
+                        Segment { start, end, edge, ..*s },
+                        plan.edge_rows,
+                        polarity,
+                    );
                 }
             }
         }
@@ -173,31 +179,38 @@ impl Labeller {
         }
     }
 
-    fn scan(&mut self, pixels: &Pixels<'_>, y: usize, s: Segment, edge_rows: (usize, usize), side: Side) {
+    fn scan(
+        &mut self,
+        pixels: &Pixels<'_>,
+        y: usize,
+        s: Segment,
+        edge_rows: (usize, usize),
+        polarity: Polarity,
+    ) {
         let edge_row = y == edge_rows.0 || y == edge_rows.1;
         let count = (s.end - s.start) as usize;
         if pixels.format == PixelFormat::Gray8 {
             let from = pixels.start(y, s.start as usize).0;
-            self.runs(&pixels.bytes[from..from + count], s, edge_row, side);
+            self.runs(&pixels.bytes[from..from + count], s, edge_row, polarity);
         } else {
             let mut row = std::mem::take(&mut self.row);
             row.resize(count, 0);
             pixels.read(y, s.start as usize, &mut row);
-            self.runs(&row, s, edge_row, side);
+            self.runs(&row, s, edge_row, polarity);
             self.row = row;
         }
     }
 
     /// The runs of a piece in which there may be some.
-    fn runs<T: Sample>(&mut self, row: &[T], s: Segment, edge_row: bool, side: Side) {
-        let Some(limit) = T::limit(s.threshold, side) else { return };
+    fn runs<T: Sample>(&mut self, row: &[T], s: Segment, edge_row: bool, polarity: Polarity) {
+        let Some(limit) = T::limit(s.threshold, polarity) else { return };
         let mut open: Option<u32> = None;
         let mut x = s.start;
         let (many, rest) = row.as_chunks::<MASK_BITS>();
         let mut last = [limit; MASK_BITS];
         last[..rest.len()].copy_from_slice(rest);
         for many in many.iter().chain((!rest.is_empty()).then_some(&last)) {
-            let mask = T::beyond(many, limit, side);
+            let mask = T::beyond(many, limit, polarity);
             // What begins or ends: beyond here and not just before, or the other way round.
             let mut turns = mask ^ (mask << 1 | u64::from(open.is_some()));
             if x + MASK_BITS as u32 > s.end {

@@ -4,7 +4,7 @@
 
 use super::mask::Spans;
 use crate::detect::levels::Levels;
-use crate::detect::side::Side;
+use crate::detect::settings::Polarity;
 
 /// Columns `start..end` of a row with the threshold to apply there, raw units.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -56,9 +56,9 @@ impl Plan {
                 while from < end {
                     let to = (from + STRETCH_PX).min(end);
                     let t = levels.threshold(f64::from(from + to - 1) / 2.0, y as f64);
-                    let threshold = match levels.side {
-                        Side::Bright => t.ceil().clamp(1.0, 65535.0),
-                        Side::Dark => t.floor().clamp(0.0, 65534.0),
+                    let threshold = match levels.polarity {
+                        Polarity::Bright => t.ceil().clamp(1.0, 65535.0),
+                        Polarity::Dark => t.floor().clamp(0.0, 65534.0),
                     } as u16;
                     let edge = (from == start, to == end);
                     match segments.last_mut() {
@@ -73,17 +73,17 @@ impl Plan {
             }
             first.push(segments.len() as u32);
         }
-        Self::of_segments(segments, first, levels.side)
+        Self::of_segments(segments, first, levels.polarity)
     }
 
     /// One threshold for a whole image.
-    pub fn uniform(width: usize, height: usize, threshold: u16, side: Side) -> Self {
+    pub fn uniform(width: usize, height: usize, threshold: u16, polarity: Polarity) -> Self {
         let segment = Segment { start: 0, end: width as u32, threshold, edge: (true, true) };
-        Self::of_segments(vec![segment; height], (0..=height as u32).collect(), side)
+        Self::of_segments(vec![segment; height], (0..=height as u32).collect(), polarity)
     }
 
     /// The plan of segments, row by row as `first` says.
-    fn of_segments(segments: Vec<Segment>, first: Vec<u32>, side: Side) -> Self {
+    fn of_segments(segments: Vec<Segment>, first: Vec<u32>, polarity: Polarity) -> Self {
         let width = segments.iter().map(|s| s.end).max().unwrap_or(0);
         let rows = first.len() - 1;
         let mut this = Self { segments, first, ..Self::default() };
@@ -91,9 +91,9 @@ impl Plan {
         this.edge_rows =
             ((0..rows).find(holds).unwrap_or(usize::MAX), (0..rows).rev().find(holds).unwrap_or(0));
         this.columns = width.div_ceil(CELL_PX) as usize;
-        let harder = |a: u16, b: u16| match side {
-            Side::Bright => a.min(b),
-            Side::Dark => a.max(b),
+        let harder = |a: u16, b: u16| match polarity {
+            Polarity::Bright => a.min(b),
+            Polarity::Dark => a.max(b),
         };
         let mut cells = Vec::new();
         for y in (0..rows).step_by(CELL_ROWS) {
@@ -140,7 +140,7 @@ mod tests {
     fn cells_hold_every_segment_and_the_easiest_threshold() {
         let corners = vec![[100.0, 3.0], [900.0, 40.0], [350.0, 90.0]];
         let spans = Spans::new(Some(&Region::Polygon(corners)), 1000, 100).unwrap();
-        for side in [Side::Bright, Side::Dark] {
+        for polarity in [Polarity::Bright, Polarity::Dark] {
             let (mut segments, mut first) = (Vec::new(), vec![0]);
             for y in 0..100 {
                 for &(start, end) in spans.row(y) {
@@ -149,16 +149,16 @@ mod tests {
                 }
                 first.push(segments.len() as u32);
             }
-            let plan = Plan::of_segments(segments, first, side);
+            let plan = Plan::of_segments(segments, first, polarity);
             assert_eq!(plan.edge_rows, (3, 89));
             for y in 0..100 {
                 for s in plan.row(y) {
                     for x in [s.start, s.end - 1] {
                         let cell = plan.cells(y)[(x / CELL_PX) as usize];
                         assert!((cell.start..cell.end).contains(&x), "{s:?} {cell:?}");
-                        assert!(match side {
-                            Side::Bright => cell.threshold <= s.threshold,
-                            Side::Dark => cell.threshold >= s.threshold,
+                        assert!(match polarity {
+                            Polarity::Bright => cell.threshold <= s.threshold,
+                            Polarity::Dark => cell.threshold >= s.threshold,
                         });
                     }
                 }

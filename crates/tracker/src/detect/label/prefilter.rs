@@ -12,7 +12,7 @@ use wide::{u8x16, u16x8};
 
 use super::plan::{CELL_PX, Cell, Plan};
 use crate::detect::pixels::{Pixels, fetch};
-use crate::detect::side::Side;
+use crate::detect::settings::Polarity;
 use crate::frame::PixelFormat;
 
 /// Samples per bit mask.
@@ -21,35 +21,35 @@ pub(crate) const MASK_BITS: usize = 64;
 /// A sample that can be compared with a threshold many at a time.
 pub(crate) trait Sample: Copy {
     /// The threshold as a limit to subtract; `None` where no sample of this type can be beyond it.
-    fn limit(threshold: u16, side: Side) -> Option<Self>;
+    fn limit(threshold: u16, polarity: Polarity) -> Option<Self>;
     /// Whether any sample in blocks of little-endian bytes is beyond the limit.
-    fn any(blocks: &[Block], limit: Self, side: Side) -> bool;
+    fn any(blocks: &[Block], limit: Self, polarity: Polarity) -> bool;
     /// Which of many samples are beyond the limit, as bits from the lowest on.
-    fn beyond(many: &[Self; MASK_BITS], limit: Self, side: Side) -> u64;
+    fn beyond(many: &[Self; MASK_BITS], limit: Self, polarity: Polarity) -> u64;
 }
 
 macro_rules! sample {
     ($t:ty, $beyond:ident) => {
         impl Sample for $t {
             #[inline(always)]
-            fn limit(threshold: u16, side: Side) -> Option<Self> {
+            fn limit(threshold: u16, polarity: Polarity) -> Option<Self> {
                 // Beyond is above the limit for bright markers and below it for dark ones.
-                match side {
-                    Side::Bright => <$t>::try_from(threshold.saturating_sub(1)).ok(),
-                    Side::Dark => Some(<$t>::try_from(threshold.saturating_add(1)).unwrap_or(<$t>::MAX)),
+                match polarity {
+                    Polarity::Bright => <$t>::try_from(threshold.saturating_sub(1)).ok(),
+                    Polarity::Dark => Some(<$t>::try_from(threshold.saturating_add(1)).unwrap_or(<$t>::MAX)),
                 }
             }
 
             // Written so that the compiler makes one vector of what is farthest, and one instruction a block.
             #[inline(always)]
-            fn any(blocks: &[Block], limit: Self, side: Side) -> bool {
+            fn any(blocks: &[Block], limit: Self, polarity: Polarity) -> bool {
                 let mut farthest = [limit; BLOCK / size_of::<$t>()];
                 for block in blocks {
                     for (f, bytes) in farthest.iter_mut().zip(block.as_chunks().0) {
                         let v = <$t>::from_le_bytes(*bytes);
-                        *f = match side {
-                            Side::Bright => v.max(*f),
-                            Side::Dark => v.min(*f),
+                        *f = match polarity {
+                            Polarity::Bright => v.max(*f),
+                            Polarity::Dark => v.min(*f),
                         };
                     }
                 }
@@ -57,8 +57,8 @@ macro_rules! sample {
             }
 
             #[inline(always)]
-            fn beyond(many: &[Self; MASK_BITS], limit: Self, side: Side) -> u64 {
-                $beyond(many, limit, side)
+            fn beyond(many: &[Self; MASK_BITS], limit: Self, polarity: Polarity) -> u64 {
+                $beyond(many, limit, polarity)
             }
         }
     };
@@ -71,13 +71,13 @@ const BLOCK: usize = 32;
 type Block = [u8; BLOCK];
 
 #[inline(always)]
-fn beyond_u8(many: &[u8; MASK_BITS], limit: u8, side: Side) -> u64 {
+fn beyond_u8(many: &[u8; MASK_BITS], limit: u8, polarity: Polarity) -> u64 {
     let limit = u8x16::splat(limit);
     let within = many.as_chunks().0.iter().enumerate().fold(0, |bits, (i, few)| {
         let values = u8x16::new(*few);
-        let farther = match side {
-            Side::Bright => values.max(limit),
-            Side::Dark => values.min(limit),
+        let farther = match polarity {
+            Polarity::Bright => values.max(limit),
+            Polarity::Dark => values.min(limit),
         };
         bits | u64::from(farther.simd_eq(limit).to_bitmask()) << (16 * i)
     });
@@ -85,14 +85,14 @@ fn beyond_u8(many: &[u8; MASK_BITS], limit: u8, side: Side) -> u64 {
 }
 
 #[inline(always)]
-fn beyond_u16(many: &[u16; MASK_BITS], limit: u16, side: Side) -> u64 {
+fn beyond_u16(many: &[u16; MASK_BITS], limit: u16, polarity: Polarity) -> u64 {
     let limit = u16x8::splat(limit);
     let within = many.as_chunks().0.iter().enumerate().fold(0, |bits, (i, few)| {
         let values = u16x8::new(*few);
         // Not every processor has extremes of 16 bits, but all have saturating differences.
-        let beyond = match side {
-            Side::Bright => values.saturating_sub(limit),
-            Side::Dark => limit.saturating_sub(values),
+        let beyond = match polarity {
+            Polarity::Bright => values.saturating_sub(limit),
+            Polarity::Dark => limit.saturating_sub(values),
         };
         bits | u64::from(beyond.simd_eq(u16x8::splat(0)).to_bitmask()) << (8 * i)
     });
@@ -155,47 +155,47 @@ fn pass(pixels: &Pixels<'_>, plan: &Plan, marks: &mut Marks, mut test: impl Test
 }
 
 /// Samples of 8 or 16 bits in whole blocks, which reach beyond a cell that is cut; at the end of the plane the last
-/// one is filled up with what is there. The side is a constant for the compiler's sake.
+/// one is filled up with what is there. The polarity is a constant for the compiler's sake.
 struct Blocks<T, const BRIGHT: bool>(PhantomData<T>);
 
 impl<T: Sample, const BRIGHT: bool> Test for Blocks<T, BRIGHT> {
     #[inline(always)]
     fn any(&mut self, line: &Line<'_>, cell: Cell) -> bool {
-        let side = if BRIGHT { Side::Bright } else { Side::Dark };
-        let Some(limit) = T::limit(cell.threshold, side) else { return false };
+        let polarity = if BRIGHT { Polarity::Bright } else { Polarity::Dark };
+        let Some(limit) = T::limit(cell.threshold, polarity) else { return false };
         let bytes = &line.bytes[line.bit / 8 + cell.start as usize * size_of::<T>()..];
         // Most cells are whole ones, whose number of blocks the compiler knows.
         if cell.end - cell.start == CELL_PX
             && let Some(whole) = bytes.get(..CELL_PX as usize * size_of::<T>())
         {
-            return T::any(whole.as_chunks().0, limit, side);
+            return T::any(whole.as_chunks().0, limit, polarity);
         }
         let (whole, rest) = bytes.as_chunks();
         let count = ((cell.end - cell.start) as usize * size_of::<T>()).div_ceil(BLOCK);
         match whole.get(..count) {
-            Some(whole) => T::any(whole, limit, side),
+            Some(whole) => T::any(whole, limit, polarity),
             None => {
                 let mut last = [0; BLOCK];
                 last.iter_mut().zip(rest.iter().cycle()).for_each(|(to, &v)| *to = v);
-                T::any(whole, limit, side) || T::any(&[last], limit, side)
+                T::any(whole, limit, polarity) || T::any(&[last], limit, polarity)
             }
         }
     }
 }
 
 #[multiversion(targets("x86_64+avx2"))]
-fn pass_u8<'a>(pixels: &Pixels<'a>, plan: &Plan, side: Side, marks: &mut Marks) {
-    match side {
-        Side::Bright => pass(pixels, plan, marks, Blocks::<u8, true>(PhantomData)),
-        Side::Dark => pass(pixels, plan, marks, Blocks::<u8, false>(PhantomData)),
+fn pass_u8<'a>(pixels: &Pixels<'a>, plan: &Plan, polarity: Polarity, marks: &mut Marks) {
+    match polarity {
+        Polarity::Bright => pass(pixels, plan, marks, Blocks::<u8, true>(PhantomData)),
+        Polarity::Dark => pass(pixels, plan, marks, Blocks::<u8, false>(PhantomData)),
     }
 }
 
 #[multiversion(targets("x86_64+avx2"))]
-fn pass_u16<'a>(pixels: &Pixels<'a>, plan: &Plan, side: Side, marks: &mut Marks) {
-    match side {
-        Side::Bright => pass(pixels, plan, marks, Blocks::<u16, true>(PhantomData)),
-        Side::Dark => pass(pixels, plan, marks, Blocks::<u16, false>(PhantomData)),
+fn pass_u16<'a>(pixels: &Pixels<'a>, plan: &Plan, polarity: Polarity, marks: &mut Marks) {
+    match polarity {
+        Polarity::Bright => pass(pixels, plan, marks, Blocks::<u16, true>(PhantomData)),
+        Polarity::Dark => pass(pixels, plan, marks, Blocks::<u16, false>(PhantomData)),
     }
 }
 
@@ -222,10 +222,10 @@ struct Coarse<const N: usize> {
 
 impl<const N: usize> Coarse<N> {
     /// `None` where the upper bits of some sample say nothing.
-    fn new(bits: usize, threshold: u16, side: Side) -> Option<Self> {
-        let never = match side {
-            Side::Bright => u8::MAX,
-            Side::Dark => 0,
+    fn new(bits: usize, threshold: u16, polarity: Polarity) -> Option<Self> {
+        let never = match polarity {
+            Polarity::Bright => u8::MAX,
+            Polarity::Dark => 0,
         };
         let mut this = Self { keep: [[0; 2]; N], limit: [[never; 2]; N] };
         for byte in 0..2 * N {
@@ -236,9 +236,9 @@ impl<const N: usize> Coarse<N> {
             // A sample beyond the threshold has upper bits that are beyond or at those of the threshold.
             let upper = u8::try_from(threshold >> (bits + within - 8)).ok()?;
             this.keep[byte / 2][byte % 2] = u8::MAX >> within;
-            this.limit[byte / 2][byte % 2] = match side {
-                Side::Bright => upper.checked_sub(1)?,
-                Side::Dark => upper.checked_add(1)?,
+            this.limit[byte / 2][byte % 2] = match polarity {
+                Polarity::Bright => upper.checked_sub(1)?,
+                Polarity::Dark => upper.checked_add(1)?,
             };
         }
         Some(this)
@@ -265,12 +265,12 @@ impl<const N: usize> Coarse<N> {
 }
 
 impl<const N: usize> Words<N> {
-    fn new(bits: usize, threshold: u16, side: Side) -> Self {
-        let never = match side {
-            Side::Bright => u16::MAX,
-            Side::Dark => 0,
+    fn new(bits: usize, threshold: u16, polarity: Polarity) -> Self {
+        let never = match polarity {
+            Polarity::Bright => u16::MAX,
+            Polarity::Dark => 0,
         };
-        let coarse = Coarse::new(bits, threshold, side);
+        let coarse = Coarse::new(bits, threshold, polarity);
         let mut this = Self { keep: [[0; N]; 2], limit: [[never; N]; 2], coarse };
         for byte in 0..2 * N {
             let within = (byte * 8).next_multiple_of(bits) - byte * 8;
@@ -280,9 +280,9 @@ impl<const N: usize> Words<N> {
             let shift = 16 - within - bits;
             let t = u32::from(threshold);
             this.keep[byte % 2][byte / 2] = u16::MAX >> within;
-            this.limit[byte % 2][byte / 2] = match side {
-                Side::Bright => (t << shift).saturating_sub(1).min(0xffff) as u16,
-                Side::Dark => ((t + 1) << shift).min(0xffff) as u16,
+            this.limit[byte % 2][byte / 2] = match polarity {
+                Polarity::Bright => (t << shift).saturating_sub(1).min(0xffff) as u16,
+                Polarity::Dark => ((t + 1) << shift).min(0xffff) as u16,
             };
         }
         this
@@ -339,10 +339,10 @@ struct Packed<'a, const N: usize, const BRIGHT: bool> {
 impl<const N: usize, const BRIGHT: bool> Test for Packed<'_, N, BRIGHT> {
     #[inline(always)]
     fn any(&mut self, line: &Line<'_>, cell: Cell) -> bool {
-        let side = if BRIGHT { Side::Bright } else { Side::Dark };
+        let polarity = if BRIGHT { Polarity::Bright } else { Polarity::Dark };
         let found = self.known.binary_search_by_key(&cell.threshold, |k| k.0);
         let i = found.unwrap_or_else(|i| {
-            self.known.insert(i, (cell.threshold, Words::new(self.bits, cell.threshold, side)));
+            self.known.insert(i, (cell.threshold, Words::new(self.bits, cell.threshold, polarity)));
             i
         });
         let words = &self.known[i].1;
@@ -382,14 +382,14 @@ impl<const N: usize, const BRIGHT: bool> Test for Packed<'_, N, BRIGHT> {
 fn pass_packed<'a, const N: usize>(
     pixels: &Pixels<'a>,
     plan: &Plan,
-    side: Side,
+    polarity: Polarity,
     known: &mut Known<N>,
     marks: &mut Marks,
 ) {
     let bits = pixels.format.bits_per_pixel() as usize;
-    match side {
-        Side::Bright => pass(pixels, plan, marks, Packed::<N, true> { known, bits }),
-        Side::Dark => pass(pixels, plan, marks, Packed::<N, false> { known, bits }),
+    match polarity {
+        Polarity::Bright => pass(pixels, plan, marks, Packed::<N, true> { known, bits }),
+        Polarity::Dark => pass(pixels, plan, marks, Packed::<N, false> { known, bits }),
     }
 }
 
@@ -404,24 +404,24 @@ pub(crate) struct Prefilter {
     marks: Marks,
     known_10: Known<{ words_of(10) }>,
     known_12: Known<{ words_of(12) }>,
-    /// The side that words are known for.
-    side: Option<Side>,
+    /// The polarity that words are known for.
+    polarity: Option<Polarity>,
 }
 
 impl Prefilter {
     /// The cells that may hold a pixel beyond their threshold, row by row. None is left out that does; pixels just
     /// beside a cell may be the reason that it is there.
-    pub fn find(&mut self, pixels: &Pixels<'_>, plan: &Plan, side: Side) {
-        if self.side != Some(side) {
+    pub fn find(&mut self, pixels: &Pixels<'_>, plan: &Plan, polarity: Polarity) {
+        if self.polarity != Some(polarity) {
             self.known_10.clear();
             self.known_12.clear();
-            self.side = Some(side);
+            self.polarity = Some(polarity);
         }
         match pixels.format {
-            PixelFormat::Gray8 => pass_u8(pixels, plan, side, &mut self.marks),
-            PixelFormat::Gray16 => pass_u16(pixels, plan, side, &mut self.marks),
-            PixelFormat::Packed10 => pass_packed(pixels, plan, side, &mut self.known_10, &mut self.marks),
-            PixelFormat::Packed12 => pass_packed(pixels, plan, side, &mut self.known_12, &mut self.marks),
+            PixelFormat::Gray8 => pass_u8(pixels, plan, polarity, &mut self.marks),
+            PixelFormat::Gray16 => pass_u16(pixels, plan, polarity, &mut self.marks),
+            PixelFormat::Packed10 => pass_packed(pixels, plan, polarity, &mut self.known_10, &mut self.marks),
+            PixelFormat::Packed12 => pass_packed(pixels, plan, polarity, &mut self.known_12, &mut self.marks),
         }
     }
 
@@ -443,10 +443,10 @@ mod tests {
             let top = if bits == 16 { 4095 } else { (1u32 << bits) - 1 } as u16;
             // An odd width, so that packed rows end inside bytes; a height that is no multiple of four.
             let (w, h) = (701usize, 7usize);
-            for side in [Side::Bright, Side::Dark] {
-                let (ground, t) = match side {
-                    Side::Bright => (top / 2, top / 2 + 1),
-                    Side::Dark => (top / 2, top / 2 - 1),
+            for polarity in [Polarity::Bright, Polarity::Dark] {
+                let (ground, t) = match polarity {
+                    Polarity::Bright => (top / 2, top / 2 + 1),
+                    Polarity::Dark => (top / 2, top / 2 - 1),
                 };
                 for x in [0, 1, 2, 3, 4, 5, 158, 159, 160, 161, 319, 320, 321, 639, 640, 697, 698, 699, 700] {
                     for y in [0, 1, 3, 6] {
@@ -455,20 +455,20 @@ mod tests {
                         let bytes = crate::detect::pixels::pack(&values, bits);
                         let pixels = Pixels::of_samples(&bytes, w, h, format);
                         let mut prefilter = Prefilter::default();
-                        prefilter.find(&pixels, &Plan::uniform(w, h, t, side), side);
+                        prefilter.find(&pixels, &Plan::uniform(w, h, t, polarity), polarity);
                         let mark = (y as u32, x as u32 / CELL_PX);
-                        assert!(prefilter.marks().any(|m| m == mark), "{format:?} {side:?} {x} {y}");
+                        assert!(prefilter.marks().any(|m| m == mark), "{format:?} {polarity:?} {x} {y}");
                         // The pixel's own cell, one beside it, and of packed rows the last one.
-                        assert!(prefilter.marks().count() <= 3, "{format:?} {side:?} {x} {y}");
+                        assert!(prefilter.marks().count() <= 3, "{format:?} {polarity:?} {x} {y}");
                         // A step farther and nothing is beyond.
-                        let farther = match side {
-                            Side::Bright => t + 1,
-                            Side::Dark => t - 1,
+                        let farther = match polarity {
+                            Polarity::Bright => t + 1,
+                            Polarity::Dark => t - 1,
                         };
-                        prefilter.find(&pixels, &Plan::uniform(w, h, farther, side), side);
+                        prefilter.find(&pixels, &Plan::uniform(w, h, farther, polarity), polarity);
                         assert!(
                             prefilter.marks().all(|m| m == (6, 2)),
-                            "{format:?} {side:?} {x} {y} farther"
+                            "{format:?} {polarity:?} {x} {y} farther"
                         );
                     }
                 }

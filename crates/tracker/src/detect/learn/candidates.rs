@@ -8,7 +8,7 @@ use super::background::Background;
 use crate::detect::label::components::{Blob, Labeller};
 use crate::detect::label::plan::Plan;
 use crate::detect::pixels::Pixels;
-use crate::detect::side::Side;
+use crate::detect::settings::Polarity;
 use crate::frame::PixelFormat;
 
 /// Sample images and what is known of them.
@@ -46,22 +46,22 @@ pub(crate) struct Candidate {
 
 /// The best choice and the blobs it gives.
 pub(crate) struct Choice {
-    pub side: Side,
+    pub polarity: Polarity,
     pub height: f64,
     pub blobs: Vec<Candidate>,
 }
 
 /// Frames in which thresholds are tried.
 const FRAMES: usize = 6;
-/// Thresholds tried on each side.
+/// Thresholds tried for each polarity.
 const STEPS: usize = 20;
 
 /// Heights above the background as an image of their own, as bytes of 16-bit samples.
-fn heights(field: &Field<'_>, image: &[u16], side: Side) -> Vec<u8> {
+fn heights(field: &Field<'_>, image: &[u16], polarity: Polarity) -> Vec<u8> {
     let flat = field.background.is_flat();
     let level = field.background.median();
     // Rounded, and 0 below the background.
-    let height = |v: u16, b: f64| (side.sign() * (f64::from(v) - b) + 0.5) as u16;
+    let height = |v: u16, b: f64| (polarity.sign() * (f64::from(v) - b) + 0.5) as u16;
     let of_level: Vec<u16> =
         if flat { (0..=u16::MAX).map(|v| height(v, level)).collect() } else { Vec::new() };
     let mut bytes = Vec::with_capacity(image.len() * 2);
@@ -79,22 +79,22 @@ fn heights(field: &Field<'_>, image: &[u16], side: Side) -> Vec<u8> {
     bytes
 }
 
-/// The side and height whose blobs look most like markers; `fixed` is a threshold in raw units.
-pub(crate) fn best(field: &Field<'_>, sides: &[Side], fixed: Option<f64>) -> Option<Choice> {
+/// The polarity and height whose blobs look most like markers; `fixed` is a threshold in raw units.
+pub(crate) fn best(field: &Field<'_>, polarities: &[Polarity], fixed: Option<f64>) -> Option<Choice> {
     let sigma = field.read.sqrt();
-    let fields: Vec<(Side, Vec<Vec<u8>>, f64)> = sides
+    let fields: Vec<(Polarity, Vec<Vec<u8>>, f64)> = polarities
         .iter()
-        .map(|&side| {
+        .map(|&polarity| {
             let maps: Vec<Vec<u8>> =
-                field.images.par_iter().step_by(field.step()).map(|i| heights(field, i, side)).collect();
+                field.images.par_iter().step_by(field.step()).map(|i| heights(field, i, polarity)).collect();
             let top = top_height(&maps);
-            (side, maps, top)
+            (polarity, maps, top)
         })
         .collect();
     let highest = fields.iter().map(|f| f.2).fold(0.0, f64::max);
     let mut found: Option<(f64, Choice)> = None;
-    for (side, maps, top) in &fields {
-        let fixed = fixed.map(|t| side.sign() * (t - field.background.median()));
+    for (polarity, maps, top) in &fields {
+        let fixed = fixed.map(|t| polarity.sign() * (t - field.background.median()));
         if fixed.is_some_and(|h| h <= 0.0) {
             continue;
         }
@@ -130,7 +130,7 @@ pub(crate) fn best(field: &Field<'_>, sides: &[Side], fixed: Option<f64>) -> Opt
         let blobs =
             if fixed.is_some() { trials.swap_remove(best).2 } else { markers(field, maps, height, sigma) };
         if !blobs.is_empty() {
-            found = Some((score, Choice { side: *side, height, blobs }));
+            found = Some((score, Choice { polarity: *polarity, height, blobs }));
         }
     }
     found.map(|f| f.1)
@@ -178,7 +178,7 @@ fn top_height(maps: &[Vec<u8>]) -> f64 {
 /// Blobs at a height that are compact, not small, and steep at their edge.
 fn markers(field: &Field<'_>, maps: &[Vec<u8>], height: f64, sigma: f64) -> Vec<Candidate> {
     let threshold = height.ceil().clamp(1.0, 65535.0) as u16;
-    let plan = Plan::uniform(field.width, field.height, threshold, Side::Bright);
+    let plan = Plan::uniform(field.width, field.height, threshold, Polarity::Bright);
     let most = field.width * field.height / 5;
     let mut labeller = Labeller::default();
     let mut blobs: Vec<Blob> = Vec::new();
@@ -186,7 +186,7 @@ fn markers(field: &Field<'_>, maps: &[Vec<u8>], height: f64, sigma: f64) -> Vec<
     for (k, map) in maps.iter().enumerate() {
         let image = k * field.step();
         let pixels = Pixels::of_samples(map, field.width, field.height, PixelFormat::Gray16);
-        labeller.find(&pixels, &plan, Side::Bright, &mut blobs);
+        labeller.find(&pixels, &plan, Polarity::Bright, &mut blobs);
         for blob in &blobs {
             let area = blob.area as usize;
             if !(5..=most).contains(&area)

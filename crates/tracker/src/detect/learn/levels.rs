@@ -12,8 +12,7 @@ use crate::detect::noise::Noise;
 use crate::detect::pixels::Pixels;
 use crate::detect::quantile::{quantile, sorted};
 use crate::detect::settings::{DetectSettings, Polarity, Threshold};
-use crate::detect::side::Side;
-use crate::error::{Error, Fault, Place, Result};
+use crate::error::{Error, Fault, FaultKind, Place, Result};
 use crate::frame::Frame;
 use crate::message::{INFO, Message, Setting};
 
@@ -24,9 +23,9 @@ const MOST_FRAMES: usize = 12;
 fn other_than(settings: &DetectSettings) -> Message {
     let lit = ", or check that markers are lit; " + INFO + " says which container and depth was read";
     let given = match (settings.threshold, settings.polarity) {
-        (Threshold::Auto, Polarity::Auto) => "Give " + Setting::Threshold + " or " + Setting::Polarity,
+        (Threshold::Auto, None) => "Give " + Setting::Threshold + " or " + Setting::Polarity,
         (Threshold::Auto, _) => "Give " + Setting::Threshold + " or the other " + Setting::Polarity,
-        (_, Polarity::Auto) => "Give another " + Setting::Threshold + " or " + Setting::Polarity,
+        (_, None) => "Give another " + Setting::Threshold + " or " + Setting::Polarity,
         _ => "Give another " + Setting::Threshold + " or the other " + Setting::Polarity,
     };
     given + lit
@@ -69,6 +68,7 @@ impl Levels {
         let Some(known) = first else {
             return Err(Error::Detect(
                 Fault::new("recording", "none of its sample frames could be decoded")
+                    .of_kind(FaultKind::Damaged)
                     .advice("Look at it with " + INFO),
             ));
         };
@@ -98,10 +98,9 @@ impl Levels {
         let read = background::noise_variance(&images, width);
 
         // Step 3: polarity and height, by which blobs come and stay.
-        let sides: &[Side] = match settings.polarity {
-            Polarity::Auto => &[Side::Bright, Side::Dark],
-            Polarity::Bright => &[Side::Bright],
-            Polarity::Dark => &[Side::Dark],
+        let polarities = match settings.polarity {
+            None => vec![Polarity::Bright, Polarity::Dark],
+            Some(polarity) => vec![polarity],
         };
         let pixel_sides = settings.pixel_aspect.sides();
         let field =
@@ -110,13 +109,15 @@ impl Levels {
             Threshold::Auto => None,
             Threshold::Raw(t) => Some(t),
         };
-        let Some(best) = candidates::best(&field, sides, fixed) else {
+        let Some(best) = candidates::best(&field, &polarities, fixed) else {
             let what = "nothing like a marker stands out from the background";
-            return Err(Error::Detect(Fault::new("recording", what).advice(other_than(settings))));
+            return Err(Error::Detect(
+                Fault::new("recording", what).of_kind(FaultKind::NothingFound).advice(other_than(settings)),
+            ));
         };
 
         // Step 4: saturation, limits, typical marker.
-        let saturation = saturation(&images, best.side, top);
+        let saturation = saturation(&images, best.polarity, top);
         let area = |part: f64| candidates::weighted_quantile(&best.blobs, |b| b.area, part);
         let low = (0.15 * area(0.05)).max(0.01 * area(0.5)).max(4.0);
         // Where most blobs are of one size, a few large ones are something else.
@@ -135,12 +136,12 @@ impl Levels {
             .filter(|b| b.area >= area_px[0] && b.area <= area_px[1])
             .map(|b| Sample { pixels: planes[b.image], blob: b.blob })
             .collect();
-        let (marker, noise) = match marker::learn(&samples, best.side, noise, saturation, pixel_sides) {
+        let (marker, noise) = match marker::learn(&samples, best.polarity, noise, saturation, pixel_sides) {
             Some((marker, noise)) => (Some(marker), noise),
             None => (None, noise),
         };
         Ok(Self {
-            side: best.side,
+            polarity: best.polarity,
             image_px: [known.width, known.height],
             pixel_aspect: settings.pixel_aspect,
             depth_bits: known.depth_bits,
@@ -160,20 +161,20 @@ impl Levels {
 }
 
 /// The value that samples pile up at on the markers' side.
-fn saturation(images: &[Vec<u16>], side: Side, top: f64) -> Option<f64> {
-    let extremes = images.par_iter().filter_map(|image| match side {
-        Side::Bright => image.iter().max().copied(),
-        Side::Dark => image.iter().min().copied(),
+fn saturation(images: &[Vec<u16>], polarity: Polarity, top: f64) -> Option<f64> {
+    let extremes = images.par_iter().filter_map(|image| match polarity {
+        Polarity::Bright => image.iter().max().copied(),
+        Polarity::Dark => image.iter().min().copied(),
     });
-    let extreme = match side {
-        Side::Bright => extremes.max()?,
-        Side::Dark => extremes.min()?,
+    let extreme = match polarity {
+        Polarity::Bright => extremes.max()?,
+        Polarity::Dark => extremes.min()?,
     };
     let at: usize = images.par_iter().map(|image| image.iter().filter(|&&v| v == extreme).count()).sum();
     let piled = at >= 20 * images.len();
-    let end = match side {
-        Side::Bright => f64::from(extreme) >= 0.9 * top,
-        Side::Dark => f64::from(extreme) <= 0.02 * top,
+    let end = match polarity {
+        Polarity::Bright => f64::from(extreme) >= 0.9 * top,
+        Polarity::Dark => f64::from(extreme) <= 0.02 * top,
     };
     (piled && end).then_some(f64::from(extreme))
 }

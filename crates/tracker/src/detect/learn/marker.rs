@@ -13,7 +13,7 @@ use crate::detect::marker::{LARGEST_MISFIT, Marker};
 use crate::detect::noise::Noise;
 use crate::detect::pixels::Pixels;
 use crate::detect::quantile::{quantile, sorted};
-use crate::detect::side::Side;
+use crate::detect::settings::Polarity;
 
 /// A blob in one of the sample frames.
 pub(crate) struct Sample<'a> {
@@ -34,7 +34,7 @@ const MOST: usize = 60;
 #[expect(clippy::too_many_lines, reason = "the steps of one estimate, in order")]
 pub(crate) fn learn(
     samples: &[Sample<'_>],
-    side: Side,
+    polarity: Polarity,
     noise: Noise,
     saturation: Option<f64>,
     sides: [f64; 2],
@@ -54,7 +54,7 @@ pub(crate) fn learn(
     let read = noise.read;
     let fits = |table: &EdgeTable, noise: Noise| -> Vec<(usize, Fitted)> {
         let fit = DiscFit {
-            model: DiscModel { table, noise, side, saturation },
+            model: DiscModel { table, noise, polarity, saturation },
             band_px: BAND_PX,
             usual_chi2: 1.0,
         };
@@ -101,7 +101,7 @@ pub(crate) fn learn(
     let found = fits(&table, noise);
     let mut flat = [Vec::new(), Vec::new()];
     let fit = DiscFit {
-        model: DiscModel { table: &table, noise, side, saturation },
+        model: DiscModel { table: &table, noise, polarity, saturation },
         band_px: BAND_PX,
         usual_chi2: 1.0,
     };
@@ -120,16 +120,16 @@ pub(crate) fn learn(
         let rise = quantile(&heights, 0.5);
         // For dark markers the ground is the brighter side.
         let within = quantile(&inside, 0.5);
-        let (dark, bright) = match side {
+        let (dark, bright) = match polarity {
             // Light only adds noise, so what is more around a marker than inside is no noise: the edge of its link.
-            Side::Bright => (noise.read.min(within), within),
-            Side::Dark => (within, noise.read),
+            Polarity::Bright => (noise.read.min(within), within),
+            Polarity::Dark => (within, noise.read),
         };
         noise.read = dark.max(1.0 / 12.0);
         noise.shot = ((bright - dark) / rise.max(1.0)).max(0.0);
-        noise.dark = match side {
-            Side::Bright => quantile(&bases, 0.5),
-            Side::Dark => quantile(&bases, 0.5) - rise,
+        noise.dark = match polarity {
+            Polarity::Bright => quantile(&bases, 0.5),
+            Polarity::Dark => quantile(&bases, 0.5) - rise,
         };
     }
 

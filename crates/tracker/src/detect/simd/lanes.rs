@@ -7,37 +7,37 @@ use std::ops::{Add, AddAssign, Mul, Sub};
 
 use wide::f32x8;
 
-/// How many numbers those are.
+/// Numbers in a vector.
 pub(crate) const LANES: usize = 8;
 
-/// Eight numbers. `Token` shows that the processor has what they need.
+/// A vector of eight single-precision numbers. A `Token` proves that the processor has the instructions for it.
 pub(crate) trait Eight:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + AddAssign
 {
     type Token: Copy;
-    /// These numbers.
+    /// The vector of eight numbers in memory.
     fn load(token: Self::Token, values: &[f32; LANES]) -> Self;
-    /// These bytes as numbers.
+    /// The vector of eight bytes in memory, each as a number.
     fn load_bytes(token: Self::Token, bytes: &[u8; LANES]) -> Self;
-    /// The same number eight times.
+    /// The vector of one number eight times.
     fn splat(token: Self::Token, value: f32) -> Self;
-    /// The first and the second of eight pairs.
+    /// The first numbers of eight pairs, and the second ones.
     fn pairs(token: Self::Token, entries: [&[f32; 2]; LANES]) -> (Self, Self);
-    /// The numbers.
+    /// The eight numbers.
     fn array(self) -> [f32; LANES];
-    /// Those numbers, not negative and small, without what is behind the point.
+    /// Whole parts; the numbers are from 0 to 2^31.
     fn trunc(self) -> [i32; LANES];
-    /// Each divided by the other's.
+    /// Quotients, number by number.
     fn div(self, other: Self) -> Self;
     /// Square roots.
     fn sqrt(self) -> Self;
-    /// Without signs.
+    /// Absolute values.
     fn abs(self) -> Self;
-    /// The lesser of each two, of which none is NaN.
+    /// Minima, number by number; none is NaN.
     fn min(self, other: Self) -> Self;
-    /// The greater of each two, of which none is NaN.
+    /// Maxima, number by number; none is NaN.
     fn max(self, other: Self) -> Self;
-    /// Each where this or the second is below the limit, elsewhere 0.
+    /// Each number where `first` or `second` is below the limit there, elsewhere 0.
     fn where_below(self, first: Self, second: Self, limit: Self) -> Self;
 }
 
@@ -94,14 +94,14 @@ impl Eight for f32x8 {
     }
 }
 
-/// Work on eights of any kind. What `run` calls has to be always inlined: only what becomes part of it gets the
-/// instructions of its kind.
+/// A computation on vectors of any kind. What `run` calls has to be always inlined: only what becomes part of `run` gets
+/// the instructions of that kind.
 pub(crate) trait Job {
     type Outcome;
     fn run<V: Eight>(self, token: V::Token) -> Self::Outcome;
 }
 
-/// Does it by the best instructions that the processor has.
+/// Runs a job with the best instructions that the processor has.
 #[inline]
 pub(crate) fn work<J: Job>(job: J) -> J::Outcome {
     #[cfg(target_arch = "x86_64")]

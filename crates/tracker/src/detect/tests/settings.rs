@@ -33,7 +33,7 @@ fn threshold_and_polarity_by_hand_are_in_raw_units() {
         };
         let at = |level: f64| DetectSettings {
             threshold: Threshold::Raw(level * scale),
-            polarity: Polarity::Bright,
+            polarity: Some(Polarity::Bright),
             ..Default::default()
         };
         for (level, count) in [(50.0, 12), (110.0, 8)] {
@@ -45,7 +45,7 @@ fn threshold_and_polarity_by_hand_are_in_raw_units() {
         let beyond = Levels::learn(&[scene(1).frame(1, bits)], &at(1e6)).unwrap_err().to_string();
         assert!(beyond.contains("outside the recording's range"), "{beyond}");
         // Bright discs have nothing dark about them.
-        let dark = DetectSettings { polarity: Polarity::Dark, ..Default::default() };
+        let dark = DetectSettings { polarity: Some(Polarity::Dark), ..Default::default() };
         if let Ok(levels) = Levels::learn(&[scene(1).frame(1, bits)], &dark) {
             let found = detect(&scene(2).frame(2, bits), &Arc::new(levels), &dark);
             assert!(scene(2).discs.iter().all(|d| of_disc(&found, d).is_none()), "{found:?}");
@@ -140,4 +140,27 @@ fn opencv_has_no_threads_of_its_own_inside_workers() {
             });
         }
     });
+}
+
+#[test]
+fn an_intensity_weighted_centre_is_no_fit_of_a_disc() {
+    let scene = |seed: u64| plain(seed);
+    let centres = |centroid: Centroid| {
+        let settings = DetectSettings { centroid, ..Default::default() };
+        detect(&scene(9).frame(9, 8), &taught(scene, 8, &settings), &settings)
+    };
+    let (discs, weighted) = (centres(Centroid::Disc), centres(Centroid::Weighted));
+    assert_eq!(discs.len(), weighted.len());
+    // No disc is fitted, so none is missing: whole markers are told by their area.
+    let whole = |found: &[Detection]| found.iter().all(|d| d.flags == Flags::default());
+    assert!(whole(&discs) && whole(&weighted) && whole(&centres(Centroid::Contour)), "{weighted:?}");
+    let mut farthest = 0.0f64;
+    for (d, w) in discs.iter().zip(&weighted) {
+        let apart = (d.x_px - w.x_px).hypot(d.y_px - w.y_px);
+        // Both are centres of the same markers, each within four of its standard uncertainties.
+        assert!(apart < 4.0 * f64::from(d.sigma_px.hypot(w.sigma_px)), "{d:?} {w:?}");
+        assert!(w.sigma_px > d.sigma_px, "the mean takes in the noise of the whole marker: {d:?} {w:?}");
+        farthest = farthest.max(apart);
+    }
+    assert!(farthest > 1e-4, "they are computed otherwise");
 }

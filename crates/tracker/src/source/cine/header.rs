@@ -3,11 +3,11 @@
 //! Owns: [`Header`], [`Stamps`]. Must not: read pixels. All numbers are little-endian; places are checked
 //! before they are read, because a header may point anywhere.
 
-use crate::error::{Error, Fault, Place, Result};
+use crate::error::{Error, Fault, FaultKind, Place, Result};
 
 /// Ticks of a second in the file's time stamps.
 pub const TICKS_PER_S: u64 = 1 << 32;
-/// A step this many times the usual one is not believed.
+/// Largest step between time stamps that is believed, in usual steps.
 const MAX_STEP: i64 = 1000;
 
 /// Facts of a recording. `None` is unknown.
@@ -63,6 +63,7 @@ impl Header {
         let cut = |at: u64| {
             Error::Source(
                 Fault::new(name, "the header is cut or points outside the file")
+                    .of_kind(FaultKind::Damaged)
                     .at(Place::Byte(at))
                     .advice("Copy the recording again"),
             )
@@ -82,6 +83,7 @@ impl Header {
         if width <= 0 || height == 0 || height == i32::MIN {
             return Err(Error::Source(
                 Fault::new(name, format!("a picture of {width} x {height} px"))
+                    .of_kind(FaultKind::Damaged)
                     .at(Place::Byte(image_header + 4))
                     .advice("Copy the recording again"),
             ));

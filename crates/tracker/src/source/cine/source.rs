@@ -46,7 +46,9 @@ impl CineSource {
     pub(crate) fn open(name: &str, input: &Input, options: &OpenOptions) -> Result<Self> {
         let unreadable = |e: std::io::Error| {
             Error::Source(
-                Fault::new(name, format!("the file cannot be read ({e})")).advice("Check its permissions"),
+                Fault::new(name, format!("the file cannot be read ({e})"))
+                    .caused_by(&e)
+                    .advice("Check its permissions"),
             )
         };
         let header = Header::parse(&head(name).map_err(unreadable)?, name)?;

@@ -15,7 +15,7 @@ const MOST_BOXES: usize = 4096;
 /// First boxes by which such a file is known.
 const FIRST: [&[u8; 4]; 6] = [b"ftyp", b"moov", b"wide", b"mdat", b"free", b"skip"];
 
-/// What the boxes say.
+/// Facts from the boxes of a file.
 #[derive(Debug, Default, Clone, PartialEq)]
 pub(super) struct Boxes {
     /// The edit list of the first video track plays a piece slower or faster, or joins several: the stamps that it

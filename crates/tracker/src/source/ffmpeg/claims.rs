@@ -9,7 +9,7 @@ use super::demux::Demuxer;
 use crate::frame::{CaptureClaim, RateClaims};
 use crate::message::Message;
 
-/// Android's tag.
+/// Android's tag of the capture rate.
 const ANDROID: &CStr = c"com.android.capture.fps";
 /// Sony's attribute in the XML of `NonRealTimeMeta`.
 const SONY: &str = "captureFps";

@@ -10,7 +10,7 @@ use ffmpeg_next::ffi;
 
 use super::boxes::Boxes;
 use super::{formats, message};
-use crate::error::{Error, Fault, Result};
+use crate::error::{Error, Fault, FaultKind, Result};
 use crate::name::path;
 
 /// The rate that libavformat counts time by in a coded stream whose bytes give none; it is told this one, which no file
@@ -27,7 +27,7 @@ pub(super) struct Demuxer {
 // SAFETY: the context is owned by this value alone and libavformat binds it to no thread.
 unsafe impl Send for Demuxer {}
 
-/// What became of a request for a packet.
+/// Outcome of a request for a packet.
 pub(super) enum Read {
     /// The packet holds data of the stream.
     Packet,
@@ -43,8 +43,11 @@ impl Demuxer {
     pub(super) fn open(url: &str, name: &str, protocols: Option<&str>) -> Result<Self> {
         let failed = |code: i32| {
             Error::Source(match formats::not_read(url) {
-                Some(what) => Fault::new(name, what).advice("Give the recording itself"),
+                Some(what) => {
+                    Fault::new(name, what).of_kind(FaultKind::Unsupported).advice("Give the recording itself")
+                }
                 None => Fault::new(name, format!("not a recording that can be read ({})", message(code)))
+                    .of_kind(FaultKind::Unsupported)
                     .advice("Check that the file is complete and that `ffmpeg -i` reads it"),
             })
         };
@@ -95,12 +98,15 @@ impl Demuxer {
         };
         demuxer.stream = usize::try_from(best).map_err(|_| {
             Error::Source(
-                Fault::new(name, "it holds no video stream").advice("Give a film, not a sound or text file"),
+                Fault::new(name, "it holds no video stream")
+                    .of_kind(FaultKind::Unsupported)
+                    .advice("Give a film, not a sound or text file"),
             )
         })?;
         if demuxer.stream().disposition & ffi::AV_DISPOSITION_ATTACHED_PIC != 0 {
             return Err(Error::Source(
                 Fault::new(name, "it holds no video stream, only sound with a cover picture")
+                    .of_kind(FaultKind::Unsupported)
                     .advice("Give a film, not a sound file"),
             ));
         }
@@ -126,7 +132,7 @@ impl Demuxer {
         self.stream
     }
 
-    /// How many streams the container has.
+    /// Number of streams of the container.
     pub(super) fn streams(&self) -> u32 {
         // SAFETY: the context is open.
         unsafe { (*self.context).nb_streams }

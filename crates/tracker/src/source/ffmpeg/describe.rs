@@ -8,7 +8,7 @@ use super::claims::claims;
 use super::codec_name;
 use super::demux::Demuxer;
 use super::layout::Layout;
-use crate::error::{Error, Fault, Result};
+use crate::error::{Error, Fault, FaultKind, Result};
 use crate::frame::{RateOrigin, SourceInfo, TimeBase};
 use crate::message::Message;
 use crate::pixel_aspect::PixelAspect;
@@ -121,6 +121,7 @@ fn size(parameters: &ffi::AVCodecParameters, name: &str) -> Result<(u32, u32)> {
         (Ok(w), Ok(h)) if w > 0 && h > 0 => Ok((w, h)),
         _ => Err(Error::Source(
             Fault::new(name, format!("a picture of {} x {} px", parameters.width, parameters.height))
+                .of_kind(FaultKind::Damaged)
                 .advice("Check that the file is complete and that `ffmpeg -i` reads it"),
         )),
     }

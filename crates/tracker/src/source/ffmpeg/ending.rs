@@ -1,4 +1,4 @@
-//! How a recording ended: whole, or before what its header declares.
+//! Decides how a recording ended: whole, or before what its header declares.
 
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
@@ -39,7 +39,7 @@ fn ends_as_ogg(tail: &[u8]) -> bool {
 /// (4). `None` without an index.
 fn last_by_nut(tail: &[u8]) -> Option<i64> {
     const INDEX: [u8; 8] = 0x4E58_DD67_2F23_E64E_u64.to_be_bytes();
-    /// Lengths from which on a header has a checksum.
+    /// Length of a header from which on it has a checksum, bytes.
     const LONG: i64 = 4096;
     let length = tail[tail.len().checked_sub(12)?..].first_chunk()?;
     let start = tail.len().checked_sub(usize::try_from(u64::from_be_bytes(*length)).ok()?)?;

@@ -1,4 +1,4 @@
-//! Packets on their way to the decoder, with what the file around each of them tells: whether it is whole, whether
+//! Feeds packets to the decoder, with what the file around each of them tells: whether it is whole, whether
 //! others before it are lost, whether it is one field of a picture only.
 //!
 //! Owns: [`Feed`], [`Given`]. Must not: decode, or number frames.

@@ -1,4 +1,4 @@
-//! Interlaced film: which packets hold one field of a picture only, and what is said of such film.
+//! Tells interlaced film: which packets hold one field of a picture only, and what is said of such film.
 //!
 //! Owns: [`Fields`], [`refusal`], [`warning`]. Must not: take a picture apart.
 
@@ -11,6 +11,8 @@ use super::demux::{Demuxer, Packet};
 use crate::error::{Error, Fault};
 use crate::message::{Message, Setting};
 use crate::name::shell_word;
+use crate::setting_words::Worded;
+use crate::source::Interlaced;
 
 /// Tells single fields from whole pictures, by the codec's own headers.
 pub(super) struct Fields {
@@ -126,9 +128,6 @@ impl FieldOrder {
     }
 }
 
-/// The setting's word for reading pictures whole.
-const AS_FRAMES: &str = "as-frames";
-
 /// The command that makes a picture of each field.
 fn command(name: &str) -> String {
     let is_address = name.contains("://");
@@ -162,7 +161,7 @@ pub(super) fn refusal(name: &str, order: FieldOrder) -> Error {
                 "Make a picture of each field, at twice the rate: {}. If the camera filmed whole pictures and only the \
                  file says interlaced, read it as it is with ",
                 command(name)
-            )) + Setting::Interlaced.set_to(AS_FRAMES),
+            )) + Setting::Interlaced.set_to(Interlaced::AsFrames.word()),
         ),
     )
 }

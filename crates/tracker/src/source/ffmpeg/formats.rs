@@ -1,6 +1,6 @@
 //! Lists which of FFmpeg's formats are opened, and names the others.
 //!
-//! Owns: [`READ`], [`not_read`], [`is_address`]. A format that is not listed is refused before its demuxer sees the file:
+//! Owns: [`READ`], [`not_read`], [`is_protocol`]. A format that is not listed is refused before its demuxer sees the file:
 //! some open other files or addresses that the file names, and one takes any text for a film. Must not: open a demuxer.
 
 use std::ffi::{CStr, CString};
@@ -24,7 +24,7 @@ pub(crate) const READ: &str = concat!(
     "h264,hevc,av1,obu,m4v,mpegvideo,vc1,h263,h261,dirac,cavsvideo,dnxhd,avs2",
 );
 
-/// What may be opened at an address beside [`READ`], by someone who asked for it.
+/// Formats that may be opened at an address beside [`READ`], by someone who asked for it.
 const READ_AT_ADDRESSES: &str = ",rtsp";
 
 /// Formats that are nothing but a list of other files or addresses.
@@ -114,14 +114,8 @@ fn is_netpbm(head: &[u8]) -> bool {
     matches!(head, [b'P', b'1'..=b'7', space, ..] if space.is_ascii_whitespace())
 }
 
-/// Whether a name begins with one of FFmpeg's protocols, other than that for files, or looks as addresses do.
-pub(crate) fn is_address(name: &str) -> bool {
-    if name
-        .split_once("://")
-        .is_some_and(|(s, _)| !s.is_empty() && s.chars().all(|c| c.is_ascii_alphanumeric()))
-    {
-        return true;
-    }
+/// Whether a name begins with one of FFmpeg's protocols, other than that for files.
+pub(crate) fn is_protocol(name: &str) -> bool {
     let Ok(name) = CString::new(name) else { return false };
     // SAFETY: the call reads the name and gives a static string or null.
     let protocol = unsafe { ffi::avio_find_protocol_name(name.as_ptr()) };

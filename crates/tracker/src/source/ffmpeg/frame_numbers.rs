@@ -1,4 +1,4 @@
-//! H.264's frame numbers: they go on by one after each picture from which others are predicted, so they tell whether
+//! Follows H.264's frame numbers: they go on by one after each picture from which others are predicted, so they tell whether
 //! frames that are not there were in the coded film (ITU-T H.264, 7.4.3, `frame_num`).
 //!
 //! Owns: [`FrameNumbers`]. Must not: decode, or decide what a gap is.
@@ -20,7 +20,7 @@ const HIGH_PROFILES: [u32; 13] = [100, 110, 122, 244, 44, 83, 86, 118, 128, 138,
 /// scaling matrices, which have a thousand at most.
 const LOOKED_AT: usize = 1024;
 
-/// What of a set of sequence parameters is needed.
+/// The sequence parameters that are needed.
 #[derive(Debug, Clone, Copy)]
 struct Sequence {
     bits: u32,

@@ -18,7 +18,7 @@ const RED: u32 = 4899;
 const GREEN: u32 = 9617;
 const BLUE: u32 = 1868;
 
-/// How brightness is taken from pictures of one pixel format.
+/// Layout of brightness in pictures of one pixel format.
 pub(super) struct Layout {
     /// How samples are handed out.
     pub format: PixelFormat,

@@ -1,4 +1,4 @@
-//! Frames that are not there: gaps in the time stamps of a film whose frames are otherwise evenly spaced.
+//! Finds frames that are not there: gaps in the time stamps of a film whose frames are otherwise evenly spaced.
 //!
 //! Owns: [`Lost`]. A gap is damage where the file is damaged beside it; else the recorder left frames out, where packets
 //! cannot be cut out of the file without a trace or the coded film proves that none were. A film of variable rate has gaps by nature: there nothing is concluded from them.
@@ -9,7 +9,7 @@ use crate::frame::TimeBase;
 use crate::gaps::{Cause, Gap, Gaps};
 use crate::timing::{Steps, grid_gaps};
 
-/// Places of damage that are remembered.
+/// Maximum number of places of damage that are remembered.
 const MOST_BREAKS: usize = 10_000;
 /// Stretches of equal steps that are remembered (16 MiB), as many as places where film goes on; more are a variable rate.
 const MOST_RUNS: usize = 1 << 20;

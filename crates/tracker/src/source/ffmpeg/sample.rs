@@ -10,14 +10,14 @@ use super::fields::{self, FieldOrder};
 use super::layout::Layout;
 use super::source::{FfmpegSource, Shared};
 use super::watch::Fate;
-use crate::error::{Error, Fault, Result};
+use crate::error::{Error, Fault, FaultKind, Result};
 use crate::frame::{Bytes, Frame, SourceInfo};
 use crate::source::orientation::Orientation;
 use crate::source::{Interlaced, cores};
 
 /// Most bytes of a pipe's first frames that are kept to be handed out again.
 const PIPE_BYTES: usize = 64 << 20;
-/// Of the frames after a key frame, every how manieth is taken.
+/// Stride over the frames after a key frame.
 const STRIDE: usize = 4;
 
 impl FfmpegSource {
@@ -77,6 +77,7 @@ impl FfmpegSource {
         if frames.is_empty() {
             return Err(Error::Source(
                 Fault::new(&self.info.name, "no frame can be decoded")
+                    .of_kind(FaultKind::Damaged)
                     .advice("Check that the file is complete and that `ffmpeg -i` reads it"),
             ));
         }
@@ -139,7 +140,7 @@ fn places(demuxer: &mut Demuxer, name: &str, count: usize) -> Result<Vec<Place>>
     Ok(places)
 }
 
-/// What samplers share.
+/// Settings that samplers share.
 struct From<'a> {
     url: &'a str,
     protocols: Option<&'static str>,
@@ -150,7 +151,7 @@ struct From<'a> {
     threads: usize,
 }
 
-/// What was decoded at a place.
+/// Frames that were decoded at a place.
 #[derive(Default)]
 struct Taken {
     /// The first frame there, if the place is a key frame.

@@ -27,7 +27,7 @@ pub(super) struct Slots {
     in_place: bool,
 }
 
-/// What the index says of a packet.
+/// Slot of a packet by the index.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Found {
     /// Its slot.
@@ -89,7 +89,7 @@ impl Slots {
         Some(Self { slots, moved, next: 0, in_place: true })
     }
 
-    /// How many slots are empty.
+    /// Number of empty slots.
     pub(super) fn empty(&self) -> u64 {
         self.slots.iter().filter(|s| s.size == 0).count() as u64
     }

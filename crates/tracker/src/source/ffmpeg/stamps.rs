@@ -74,7 +74,7 @@ impl Counted {
     }
 }
 
-/// Where display times come from.
+/// Origin of display times.
 enum Origin {
     /// Each packet has one.
     Packets(Keys),

@@ -2,6 +2,11 @@
 //!
 //! Owns: [`SequenceSource`], [`StackSource`].
 
+#[cfg(feature = "opencv")]
+mod coded_picture;
+#[cfg(not(feature = "opencv"))]
+#[path = "without_coded_picture.rs"]
+mod coded_picture;
 pub mod names;
 mod orientation_tag;
 mod picture;

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::error::{Error, Fault, Result};
+use crate::error::{Error, Fault, FaultKind, Result};
 use crate::message::Message;
 use crate::name::{path, text};
 
@@ -43,6 +43,7 @@ pub fn list(name: &str) -> Result<Numbered> {
     let entries = fs::read_dir(&folder).map_err(|e| {
         Error::Source(
             Fault::new(folder.display(), format!("the folder cannot be read ({e})"))
+                .caused_by(&e)
                 .advice("Check its name; a pattern may stand for file names only, not for folders"),
         )
     })?;
@@ -58,6 +59,7 @@ pub fn list(name: &str) -> Result<Numbered> {
     if names.is_empty() {
         return Err(Error::Source(
             Fault::new(name, "no pictures (PNG, TIFF, BMP, PGM, JPEG) are there")
+                .of_kind(FaultKind::Missing)
                 .advice("Give a folder, or a pattern such as 'frames/img_%05d.png'"),
         ));
     }
@@ -71,7 +73,7 @@ pub fn list(name: &str) -> Result<Numbered> {
     Ok(numbered)
 }
 
-/// How many times as many pictures of one naming as of any other make the others company: covers and previews.
+/// Ratio of the numbers of pictures of two namings from which on the rarer ones are company: covers and previews.
 const CLEARLY_MORE: usize = 10;
 
 /// The naming of a file: its name with `#` for each number.

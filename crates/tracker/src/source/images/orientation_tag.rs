@@ -1,4 +1,4 @@
-//! How a picture file says that it is to be turned: the tag Orientation of TIFF, and of EXIF in JPEG and PNG.
+//! Reads how a picture file says that it is to be turned: the tag Orientation of TIFF, and of EXIF in JPEG and PNG.
 //!
 //! Owns: [`of_file`], [`of_tiff`], [`is_turned`]. Must not: turn anything.
 

@@ -45,7 +45,7 @@ impl Picture {
     }
 }
 
-/// What all pictures of a recording must say alike, or markers would jump.
+/// Facts that all pictures of a recording must share, or markers would jump.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Alike {
     pub orientation: Orientation,

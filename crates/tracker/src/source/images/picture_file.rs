@@ -6,16 +6,12 @@ use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
 
-use opencv::core::{CV_8U, CV_16U, Vector};
-use opencv::imgcodecs;
-use opencv::prelude::{MatTraitConst, MatTraitConstManual};
 use tiff::decoder::Decoder;
 
 use super::picture::Picture;
 use super::planes::are_behind;
 use super::tiff_layout::is_reduced;
-use super::{orientation_tag, pixel_size, tiff_page};
-use crate::source::orientation::Orientation;
+use super::{coded_picture, orientation_tag, pixel_size, tiff_page};
 
 /// Reads a picture file; an error is a clause without a full stop.
 pub fn read(path: &Path) -> Result<Picture, String> {
@@ -49,11 +45,7 @@ pub fn read(path: &Path) -> Result<Picture, String> {
     // From memory: a name for OpenCV would have to be UTF-8.
     let bytes = std::fs::read(path).map_err(|e| format!("it cannot be read ({e})"))?;
     let (orientation, size_of_pixel) = (orientation_tag::of_file(&bytes), pixel_size::of_png(&bytes));
-    let bytes = Vector::<u8>::from_slice(&bytes);
-    // Unchanged, and so not turned.
-    let picture =
-        gray(imgcodecs::imdecode(&bytes, imgcodecs::IMREAD_UNCHANGED).map_err(|e| short(&e.message))?)?;
-    Ok(picture.shown(orientation, size_of_pixel))
+    Ok(coded_picture::decode(&bytes)?.shown(orientation, size_of_pixel))
 }
 
 /// Decodes a JPEG picture that lies in memory; an error is a clause without a full stop.
@@ -63,45 +55,7 @@ pub fn decode(jpeg: &[u8]) -> Result<Picture, String> {
     {
         return Err("it is no whole JPEG picture".to_owned());
     }
-    let bytes = Vector::<u8>::from_slice(jpeg);
-    gray(imgcodecs::imdecode(&bytes, imgcodecs::IMREAD_UNCHANGED).map_err(|e| short(&e.message))?)
-}
-
-/// The brightness of a picture as OpenCV reads it.
-fn gray(color: opencv::core::Mat) -> Result<Picture, String> {
-    if color.empty() {
-        return Err("it is not a picture that can be read, or it is cut".to_owned());
-    }
-    let channels = color.channels();
-    let (gray, converted_from) = if channels == 1 {
-        (color, None)
-    } else {
-        let code = match channels {
-            3 => opencv::imgproc::COLOR_BGR2GRAY,
-            4 => opencv::imgproc::COLOR_BGRA2GRAY,
-            n => return Err(format!("it has {n} channels")),
-        };
-        let mut gray = opencv::core::Mat::default();
-        opencv::imgproc::cvt_color_def(&color, &mut gray, code).map_err(|e| short(&e.message))?;
-        (gray, Some(format!("{channels} channels")))
-    };
-    let depth_bits = match gray.depth() {
-        CV_8U => 8,
-        CV_16U => 16,
-        other => return Err(format!("its samples are of OpenCV's kind {other}, not 8 or 16 bit")),
-    };
-    let size = |n: i32| u32::try_from(n).map_err(|e| e.to_string());
-    // OpenCV's 16-bit samples are in this machine's order; all machines that we are built for are little-endian.
-    let samples = gray.data_bytes().map_err(|e| short(&e.message))?.to_vec();
-    Ok(Picture {
-        width: size(gray.cols())?,
-        height: size(gray.rows())?,
-        depth_bits,
-        samples,
-        converted_from,
-        orientation: Orientation::default(),
-        pixel_size: None,
-    })
+    coded_picture::decode(jpeg)
 }
 
 /// Refuses a header that promises more pixels than the file can hold, before anything is allocated.
@@ -148,8 +102,4 @@ fn tail(file: &mut File, count: u64) -> Result<Vec<u8>, String> {
         .and_then(|_| file.read_to_end(&mut bytes))
         .map_err(|e| e.to_string())?;
     Ok(bytes)
-}
-
-fn short(message: &str) -> String {
-    message.lines().next().unwrap_or("it cannot be decoded").trim().to_owned()
 }

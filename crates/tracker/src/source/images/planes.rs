@@ -14,7 +14,7 @@ use crate::source::raw::Stored;
 /// MetaMorph's table of times and heights, an entry for each picture.
 const METAMORPH_TABLE: u16 = 33629;
 
-/// How many pictures a file says that it holds.
+/// Number of pictures that a file says it holds.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Declared {
     /// More than 1.

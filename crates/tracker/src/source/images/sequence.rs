@@ -17,9 +17,9 @@ use crate::source::OpenOptions;
 
 /// Bytes of pictures decoded ahead at most.
 const AHEAD_BYTES: usize = 48 << 20;
-/// Pictures, spread over the sequence, of which most must agree on a size.
+/// Number of pictures, spread over the sequence, of which most must agree on a size.
 const LOOKED_AT: usize = 9;
-/// Pictures looked at, from the first on, if none of those can be read.
+/// Number of pictures that are tried, from the first on, if none of those can be read.
 const LOOKED_FOR: usize = 16;
 
 /// Picture files in the order of their numbers.

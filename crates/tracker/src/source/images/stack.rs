@@ -9,7 +9,7 @@ use super::picture::{Alike, Picture, format, frame, rate};
 use super::planes::{self, Declared, Planes};
 use super::tiff_layout::{Layout, is_reduced};
 use super::{orientation_tag, pixel_size, tiff_page};
-use crate::error::{Error, Fault, Result};
+use crate::error::{Error, Fault, FaultKind, Result};
 use crate::frame::{Ending, Frame, FrameSource, RateClaims, SourceInfo};
 use crate::message::Message;
 use crate::name::path;
@@ -26,7 +26,7 @@ pub struct StackSource {
     ending: Ending,
 }
 
-/// Where the pictures of a file are.
+/// Places of the pictures of a file.
 enum Pictures {
     /// Each in a page of its own; `None` once they have ended.
     Pages(Option<Box<Pages>>),
@@ -84,7 +84,7 @@ impl StackSource {
     /// [`Error::Source`] if its first page cannot be read.
     pub fn open(name: &str, options: &OpenOptions) -> Result<Self> {
         let unreadable = |e: String| {
-            Error::Source(Fault::new(name, format!("the first page cannot be read: {e}")).advice(
+            Error::Source(Fault::new(name, format!("the first page cannot be read: {e}")).of_kind(FaultKind::Unsupported).advice(
                 "Save it as gray of 8 or 16 bit, without compression or with LZW, Deflate or PackBits",
             ))
         };

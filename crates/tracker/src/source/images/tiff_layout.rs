@@ -8,7 +8,7 @@ use std::io::{Read, Seek};
 use tiff::decoder::Decoder;
 use tiff::tags::{ByteOrder, Tag};
 
-/// What the directory of a page says of its samples.
+/// Layout of the samples of a page, as its directory says.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Layout {
     pub width: u32,

@@ -6,7 +6,7 @@
 use std::collections::HashMap;
 
 use super::fields::{Header, Names};
-use crate::error::{Error, Fault, Result};
+use crate::error::{Error, Fault, FaultKind, Result};
 
 const OPEN: &[u8] = b"<cih>";
 const CLOSE: &[u8] = b"</cih>";
@@ -45,7 +45,11 @@ pub fn is_cihx(bytes: &[u8]) -> bool {
 /// [`Error::Source`] if there is no XML in it or width, height or bits are missing.
 pub fn parse(bytes: &[u8], name: &str) -> Result<Header> {
     let begin = find(bytes, OPEN).ok_or_else(|| {
-        Error::Source(Fault::new(name, "it holds no <cih> element").advice("Copy the header file again"))
+        Error::Source(
+            Fault::new(name, "it holds no <cih> element")
+                .of_kind(FaultKind::Damaged)
+                .advice("Copy the header file again"),
+        )
     })?;
     let body = &bytes[begin..];
     let mut warnings = Vec::new();

@@ -2,12 +2,12 @@
 //!
 //! Owns: [`Header`], [`Packing`], the names of the entries. Must not: open files, or know how a form is written.
 
-use crate::error::{Error, Fault, Place, Result};
+use crate::error::{Error, Fault, FaultKind, Place, Result};
 use crate::frame::{PixelFormat, TimeBase};
 use crate::message::Message;
 use crate::timing::rational;
 
-/// Where the significant bits of a sample lie in its 16 bits.
+/// Position of the significant bits of a sample in its 16 bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Side {
     /// At the bottom: values as they are.
@@ -56,7 +56,7 @@ pub struct Header {
     pub warnings: Vec<Message>,
 }
 
-/// How frames lie in the pixel file.
+/// Layout of the frames in the pixel file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Packing {
     /// Format of the samples in the file.
@@ -165,6 +165,7 @@ impl Header {
                         name,
                         format!("{bits} bits per pixel are not read, only 8, 10, 12 and 16 are"),
                     )
+                    .of_kind(FaultKind::Unsupported)
                     .at(Place::Key("color bit".into()))
                     .advice("Export the recording with one of these"),
                 ));
@@ -175,6 +176,7 @@ impl Header {
             u64::try_from(bits.div_ceil(8)).ok().filter(|b| i64::try_from(*b).is_ok()).ok_or_else(|| {
                 Error::Source(
                     Fault::new(name, format!("a picture of {} x {} px", self.width, self.height))
+                        .of_kind(FaultKind::Damaged)
                         .at(Place::Key("image size".into()))
                         .advice("Export the recording again; the header is wrong"),
                 )
@@ -234,6 +236,7 @@ fn fraction(key: &str, text: &str, warnings: &mut Vec<Message>) -> Option<f64> {
 fn missing(name: &str, key: &str) -> Error {
     Error::Source(
         Fault::new(name, "it is not in the header, or not a number")
+            .of_kind(FaultKind::Damaged)
             .at(Place::Key(key.into()))
             .advice("Export the recording again; the header is not complete"),
     )

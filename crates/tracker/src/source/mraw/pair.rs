@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::cihx;
-use crate::error::{Error, Fault, Result};
+use crate::error::{Error, Fault, FaultKind, Result};
 use crate::name::{path, text};
 
 /// Whether a file is one of a Photron pair, by what it starts with or, for pixels, by its ending.
@@ -46,6 +46,7 @@ fn partner(path: &Path, endings: &[&str]) -> Result<PathBuf> {
                     path.display(),
                     format!("its partner ({wanted} of the same name) is not beside it"),
                 )
+                .of_kind(FaultKind::Missing)
                 .advice("Copy both files of the recording into one folder"),
             )
         })

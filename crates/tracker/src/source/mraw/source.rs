@@ -9,7 +9,7 @@ use std::path::Path;
 
 use super::fields::{Header, Packing};
 use super::pair::{Pair, pair};
-use crate::error::{Error, Fault, Result};
+use crate::error::{Error, Fault, FaultKind, Result};
 use crate::frame::{
     Bytes, Ending, Frame, FrameSource, PixelFormat, RateClaims, RateOrigin, SourceInfo, TimeBase,
 };
@@ -35,6 +35,7 @@ pub struct MrawSource {
 fn unreadable(path: &Path, error: &std::io::Error) -> Error {
     Error::Source(
         Fault::new(path.display(), format!("the file cannot be read ({error})"))
+            .caused_by(error)
             .advice("Check its permissions"),
     )
 }
@@ -64,6 +65,7 @@ impl MrawSource {
                     pixels_path.display(),
                     format!("not one whole frame: {size} bytes, and one takes {}", packing.frame_bytes),
                 )
+                .of_kind(FaultKind::Damaged)
                 .advice("Copy the recording again, or check that the header is the right one"),
             ));
         }

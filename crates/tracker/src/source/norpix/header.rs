@@ -10,7 +10,7 @@ use crate::source::raw::Stored;
 
 /// Bytes of the header that are read.
 pub const HEADER_BYTES: usize = 1024;
-/// Where uncompressed pixels begin from this version on (StreamPix 6).
+/// Version from which on uncompressed pixels begin at another place (StreamPix 6).
 const ALIGNED_VERSION: u32 = 5;
 const ALIGNED_START: u64 = 8192;
 
@@ -19,7 +19,7 @@ pub fn is_norpix(first_bytes: &[u8]) -> bool {
     first_bytes.starts_with(b"\xed\xfe\0\0N\0o\0r\0p\0i\0x\0")
 }
 
-/// How pictures are stored.
+/// Storage of the pictures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Form {
     /// As samples, all of the same size.

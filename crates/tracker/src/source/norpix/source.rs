@@ -25,7 +25,7 @@ const AHEAD: usize = 16;
 /// Bytes between a JPEG picture's end and the length of the next: its time, and in some files as many zeros.
 const GAPS: [u64; 2] = [8, 16];
 
-/// Where a picture is in the file, and when it was taken.
+/// Place of a picture in the file, and time at which it was taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Recorded {
     at: u64,
@@ -58,7 +58,9 @@ impl NorpixSource {
     pub fn open(name: &str, options: &OpenOptions) -> Result<Self> {
         let unreadable = |e: std::io::Error| {
             Error::Source(
-                Fault::new(name, format!("the file cannot be read ({e})")).advice("Check its permissions"),
+                Fault::new(name, format!("the file cannot be read ({e})"))
+                    .caused_by(&e)
+                    .advice("Check its permissions"),
             )
         };
         let file = File::open(crate::name::path(name)).map_err(unreadable)?;

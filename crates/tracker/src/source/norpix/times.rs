@@ -8,9 +8,10 @@ use crate::message::{Message, Setting};
 use crate::source::cine::header::plausible;
 use crate::source::clock;
 
-/// A header's rate so far from the stamps' is another one: far above a clock's error, far below a dropped frame.
+/// Relative difference from which on the header's rate is another than the stamps': far above a clock's error, far below a
+/// dropped frame.
 const RATE_DIFFERS: f64 = 0.01;
-/// Where more than this part of the stamps had to be replaced, they are not believed.
+/// Largest part of the stamps that may be replaced for the others to be believed.
 const MOST_REPLACED: f64 = 0.1;
 /// Steps of the search for an even grid; each leaves two thirds: 10^-7 of two ticks.
 const SEARCHES: u32 = 40;

@@ -1,4 +1,4 @@
-//! ASF (WMV): packets of one length that hold parts of numbered objects, a picture each (Advanced Systems Format
+//! Walks ASF (WMV): packets of one length that hold parts of numbered objects, a picture each (Advanced Systems Format
 //! specification 01.20.05, sections 3 and 5).
 
 use super::Fit;
@@ -12,12 +12,12 @@ const PROPERTIES: [u8; 16] = *b"\xa1\xdc\xab\x8c\x47\xa9\xcf\x11\x8e\xe4\x00\xc0
 /// Bytes of the header object and of the data object before what they hold.
 const IN_HEADER: u64 = 30;
 const IN_DATA: u64 = 50;
-/// Where in the properties the length of a packet is.
+/// Place of the length of a packet in the properties, bytes.
 const PACKET_LENGTH: u64 = 92;
-/// What most packets begin with: two bytes of error correction follow, which are 0.
+/// First bytes of most packets: two bytes of error correction follow, which are 0.
 const BEGIN: [u8; 3] = [0x82, 0, 0];
 
-/// What has come of an object.
+/// Parts of an object that have come.
 #[derive(Debug, Clone, Copy)]
 struct Object {
     number: u32,

@@ -1,15 +1,15 @@
-//! FLV: tags one after the other, each with a kind, a length and behind it the length again (Adobe's Flash Video File
+//! Walks FLV: tags one after the other, each with a kind, a length and behind it the length again (Adobe's Flash Video File
 //! Format 10.1, annex E).
 
 use super::bytes::Bytes;
-use super::{Fit, Walk};
+use super::walk::Elements;
 
 /// Bytes of a tag's header.
 const HEADER: u64 = 11;
 /// Sound, picture, script.
 const KINDS: [u8; 3] = [8, 9, 18];
 
-/// Where the walk stands.
+/// State of the walk through FLV.
 #[derive(Debug)]
 pub(super) struct Flv {
     at: u64,
@@ -24,8 +24,13 @@ impl Flv {
         let first = u64::from(u32::from_be_bytes([head[5], head[6], head[7], head[8]])) + 4;
         head.starts_with(b"FLV").then_some(Self { at: first, has_lengths: None })
     }
+}
 
-    /// Goes over one tag. `None` where there is none, or none that is whole.
+impl Elements for Flv {
+    fn at(&mut self) -> &mut u64 {
+        &mut self.at
+    }
+
     fn step(&mut self, file: &mut Bytes) -> Option<()> {
         let head: [u8; HEADER as usize] = file.array(self.at)?;
         // The bit above the kind is that of encryption.
@@ -45,26 +50,5 @@ impl Flv {
         }
         self.at = end + 4;
         Some(())
-    }
-}
-
-impl Walk for Flv {
-    fn reach(&mut self, file: &mut Bytes, to: u64) -> Fit {
-        let mut whole = true;
-        while whole && self.at < to {
-            whole = self.step(file).is_some();
-        }
-        whole &= self.at == to;
-        self.at = to;
-        if whole { Fit::Whole } else { Fit::Broken }
-    }
-
-    fn rest(&mut self, file: &mut Bytes) -> Fit {
-        while self.at < file.length() {
-            if self.step(file).is_none() {
-                return Fit::Broken;
-            }
-        }
-        Fit::Whole
     }
 }

@@ -3,7 +3,7 @@
 use super::bytes::Bytes;
 use super::{Fit, Walk};
 
-/// Where the walk stands.
+/// State of the walk through GIF.
 #[derive(Debug, Default)]
 pub(super) struct Gif {
     at: u64,

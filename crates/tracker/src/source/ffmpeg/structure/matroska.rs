@@ -8,12 +8,12 @@ const SEGMENT: u32 = 0x1853_8067;
 const CLUSTER: u32 = 0x1F43_B675;
 const VOID: u32 = 0xEC;
 const CHECKSUM: u32 = 0xBF;
-/// What a segment holds beside clusters: index of places, facts, tracks, index of times, files, chapters, tags.
+/// Identities of the elements that a segment holds beside clusters: index of places, facts, tracks, index of times, files, chapters, tags.
 const IN_SEGMENT: [u32; 7] =
     [0x114D_9B74, 0x1549_A966, 0x1654_AE6B, 0x1C53_BB6B, 0x1941_A469, 0x1043_A770, 0x1254_C367];
-/// What a cluster holds: time, silent tracks, place, length of the one before, blocks alone, in groups, encrypted.
+/// Identities of the elements that a cluster holds: time, silent tracks, place, length of the one before, blocks alone, in groups, encrypted.
 const IN_CLUSTER: [u32; 7] = [0xE7, 0x5854, 0xA7, 0xAB, 0xA3, 0xA0, 0xAF];
-/// Those of them that are a number, which has eight bytes at most.
+/// Identities of a cluster's elements that are a number, of eight bytes at most.
 const NUMBERS: [u32; 3] = [0xE7, 0xA7, 0xAB];
 const LONGEST_NUMBER: u64 = 8;
 /// What a group of a block holds, met where its own header was lost: block, length, references, padding, additions.
@@ -25,7 +25,7 @@ const GROUP: u32 = 0xA0;
 /// Blocks, alone or in a group.
 const BLOCKS: [u32; 2] = [0xA3, 0xA1];
 
-/// Where the walk stands.
+/// State of the walk through Matroska.
 #[derive(Debug, Default)]
 pub(super) struct Matroska {
     at: u64,

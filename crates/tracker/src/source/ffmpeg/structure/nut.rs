@@ -4,12 +4,12 @@
 use super::bytes::Bytes;
 use super::{Fit, Walk};
 
-/// What a file begins with.
+/// First bytes of a NUT file.
 const NAME: &[u8; 25] = b"nut/multimedia container\0";
 /// Marks of the headers: main, stream, information; and of the place from which pictures are read.
 const HEADERS: [u64; 3] = [0x4E4D_7A56_1F5F_04AD, 0x4E53_1140_5BF2_F9DB, 0x4E49_AB68_B596_BA78];
 const PICTURES: u64 = 0x4E4B_E4AD_EECA_4569;
-/// Lengths from which on a header has a checksum of four bytes before what it holds.
+/// Length of a header from which on it has a checksum of four bytes before its contents, bytes.
 const LONG: u64 = 4096;
 
 /// Whether the headers were looked at.

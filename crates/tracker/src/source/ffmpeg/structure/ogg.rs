@@ -1,4 +1,4 @@
-//! Ogg: pages with a mark, the number of their stream, a number of their own and a checksum (RFC 3533, section 6).
+//! Reads Ogg's pages: pages with a mark, the number of their stream, a number of their own and a checksum (RFC 3533, section 6).
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ use super::pages::Pages;
 const MARK: [u8; 4] = *b"OggS";
 /// Bytes of a page's header before the table of lengths.
 const HEADER: usize = 27;
-/// Where in the header the checksum is.
+/// Place of the checksum in the header, bytes.
 const CHECKSUM: usize = 22;
 
 /// The last page's number in each stream.

@@ -1,4 +1,4 @@
-//! Containers whose packets lie in pages: each page is found by itself, numbered, and may hold many packets or a part
+//! Walks containers whose packets lie in pages: each page is found by itself, numbered, and may hold many packets or a part
 //! of one.
 //!
 //! Owns: [`Paged`], [`Pages`].

@@ -1,22 +1,25 @@
-//! MPEG program streams: packs and packets one after the other, each with a mark and most with a length
+//! Walks MPEG program streams: packs and packets one after the other, each with a mark and most with a length
 //! (ISO/IEC 13818-1, 2.5; ISO/IEC 11172-1).
 
 use super::bytes::Bytes;
-use super::{Fit, Walk};
+use super::walk::Elements;
 
 /// Kinds after a mark's bytes 0, 0, 1: the stream's end, a pack, a header; from that on all have a length.
 const END: u8 = 0xB9;
 const PACK: u8 = 0xBA;
 const HEADER: u8 = 0xBB;
 
-/// Where the walk stands.
+/// State of the walk through a program stream.
 #[derive(Debug, Default)]
 pub(super) struct Program {
     at: u64,
 }
 
-impl Program {
-    /// Goes over one element. `None` where there is none that is whole.
+impl Elements for Program {
+    fn at(&mut self) -> &mut u64 {
+        &mut self.at
+    }
+
     fn step(&mut self, file: &mut Bytes) -> Option<()> {
         let [0, 0, 1, kind] = file.array(self.at)? else { return None };
         let length = match kind {
@@ -35,26 +38,5 @@ impl Program {
         };
         self.at = self.at.checked_add(length).filter(|end| *end <= file.length())?;
         Some(())
-    }
-}
-
-impl Walk for Program {
-    fn reach(&mut self, file: &mut Bytes, to: u64) -> Fit {
-        let mut whole = true;
-        while whole && self.at < to {
-            whole = self.step(file).is_some();
-        }
-        whole &= self.at == to;
-        self.at = to;
-        if whole { Fit::Whole } else { Fit::Broken }
-    }
-
-    fn rest(&mut self, file: &mut Bytes) -> Fit {
-        while self.at < file.length() {
-            if self.step(file).is_none() {
-                return Fit::Broken;
-            }
-        }
-        Fit::Whole
     }
 }

@@ -10,7 +10,7 @@ const FORMS: [(u64, u64); 3] = [(188, 0), (192, 4), (204, 0)];
 /// Marks in a row that are no chance.
 const MARKS: u64 = 4;
 
-/// Where the walk stands.
+/// State of the walk through a transport stream.
 #[derive(Debug)]
 pub(super) struct Transport {
     at: u64,

@@ -4,7 +4,7 @@
 
 use super::bytes::Bytes;
 
-/// How the elements between two packets fit together, the better first.
+/// Fit of the elements between two packets, the better first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(in super::super) enum Fit {
     /// As they should.
@@ -22,4 +22,34 @@ pub(super) trait Walk: Send {
 
     /// Goes on to the end of the file. How all elements up to there fit together.
     fn rest(&mut self, file: &mut Bytes) -> Fit;
+}
+
+/// A container of elements one after the other, each of which says where it ends.
+pub(super) trait Elements {
+    /// The byte at which the walk stands.
+    fn at(&mut self) -> &mut u64;
+
+    /// Goes over one element. `None` where there is none that is whole.
+    fn step(&mut self, file: &mut Bytes) -> Option<()>;
+}
+
+impl<E: Elements + Send> Walk for E {
+    fn reach(&mut self, file: &mut Bytes, to: u64) -> Fit {
+        let mut whole = true;
+        while whole && *self.at() < to {
+            whole = self.step(file).is_some();
+        }
+        whole &= *self.at() == to;
+        *self.at() = to;
+        if whole { Fit::Whole } else { Fit::Broken }
+    }
+
+    fn rest(&mut self, file: &mut Bytes) -> Fit {
+        while *self.at() < file.length() {
+            if self.step(file).is_none() {
+                return Fit::Broken;
+            }
+        }
+        Fit::Whole
+    }
 }

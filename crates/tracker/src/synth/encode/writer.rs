@@ -1,8 +1,7 @@
 //! Encodes gray frames into a video file through FFmpeg's libraries.
 //!
-//! Owns: [`Codec`], [`VideoWriter`], [`encode_image`]. Must not: know of scenes; whoever has gray frames may use it.
+//! Owns: [`VideoWriter`], [`encode_image`]. Must not: know of scenes; whoever has gray frames may use it.
 
-use std::io::ErrorKind;
 use std::path::Path;
 
 use ffmpeg_next as ffmpeg;
@@ -12,46 +11,11 @@ use ffmpeg::format::Pixel;
 use ffmpeg::format::context::StreamIo;
 use ffmpeg::{Dictionary, Packet, Rational, color, format, frame};
 
-use crate::error::{Error, Fault, Place, Result};
+use super::settings::{Codec, ImageKind, VideoSettings, cannot_write, fault};
+use crate::error::{Error, Fault, FaultKind, Place, Result};
 use crate::frame::TimeBase;
 use crate::name::text;
 use crate::output::NewFile;
-
-/// How a video file holds its frames.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Codec {
-    /// H.264 by libx264, 8 bit, lossy: small, and plays everywhere.
-    H264,
-    /// FFV1, 8 to 16 bit, without loss.
-    Ffv1,
-    /// JPEG pictures in a row, 8 bit, lossy.
-    Mjpeg,
-    /// Uncompressed gray, 8 bit.
-    Raw,
-}
-
-/// What a writer needs to know of the frames and of the file.
-#[derive(Debug, Clone, PartialEq)]
-pub struct VideoSettings {
-    /// Width, px.
-    pub width: u32,
-    /// Height, px.
-    pub height: u32,
-    /// Significant bits per sample; above 8, frames have two bytes per sample, little-endian.
-    pub depth_bits: u32,
-    /// Seconds per frame.
-    pub time_base: TimeBase,
-    /// Codec.
-    pub codec: Codec,
-    /// H.264: constant rate factor, 0 (no loss) to 51; MJPEG: quantiser, 1 (best) to 31. `None` is 12 and 2.
-    pub quality: Option<u32>,
-    /// H.264: x264's preset; `None` is `medium`.
-    pub x264_preset: Option<String>,
-    /// H.264: a plane of brightness and nothing else. Smaller, but some players need colour planes, which otherwise
-    /// are there and empty.
-    pub gray_only: bool,
-}
 
 /// A video file being written.
 pub struct VideoWriter {
@@ -66,20 +30,6 @@ pub struct VideoWriter {
     height: u32,
     bytes_per_pixel: usize,
     next: i64,
-}
-
-fn fault(name: &str, problem: String, advice: &str) -> Error {
-    Error::Film(Fault::new(name, problem).advice(advice))
-}
-
-/// A file that cannot be written.
-pub(super) fn cannot_write(name: &str, e: &std::io::Error) -> Error {
-    let advice = match e.kind() {
-        ErrorKind::StorageFull | ErrorKind::QuotaExceeded => "Free some space",
-        ErrorKind::InvalidFilename => "Choose a shorter name",
-        _ => "Check that the folder exists and may be written to",
-    };
-    fault(name, format!("it cannot be written ({e})"), advice)
 }
 
 /// An error of FFmpeg's as ours.
@@ -282,12 +232,14 @@ fn pixel_format(name: &str, s: &VideoSettings) -> Result<(&'static str, Pixel)> 
     match s.codec {
         Codec::H264 | Codec::Mjpeg if deep => Err(Error::Film(
             Fault::new(name, format!("{} bits do not fit into 8-bit video", s.depth_bits))
+                .of_kind(FaultKind::Unsupported)
                 .at(Place::Key("codec".into()))
                 .advice("Choose ffv1 or raw, or film with 8 bits"),
         )),
         Codec::H264 if s.gray_only => Ok(("libx264", Pixel::GRAY8)),
         Codec::H264 if s.width % 2 == 1 || s.height % 2 == 1 => Err(Error::Film(
             Fault::new(name, format!("{} x {} px have no half for colour planes", s.width, s.height))
+                .of_kind(FaultKind::Unsupported)
                 .at(Place::Key("image_px".into()))
                 .advice("Give an even width and height or ask for gray only"),
         )),
@@ -304,6 +256,7 @@ fn pixel_format(name: &str, s: &VideoSettings) -> Result<(&'static str, Pixel)> 
         )),
         Codec::Raw if deep => Err(Error::Film(
             Fault::new(name, format!("no video container holds {} bits uncompressed", s.depth_bits))
+                .of_kind(FaultKind::Unsupported)
                 .at(Place::Key("codec".into()))
                 .advice("Choose ffv1 in .mkv, or .mraw or images"),
         )),
@@ -379,15 +332,4 @@ pub fn encode_image(
     let mut packet = Packet::empty();
     opened.receive_packet(&mut packet).map_err(failed(name, "encoding"))?;
     Ok(packet.data().unwrap_or_default().to_vec())
-}
-
-/// Kinds of image files.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ImageKind {
-    /// PNG, 8 or 16 bit.
-    Png,
-    /// TIFF, 8 or 16 bit.
-    Tiff,
-    /// BMP, 8 bit.
-    Bmp,
 }
