@@ -165,9 +165,9 @@ impl Run<'_> {
     /// Nodes that hardly are markers, of which it is told why.
     ///
     /// # Errors
-    /// [`Error::Rig`] where no node is ever seen.
+    /// [`Error::Rig`] where no node of a rig that was found is ever seen.
     fn judge(&mut self, nodes: &[NodeSummary], sizes: &mut Sizes) -> Result<Vec<String>> {
-        if nodes.iter().all(|n| n.seen == 0) {
+        if self.settings.rig.is_none() && nodes.iter().all(|n| n.seen == 0) {
             return Err(Error::Rig(
                 Fault::new("recording", "what stands out cannot be told apart in any frame").advice(
                     "Point at each marker with " + Setting::Marker + ", or give a rig with " + Setting::Rig,
