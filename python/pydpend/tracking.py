@@ -150,6 +150,9 @@ def track(
         Numbers of the picture of `setup` that are to be followed too.
     same : tuple of str or sequence of these
         Pairs of nodes that are one marker, which keeps the first name.
+    region : sequence of float or str, optional
+        Part of the image in which markers are looked for: first column and row and last column and row in px,
+        ``(0, 0, 319, 239)`` or ``"0,0,319,239"``; the rig's if not given.
     threshold : float, optional
         Level that parts markers from what is around them, in the recording's units; learned from it if not given.
     polarity : {"auto", "bright", "dark"}
@@ -157,9 +160,6 @@ def track(
     centroid : {"disc", "weighted", "contour"}
         Centre by the disc that fits best, by intensity above the background, or by OpenCV's contours as in the paper
         (Section 4).
-    region : sequence of float or str, optional
-        Part of the image in which markers are looked for: first column and row and last column and row in px,
-        ``(0, 0, 319, 239)`` or ``"0,0,319,239"``; the rig's if not given.
     min_area_px, max_area_px : float, optional
         Limits of a marker's area, px; learned from the recording if not given.
     decoder : {"auto", "ffmpeg", "opencv"}
@@ -291,7 +291,7 @@ def setup(
         Whether to replace `output` and `picture` if they are there already.
     fps, frames, threads, progress, marker, markers, also, same : optional
         As in `track`; the rig keeps what was said of what to follow.
-    threshold, polarity, centroid, region, min_area_px, max_area_px : optional
+    region, threshold, polarity, centroid, min_area_px, max_area_px : optional
         As in `track`.
     decoder, interlaced, allow_protocol, pixel_aspect : optional
         As in `track`.
@@ -492,10 +492,12 @@ def info(
     ----------
     path : path-like
         The recording.
-    fps, threads, decoder, allow_protocol, pixel_aspect : optional
+    fps, threads, decoder : optional
         As in `track`.
     interlaced : {"as-frames", "refuse"}
         As in `track`, but what interlaced film is, is told by default.
+    allow_protocol, pixel_aspect : optional
+        As in `track`.
 
     Returns
     -------
