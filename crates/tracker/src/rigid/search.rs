@@ -464,7 +464,7 @@ mod tests {
     fn the_work_is_bounded_however_much_stands_out() {
         let link = link();
         for (count, sigma_px, is_bounded) in
-            [(40, 0.1, false), (150, 0.1, false), (1000, 0.1, true), (6000, 0.1, true), (380, 3.0, true)]
+            [(40, 0.1, false), (150, 0.1, false), (1000, 0.1, true), (6000, 0.1, true), (399, 3.0, true)]
         {
             let found = run(&link, &noise(count, sigma_px));
             assert_eq!(found.is_bounded, is_bounded, "{count}: {} trials", found.trials);
