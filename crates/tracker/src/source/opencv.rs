@@ -55,6 +55,8 @@ pub struct OpencvSource {
     by_order: bool,
     /// Time of the frame before, s.
     last_s: Option<f64>,
+    /// OpenCV's pictures have lost their places: in AVI it counts them, and passes over those that are damaged.
+    is_astray: bool,
     ending: Ending,
 }
 
@@ -105,6 +107,7 @@ impl OpencvSource {
             frames: 0,
             by_order: false,
             last_s: None,
+            is_astray: false,
             ending: Ending::Complete,
         })
     }
@@ -239,7 +242,8 @@ impl FrameSource for OpencvSource {
         };
         self.frames += 1;
         let frame_s = self.beside.info().time_base.seconds(told.ticks);
-        let plane = self.picture(frame_s)?.filter(|_| told.plane.is_some());
+        self.is_astray |= told.plane.is_none() && self.info.container == "avi";
+        let plane = self.picture(frame_s)?.filter(|_| told.plane.is_some() && !self.is_astray);
         if self.is_dry && self.pictures == 0 {
             return Err(Error::Source(
                 Fault::new(&self.info.name, "OpenCV decodes no frame of it")

@@ -234,7 +234,7 @@ fn a_first_picture_of_another_size_is_the_odd_one() {
         let mut source = open(folder.path().to_str().unwrap(), &with_fps(100.0)).unwrap();
         assert_eq!((source.info().width, source.info().height), (8, 6));
         if odd != 7 {
-            let expected = format!("picture {} (img_{odd:03}.pgm) is 3 x 2 px", odd - 1);
+            let expected = format!("frame {}: img_{odd:03}.pgm is 3 x 2 px", odd - 1);
             assert!(
                 source.info().warnings.iter().any(|w| w.to_string().contains(&expected)),
                 "{:?}",

@@ -206,7 +206,11 @@ impl Feed {
         }
         if let Some(sums) = &mut self.sums {
             let is_after_loss = given.after_loss || given.after_damage;
-            given.is_damaged |= sums.is_damaged(given.packet.bytes(), is_after_loss, given.is_damaged);
+            if sums.is_damaged(given.packet.bytes(), is_after_loss, given.is_damaged) {
+                given.is_damaged = true;
+                // It may decode to anything, to interlaced pictures too.
+                given.packet.set_corrupt();
+            }
         }
         given.is_damaged |= self.tags.as_mut().is_some_and(|tags| tags.differs(given.packet.bytes()));
         Ok(Some(given))

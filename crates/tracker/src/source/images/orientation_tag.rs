@@ -19,13 +19,20 @@ const ENTRY_BYTES: usize = 12;
 
 /// What the bytes of a picture file say; `None` if nothing.
 pub(crate) fn told(bytes: &[u8]) -> Option<Orientation> {
+    match bytes {
+        [b'I', b'I', 42 | 43, 0, ..] | [b'M', b'M', 0, 42 | 43, ..] => {
+            Decoder::new(Cursor::new(bytes)).ok().and_then(|mut decoder| tag_of_page(&mut decoder))
+        }
+        _ => by_exif(bytes),
+    }
+}
+
+/// What the EXIF block of a JPEG, PNG or WebP file says.
+fn by_exif(bytes: &[u8]) -> Option<Orientation> {
     let block = match bytes {
         [0x89, b'P', b'N', b'G', b'\r', b'\n', 0x1a, b'\n', ..] => in_png(bytes),
         [0xff, 0xd8, ..] => in_jpeg(bytes),
         [b'R', b'I', b'F', b'F', _, _, _, _, b'W', b'E', b'B', b'P', ..] => in_webp(bytes),
-        [b'I', b'I', 42 | 43, 0, ..] | [b'M', b'M', 0, 42 | 43, ..] => {
-            return Decoder::new(Cursor::new(bytes)).ok().and_then(|mut decoder| tag_of_page(&mut decoder));
-        }
         _ => None,
     };
     block.and_then(tag).and_then(Orientation::from_tag)
@@ -33,7 +40,7 @@ pub(crate) fn told(bytes: &[u8]) -> Option<Orientation> {
 
 /// What the bytes of a JPEG or PNG file say.
 pub(super) fn of_file(bytes: &[u8]) -> Orientation {
-    told(bytes).unwrap_or_default()
+    by_exif(bytes).unwrap_or_default()
 }
 
 /// Whether a JPEG or PNG file says that it is to be turned; not where it cannot be read.
