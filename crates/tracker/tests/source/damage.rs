@@ -3,7 +3,7 @@
 use std::io::Write;
 use std::process::{Command, Stdio};
 
-use tracker::frame::{Ending, Frame, FrameSource};
+use tracker::frame::{Ending, Frame};
 use tracker::source::{OpenOptions, open};
 
 use crate::film::{HEIGHT, WIDTH, encode, have_ffmpeg, index_of, read_all, samples};
@@ -184,7 +184,6 @@ fn damaged_slices_of_ffv1_are_seen_by_their_sums() {
         let whole = std::fs::read(&path).unwrap();
         let truth = read_all(&mut *open(path.to_str().unwrap(), &OpenOptions::default()).unwrap());
         assert!(truth.len() == COUNT && truth.iter().all(|f| f.plane.is_some()), "{name}");
-        let time = |source: &dyn FrameSource, frame: &Frame| source.info().time_base.seconds(frame.ticks);
         // Frames that are left where a group of pictures is lost at most; where the file's structure is hit, more are.
         let mut few_lost = 0;
         for part in 1..8 {
@@ -198,10 +197,10 @@ fn damaged_slices_of_ffv1_are_seen_by_their_sums() {
                 let mut whole_frames = 0;
                 for frame in frames.iter().filter(|f| f.plane.is_some()) {
                     whole_frames += 1;
-                    let shown = truth[told(frame).filter(|i| *i < COUNT).unwrap()].index;
-                    let i = (time(&*source, frame) * 500.0).round() as u64;
-                    assert_eq!(shown, i, "{name} {at} {length}");
-                    assert_eq!(samples(frame), samples(&truth[i as usize]), "{name} {at} {length} frame {i}");
+                    // A container's time stamps have no sums: only what is shown is looked at.
+                    let i = told(frame).filter(|i| *i < COUNT);
+                    let i = i.unwrap_or_else(|| panic!("{name} {at} {length}: frame {}", frame.index));
+                    assert_eq!(samples(frame), samples(&truth[i]), "{name} {at} {length} picture {i}");
                 }
                 // Up to the next key frame.
                 let is_told = frames.len() > whole_frames

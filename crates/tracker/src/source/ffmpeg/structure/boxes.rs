@@ -35,9 +35,11 @@ impl Boxes {
         let (mut follows_header, mut is_fragmented) = (false, false);
         while at < file.length() {
             let Some((end, kind)) = header(file, at) else {
-                boxes.breaks.push((at, Fit::Broken));
                 let holds_none = |kind| NO_PICTURES.contains(&kind);
                 boxes.lacks_fragments = is_fragmented && !file.array(at + 4).is_some_and(holds_none);
+                if !is_fragmented || boxes.lacks_fragments {
+                    boxes.breaks.push((at, Fit::Broken));
+                }
                 break;
             };
             if kind == FRAGMENT {
