@@ -107,6 +107,14 @@ def test_a_folder_that_is_no_run_is_left_alone(tmp_path: Path) -> None:
             "0 s is no length of a window",
         ),
         (["predict", "a.csv", "--fit", "F", "-o", "d", "--windows", "1,05"], "1,05 may be one number or two"),
+        (
+            ["predict", "a.csv", "--fit", "F", "-o", "d", "--windows", "1,5"],
+            "--windows: '1,5' may be one number or two. Write 1.5, or 1.0,5.0",
+        ),
+        (
+            ["predict", "a.csv", "--fit", "F", "-o", "d", "--windows", " 12,25"],
+            "Write 12.25, or 12.0,25.0",
+        ),
         (["predict", "a.csv", "--fit", "F", "-o", "d", "--windows", "0,5;1"], "not a list of numbers"),
         (["angles", "N", "-o", "a.csv", "--zero", "12,05,-3,5"], "12,05 may be one number or two"),
         (["angles", "N", "-o", "a.csv", "--zero=-3,02"], "-3,02 may be one number or two"),
@@ -127,3 +135,30 @@ def test_lists_of_numbers_are_read() -> None:
     for text in ("", "1,,2", "nan", "inf,1", "1,2,"):
         with pytest.raises(OptionError, match="is not a list of numbers"):
             numbers(text, "windows")
+
+
+@pytest.mark.parametrize(
+    ("words", "what"),
+    [
+        ("angles nodes.parquet -o -", "file"),
+        ("fit angles.parquet -o -", "folder"),
+        ("compare angles.parquet encoder.csv --calibration c.json -o -", "folder"),
+        ("analyse angles.parquet -o -", "folder"),
+        ("predict angles.parquet --fit F -o -", "folder"),
+        ("export nodes.parquet -o -", "file"),
+        ("animate run -o -", "file"),
+    ],
+)
+def test_standard_output_is_no_output(
+    words: str, what: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from pydpend.kinematics import write_angles
+
+    monkeypatch.chdir(tmp_path)
+    nodes().write("nodes.parquet")
+    write_angles(angles(), tmp_path / "angles.parquet")
+    (tmp_path / "encoder.csv").write_text("time_s,phi1_rad\n0,0\n")
+    before = sorted(p.name for p in tmp_path.iterdir())
+    ends = {"file": "the output is a file", "folder": "the results need a folder"}
+    refused(words.split(), f"-: standard output is not possible: {ends[what]}")
+    assert sorted(p.name for p in tmp_path.iterdir()) == before

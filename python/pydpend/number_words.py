@@ -14,6 +14,10 @@ _CUT_DECIMALS = re.compile(r"[+-]?\d+,0\d")
 """Digits behind a comma that begin with 0, as decimals do and whole numbers do not: ``12,05``."""
 
 
+_PAIR = re.compile(r"[+-]?(\d+),(\d+)")
+"""Two whole numbers, or one with a decimal comma: ``1,5``."""
+
+
 def number(word: str) -> float:
     """The number that a word is. Raises ValueError with what is wrong and how to write it."""
     try:
@@ -25,8 +29,17 @@ def number(word: str) -> float:
         raise ValueError(f"{word!r} is not a number{advice}") from None
 
 
-def numbers(text: str, setting: str) -> list[float]:
+def numbers(text: str, setting: str, *, is_pair: bool = True) -> list[float]:
     """The numbers of a list with commas, the value of the option ``setting``.
+
+    Parameters
+    ----------
+    text
+        The value.
+    setting
+        The option's name.
+    is_pair
+        Whether two whole numbers are what one expects there; else they may be one number with a decimal comma.
 
     Raises
     ------
@@ -39,6 +52,15 @@ def numbers(text: str, setting: str) -> list[float]:
                 Setting(setting),
                 f"the commas of {text!r} may be decimal marks: {cut[0]} may be one number or two",
                 "Write decimals with a point, and commas between the numbers: 0.5,1,2",
+            )
+        )
+    pair = None if is_pair else _PAIR.fullmatch(text.strip())
+    if pair is not None:
+        raise OptionError(
+            fault(
+                Setting(setting),
+                f"{text!r} may be one number or two",
+                f"Write {text.strip().replace(',', '.')}, or {pair[1]}.0,{pair[2]}.0",
             )
         )
     try:

@@ -112,6 +112,9 @@ def whole(path: AnyPath) -> Iterator[Path]:
 def check_folder(path: AnyPath) -> Path:
     """The folder that results go into. Raises ArgumentError if a file has its name or the name of one above it."""
     folder = path_of(path)
+    if os.fspath(folder) == "-":
+        what = "standard output is not possible: the results need a folder"
+        raise ArgumentError(fault("-", what, "Give the name of a folder"))
     there = next((p for p in (folder, *folder.parents) if p.exists()), None)
     if there is not None and not there.is_dir():
         what = "it is a file, and the results need a folder"

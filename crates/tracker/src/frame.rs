@@ -8,7 +8,7 @@
 use std::fmt;
 
 use crate::error::{Error, Fault, Result};
-use crate::gaps::Gaps;
+use crate::gaps::{Gaps, Reason};
 use crate::message::Message;
 use crate::pixel_aspect::{AspectOrigin, PixelAspect};
 
@@ -251,6 +251,11 @@ pub trait FrameSource: Send {
     /// Frames that are not there between those that were handed out so far.
     fn gaps(&self) -> Gaps {
         Gaps::default()
+    }
+
+    /// Why the first of the frames handed out without a plane have none, where that is more than that they cannot be decoded.
+    fn reasons(&self) -> Vec<Reason> {
+        Vec::new()
     }
 
     /// Up to `count` decoded frames spread over the recording, for learning thresholds and noise; their

@@ -1,6 +1,6 @@
 //! Counts the frames that lack between two that are there, and the frames that cannot be decoded.
 //!
-//! Owns: [`Gap`], [`Gaps`], [`Stretches`], how they are told. Must not: read anything.
+//! Owns: [`Gap`], [`Gaps`], [`Stretches`], [`Reason`], [`Damage`], how they are told. Must not: read anything.
 
 use serde::{Deserialize, Serialize};
 
@@ -183,6 +183,22 @@ fn listed(parts: &[String]) -> String {
     }
 }
 
+/// Why a frame that is there cannot be used.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Reason {
+    /// Index of the frame.
+    pub frame: u64,
+    /// What is wrong, a clause without a full stop.
+    pub words: String,
+}
+
+/// Adds a reason; the first thousand are kept.
+pub fn keep_reason(reasons: &mut Vec<Reason>, frame: u64, words: String) {
+    if reasons.len() < MOST_KEPT {
+        reasons.push(Reason { frame, words });
+    }
+}
+
 /// Damage of a recording: frames that cannot be decoded, and gaps.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Damage {
@@ -190,6 +206,9 @@ pub struct Damage {
     pub undecoded: Stretches,
     /// Frames that are not there.
     pub gaps: Gaps,
+    /// Why the first of the undecoded frames are so, where that is more than that they cannot be decoded.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub reasons: Vec<Reason>,
 }
 
 impl Damage {
@@ -203,10 +222,24 @@ impl Damage {
         !self.undecoded.is_empty() || self.gaps.is_damage()
     }
 
+    fn reason_words(&self) -> Option<String> {
+        if let ([only], 1) = (&self.reasons[..], self.undecoded.frames) {
+            return Some(only.words.clone());
+        }
+        let told = self.reasons.iter().take(MOST_TOLD);
+        let mut words: Vec<String> = told.map(|r| format!("frame {}: {}", r.frame, r.words)).collect();
+        if !words.is_empty() && self.undecoded.frames > words.len() as u64 {
+            words.push("...".into());
+        }
+        Some(words.join("; ")).filter(|w| !w.is_empty())
+    }
+
     /// What is lost, in a sentence; `None` if nothing is.
     pub fn words(&self) -> Option<String> {
-        let undecoded =
-            (!self.undecoded.is_empty()).then(|| format!("{} cannot be decoded", self.undecoded.words()));
+        let undecoded = (!self.undecoded.is_empty()).then(|| match self.reason_words() {
+            None => format!("{} cannot be decoded", self.undecoded.words()),
+            Some(reasons) => format!("{} cannot be used ({reasons})", self.undecoded.words()),
+        });
         let parts: Vec<String> = undecoded.into_iter().chain(self.gaps.lost_words()).collect();
         (!parts.is_empty()).then(|| format!("damaged: {}", parts.join("; ")))
     }
@@ -227,6 +260,30 @@ mod tests {
         (0..3000).for_each(|i| s.push(100 + 2 * i));
         assert_eq!((s.frames, s.stretches.len()), (3008, MOST_KEPT));
         assert_eq!(s.words(), "frames 7-10, 15, 20-22, 100, 102, 104, 106, 108 and 2995 more");
+    }
+
+    #[test]
+    fn frames_are_told_with_what_is_wrong_with_them() {
+        let mut damage = Damage::default();
+        damage.undecoded.push(3);
+        keep_reason(&mut damage.reasons, 3, "a.png is 8 x 6 px".into());
+        assert_eq!(damage.words().unwrap(), "damaged: frame 3 cannot be used (a.png is 8 x 6 px)");
+        damage = Damage::default();
+        [3, 7].into_iter().for_each(|i| damage.undecoded.push(i));
+        assert_eq!(damage.words().unwrap(), "damaged: frames 3 and 7 cannot be decoded");
+        keep_reason(&mut damage.reasons, 3, "a.png is 8 x 6 px".into());
+        assert_eq!(
+            damage.words().unwrap(),
+            "damaged: frames 3 and 7 cannot be used (frame 3: a.png is 8 x 6 px; ...)"
+        );
+        keep_reason(&mut damage.reasons, 7, "b.png: it is cut".into());
+        assert_eq!(
+            damage.words().unwrap(),
+            "damaged: frames 3 and 7 cannot be used (frame 3: a.png is 8 x 6 px; frame 7: b.png: it is cut)"
+        );
+        (8..2000).for_each(|i| keep_reason(&mut damage.reasons, i, String::new()));
+        assert_eq!(damage.reasons.len(), MOST_KEPT);
+        assert_eq!(damage.words().unwrap().matches(": ").count(), 2 + MOST_TOLD);
     }
 
     #[test]

@@ -113,6 +113,9 @@ static MADE: AtomicU64 = AtomicU64::new(0);
 /// Bytes of a file's name that the file systems in use take at most.
 pub const LONGEST_NAME: usize = 255;
 
+/// What stands for standard output where a command writes there.
+const STANDARD_OUTPUT: &str = "-";
+
 /// What tells one file on a disk from another, links of either kind followed.
 fn identity(path: &Path) -> Option<(u64, u64)> {
     fs::metadata(path).ok().map(|m| (m.dev(), m.ino()))
@@ -123,8 +126,8 @@ fn place(path: &Path) -> Option<PathBuf> {
     Some(fs::canonicalize(folder(path)).ok()?.join(path.file_name()?))
 }
 
-/// Refuses `outputs` that would replace one of the `inputs` or one another, and, unless `replace`, any that is there
-/// already. Names are compared by the files that they stand for, so that no link hides one.
+/// Refuses `outputs` that are no files, that would replace one of the `inputs` or one another, and, unless `replace`, any
+/// that is there already. Names are compared by the files that they stand for, so that no link hides one.
 ///
 /// # Errors
 /// The fault of the first such output.
@@ -132,6 +135,10 @@ pub fn check(outputs: &[PathBuf], inputs: &[PathBuf], replace: bool) -> Result<(
     let read: Vec<_> = inputs.iter().filter_map(|p| Some((p, identity(p)?))).collect();
     for (i, output) in outputs.iter().enumerate() {
         let name = text(output);
+        if name == STANDARD_OUTPUT {
+            return Err(Fault::new(name, "standard output is not possible: the output is a file")
+                .advice("Give the name of a file"));
+        }
         if is_stream(output) {
             continue;
         }
@@ -188,6 +195,14 @@ mod tests {
         }
         assert!(NewFile::create(&dir.path().join("n".repeat(256))).is_err());
         assert!(NewFile::create(dir.path()).is_err() && NewFile::create(&dir.path().join("no/x")).is_err());
+    }
+
+    #[test]
+    fn standard_output_is_no_file() {
+        let refused = check(&["a.toml".into(), "-".into()], &[], true).unwrap_err().to_string();
+        assert!(refused.starts_with("-: standard output is not possible"), "{refused}");
+        let dir = tempfile::tempdir().unwrap();
+        check(&[dir.path().join("-"), dir.path().join("-x")], &[], false).unwrap();
     }
 
     #[test]

@@ -42,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
 
     check_folder(args.output)
     check_files(args, *(args.output / name for name in ("predict.json", "windows.csv", "windows.png")))
-    windows = numbers(args.windows, "windows")
+    windows = numbers(args.windows, "windows", is_pair=False)
     if min(windows) <= 0:
         advice = "Give lengths above 0, decimals with a point: 0.5,1,2"
         raise OptionError(fault(Setting("windows"), f"{min(windows):g} s is no length of a window", advice))

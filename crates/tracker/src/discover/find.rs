@@ -57,8 +57,7 @@ pub fn discover(store: &DetectionStore, image_px: [u32; 2], stop: &Stop) -> Resu
     let standing = sample.standing.clone();
     let links: Vec<Link> = found.iter().map(|f| f.link.clone()).collect();
     if links.is_empty() || lone::others_move(&sample, &links, stop)? {
-        found.extend(lone::find_lone(store, &sample, &standing, &links, stop)?);
-        lone::pair_up(&mut found, stop)?;
+        warnings.extend(add_lone(&mut found, store, &sample, &links, stop)?);
     }
     if found.is_empty() {
         return Err(nothing_found(
@@ -191,6 +190,31 @@ fn reference(
         }
     }
     Ok((index, best.1 == all))
+}
+
+/// Adds markers that are on no body of three, and pairs of them; what to know of those that are too many.
+fn add_lone(
+    found: &mut Vec<Found>,
+    store: &DetectionStore,
+    sample: &Sample,
+    links: &[Link],
+    stop: &Stop,
+) -> Result<Option<Message>> {
+    let (alone, left_out) = lone::find_lone(store, sample, &sample.standing, links, stop)?;
+    found.extend(alone);
+    lone::pair_up(found, stop)?;
+    Ok(left_out_words(left_out))
+}
+
+/// What to know of markers that move by themselves and are too many.
+fn left_out_words(left_out: usize) -> Option<Message> {
+    let others = if left_out == 1 { "one more is".to_owned() } else { format!("{left_out} more are") };
+    let words = format!(
+        "markers move by themselves: the {} that are seen longest are followed, {others} not. Leave out what are no markers \
+         with ",
+        lone::MOST_LONE
+    );
+    (left_out > 0).then(|| Message::from(words) + Setting::Threshold)
 }
 
 /// Where a body was found, for a message.

@@ -17,6 +17,9 @@ use crate::store::DetectionStore;
 
 /// Frames linked at most.
 const FRAMES: usize = 3000;
+/// Markers alone that are kept at most, those that are seen longest: each may be any other, so the work of following them
+/// grows with the square of their number.
+pub const MOST_LONE: usize = 100;
 /// Frames a path must have to be a marker's.
 const LEAST: usize = 6;
 
@@ -96,7 +99,7 @@ pub fn others_move(sample: &Sample, links: &[Link], stop: &Stop) -> Result<bool>
     Ok(2 * rest.iter().filter(|&&n| n > 0).count() > rest.len())
 }
 
-/// Markers that are on no body of three, with their places in the sample's frames.
+/// Markers that are on no body of three, with their places in the sample's frames, and how many more there were than are kept.
 ///
 /// # Errors
 /// [`crate::error::Error::Interrupted`] once `stop` was asked for.
@@ -106,7 +109,7 @@ pub fn find_lone(
     standing: &[Vector2<f64>],
     links: &[Link],
     stop: &Stop,
-) -> Result<Vec<Found>> {
+) -> Result<(Vec<Found>, usize)> {
     let mut linked = 0;
     let mut open: Vec<Path> = Vec::new();
     let mut done: Vec<Path> = Vec::new();
@@ -178,18 +181,21 @@ pub fn find_lone(
             kept.push(path);
         }
     }
-    Ok(kept
-        .iter()
-        .map(|path| {
-            let mut poses = vec![None; sample.frames.len()];
-            for (&(f, p), _) in path.at.iter().zip(&path.whole).filter(|(_, whole)| **whole) {
-                if let Ok(k) = sample.frames.binary_search(&f) {
-                    poses[k] = Some(Isometry2::new(p, 0.0));
-                }
-            }
-            Found { link: link_of(vec![path.at[0].1], FLOOR_PX), poses }
-        })
-        .collect())
+    let left_out = kept.len().saturating_sub(MOST_LONE);
+    kept.truncate(MOST_LONE);
+    let found = kept.iter().map(|path| found_of(path, sample)).collect();
+    Ok((found, left_out))
+}
+
+/// A marker alone, with its places in the sample's frames.
+fn found_of(path: &Path, sample: &Sample) -> Found {
+    let mut poses = vec![None; sample.frames.len()];
+    for (&(f, p), _) in path.at.iter().zip(&path.whole).filter(|(_, whole)| **whole) {
+        if let Ok(k) = sample.frames.binary_search(&f) {
+            poses[k] = Some(Isometry2::new(p, 0.0));
+        }
+    }
+    Found { link: link_of(vec![path.at[0].1], FLOOR_PX), poses }
 }
 
 /// Makes one body of every two lone markers that keep their distance, unless one hangs on the other: then one of them

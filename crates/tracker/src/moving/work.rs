@@ -10,7 +10,7 @@ use std::os::unix::fs::FileExt;
 use super::picture::{Film, Picture};
 use crate::error::{Error, Fault, Result};
 use crate::frame::{Ending, Frame, FrameSource};
-use crate::gaps::Gaps;
+use crate::gaps::Damage;
 use crate::gray::gray8;
 use crate::stop::Stop;
 use crate::store::FrameStamp;
@@ -43,7 +43,7 @@ pub struct WorkFilm<'a> {
     /// For each picture its place among the decoded frames.
     kept: Vec<usize>,
     ending: Ending,
-    gaps: Gaps,
+    damage: Damage,
     stop: &'a Stop,
 }
 
@@ -75,7 +75,7 @@ impl<'a> WorkFilm<'a> {
             decoded: Vec::new(),
             kept: Vec::new(),
             ending: Ending::Complete,
-            gaps: Gaps::default(),
+            damage: Damage::default(),
             stop,
         };
         let mut differences = Vec::new();
@@ -102,7 +102,10 @@ impl<'a> WorkFilm<'a> {
                 before = luma;
             }
         }
-        film.gaps = source.gaps();
+        film.damage.gaps = source.gaps().within(&frames);
+        film.damage.reasons = source.reasons();
+        film.damage.reasons.retain(|r| frames.contains(&r.frame));
+        film.stamps.iter().filter(|s| !s.decoded).for_each(|s| film.damage.undecoded.push(s.index));
         film.kept = without_copies(&differences);
         Ok(film)
     }
@@ -159,8 +162,8 @@ impl<'a> WorkFilm<'a> {
     }
 
     /// Frames that are not there between those that were read.
-    pub fn gaps(&self) -> &Gaps {
-        &self.gaps
+    pub fn damage(&self) -> &Damage {
+        &self.damage
     }
 
     /// A place in a work picture as a place in the recording, px: pixel centres are at integers in both.

@@ -11,7 +11,7 @@ use crossbeam_channel::{Receiver, Sender, bounded};
 
 use crate::error::{Error, Fault, Result};
 use crate::frame::{Ending, Frame, FrameSource};
-use crate::gaps::Gaps;
+use crate::gaps::{Gaps, Reason};
 
 /// Bytes of frames in a batch: a large frame is handed on as soon as it is there, while caches hold it.
 const BATCH_BYTES: usize = 1 << 20;
@@ -33,6 +33,8 @@ pub struct End {
     pub ending: Ending,
     /// Frames that are not there between those that were asked for.
     pub gaps: Gaps,
+    /// Why frames have no plane, see [`FrameSource::reasons`].
+    pub reasons: Vec<Reason>,
 }
 
 /// Frames of a source, read ahead.
@@ -103,7 +105,7 @@ fn read(
         if batch.frames.len() == size {
             let next = Batch { first: batch.first + size, frames: Vec::new() };
             if sender.send(std::mem::replace(&mut batch, next)).is_err() {
-                return Ok(End { ending, gaps: Gaps::default() });
+                return Ok(End { ending, gaps: Gaps::default(), reasons: Vec::new() });
             }
         }
     }
@@ -111,7 +113,9 @@ fn read(
         // The receivers may be gone; then nobody asks for the ending either.
         let _ = sender.send(batch);
     }
-    Ok(End { ending, gaps: source.gaps().within(frames) })
+    let mut reasons = source.reasons();
+    reasons.retain(|r| frames.contains(&r.frame));
+    Ok(End { ending, gaps: source.gaps().within(frames), reasons })
 }
 
 /// Frames in a batch: so many that handing them on costs nothing beside detecting in them.

@@ -21,6 +21,7 @@ use crate::gaps::Damage;
 use crate::message::{Message, Setting};
 use crate::name::shown;
 use crate::rig::Rig;
+use crate::rigid::search::MOST_SEEDS;
 use crate::source::Interlaced;
 use crate::table::{
     NodeSummary, NodeTable, Rows, RunEnding, SCHEMA_VERSION, SourceFacts, TableMeta, TableWriter, Tally,
@@ -95,8 +96,8 @@ impl Run<'_> {
         let mut stop = end.is_none();
         let reading_was_stopped = stop;
         let mut done = 0;
-        let mut damage =
-            Damage { gaps: end.as_ref().map(|e| e.gaps.clone()).unwrap_or_default(), ..Damage::default() };
+        let (gaps, reasons) = end.as_ref().map(|e| (e.gaps.clone(), e.reasons.clone())).unwrap_or_default();
+        let mut damage = Damage { gaps, reasons, ..Damage::default() };
         let attended = Attended::default();
         let leave = |o: &mut dyn Observer| if reading_was_stopped { o.abandoned() } else { o.interrupted() };
         let tracked = attended.run(observer, leave, |attended| {
@@ -120,7 +121,10 @@ impl Run<'_> {
         });
         stop |= attended.stop.asked();
         match tracked {
-            Ok(_) => observer.progress(done),
+            Ok(summary) => {
+                observer.progress(done);
+                self.warnings.extend(bounded_words(summary.bounded_frames));
+            }
             Err(Error::Interrupted) if done > 0 => {}
             Err(error) => return Err(error),
         }
@@ -276,4 +280,14 @@ impl Run<'_> {
             .replace(&self.settings.input, &self.facts.name)
             .replace(&shown(&self.settings.input), &self.facts.name)
     }
+}
+
+/// What to know of frames in which more stood out than is tried.
+fn bounded_words(frames: u64) -> Option<Message> {
+    let which = if frames == 1 { "one frame".to_owned() } else { format!("{frames} frames") };
+    let words = format!(
+        "in {which} so much stands out that only part of it was tried for where a body may be, the {MOST_SEEDS} spots whose \
+         centres are known best. Leave out what are no markers with "
+    );
+    (frames > 0).then(|| Message::from(words) + Setting::Threshold)
 }

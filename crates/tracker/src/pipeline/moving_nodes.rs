@@ -11,7 +11,7 @@ use super::times::times;
 use crate::detect::DetectSettings;
 use crate::error::{Error, Fault, Place, Result};
 use crate::frame::{Ending, SourceInfo};
-use crate::gaps::{Damage, Gaps};
+use crate::gaps::Damage;
 use crate::message::{Message, Setting};
 use crate::moving::{Marker, WorkFilm};
 use crate::observation::{Observation, Status};
@@ -49,7 +49,7 @@ pub(super) struct Moving {
     /// By frame, then track.
     rows: Vec<Vec<Observation>>,
     ending: Ending,
-    gaps: Gaps,
+    damage: Damage,
 }
 
 impl Moving {
@@ -65,7 +65,7 @@ impl Moving {
             decoded: film.decoded(),
             stamps: film.stamps().to_vec(),
             ending: film.ending().clone(),
-            gaps: film.gaps().clone(),
+            damage: film.damage().clone(),
             rows,
         }
     }
@@ -154,8 +154,7 @@ impl Moving {
             }
             tally.push(observations);
         }
-        let mut damage = Damage { gaps: self.gaps.clone(), ..Damage::default() };
-        self.stamps.iter().filter(|s| !s.decoded).for_each(|s| damage.undecoded.push(s.index));
+        let damage = self.damage.clone();
         let mut warnings = info.warnings.clone();
         warnings.extend(timing::notes(&timing));
         warnings.extend(damage.gaps.dropped_words().map(Message::from));
@@ -399,7 +398,7 @@ mod tests {
                 .collect(),
             rows,
             ending: Ending::Complete,
-            gaps: Gaps::default(),
+            damage: Damage::default(),
         }
     }
 

@@ -14,7 +14,7 @@ use super::settings::RunSettings;
 use crate::detect::{Centroid, DetectSettings, Levels};
 use crate::error::{Error, Fault, FaultKind, Place, Result};
 use crate::frame::{Ending, RateOrigin};
-use crate::gaps::Gaps;
+use crate::gaps::{Gaps, Reason};
 use crate::message::{Message, Setting};
 use crate::name::text;
 use crate::output::LONGEST_NAME;
@@ -183,6 +183,8 @@ struct EndingText {
     early: Option<(u64, Option<u64>, String)>,
     #[serde(default)]
     gaps: Gaps,
+    #[serde(default)]
+    reasons: Vec<Reason>,
 }
 
 /// How reading ended, as the state file has it.
@@ -191,7 +193,8 @@ pub fn finished(end: &End) -> Result<Finished> {
         Ending::Complete => None,
         Ending::Early { frames, byte, reason } => Some((*frames, *byte, reason.clone())),
     };
-    let ending = serde_json::to_string(&EndingText { early, gaps: end.gaps.clone() })
+    let (gaps, reasons) = (end.gaps.clone(), end.reasons.clone());
+    let ending = serde_json::to_string(&EndingText { early, gaps, reasons })
         .map_err(|e| Error::Table(Fault::new("state", e.to_string())))?;
     Ok(Finished { ending })
 }
@@ -208,7 +211,7 @@ fn read_end(words: &str, path: &Path) -> Result<End> {
         None => Ending::Complete,
         Some((frames, byte, reason)) => Ending::Early { frames, byte, reason },
     };
-    Ok(End { ending, gaps: words.gaps })
+    Ok(End { ending, gaps: words.gaps, reasons: words.reasons })
 }
 
 /// Removes the state of a run, if there is one.

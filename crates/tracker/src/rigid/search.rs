@@ -5,6 +5,7 @@
 //! A pose follows from two joints, from a joint and one node, or from two nodes. Every pose that follows from
 //! the detections is tested on all nodes of the body and refitted on those that agree.
 
+use std::collections::HashSet;
 use std::f64::consts::PI;
 
 use nalgebra::{Isometry2, Vector2};
@@ -19,6 +20,13 @@ use super::pose::{Pair, PoseFit, fit_pose, place, pose_at};
 pub const REACH_SIGMA: f64 = 5.1;
 /// Pairs of nodes from which a free body is sought.
 pub const PAIRS: usize = 60;
+/// Detections that pairs of nodes are sought among, at most: those whose centres are known best. Bodies have tens of nodes, and
+/// every scene that was followed without a bound has fewer (docs/validation.md); noise has thousands, and its pairs millions.
+pub const MOST_SEEDS: usize = 400;
+/// Poses that one search tests, at most: 0.1 s of work.
+pub const MOST_TRIALS: usize = 50_000;
+/// Hypotheses up to which each is compared with a new one; beyond, a table is quicker.
+const FEW_HYPOTHESES: usize = 32;
 /// Rounds of picking detections and fitting the pose, at most.
 const REFINE_ROUNDS: usize = 6;
 /// Distance of two anchors that fix the pose alone, in their standard uncertainties: the angle is then known to 1/20 rad.
@@ -59,6 +67,27 @@ pub struct Found {
     pub hypotheses: Vec<PoseHypothesis>,
     /// Poses that the detections allowed and that were tested.
     pub trials: usize,
+    /// There were more detections or poses than are tried.
+    pub is_bounded: bool,
+    /// Detections of the hypotheses, once these are many.
+    known: HashSet<Vec<Option<usize>>>,
+}
+
+impl Found {
+    /// Keeps a hypothesis unless one with the same detections is known.
+    fn keep(&mut self, hypothesis: PoseHypothesis) {
+        let is_new = if self.hypotheses.len() < FEW_HYPOTHESES {
+            !self.hypotheses.iter().any(|other| other.picks == hypothesis.picks)
+        } else {
+            if self.known.is_empty() {
+                self.known.extend(self.hypotheses.iter().map(|other| other.picks.clone()));
+            }
+            self.known.insert(hypothesis.picks.clone())
+        };
+        if is_new {
+            self.hypotheses.push(hypothesis);
+        }
+    }
 }
 
 /// A search for one body in one frame.
@@ -319,8 +348,14 @@ impl Search<'_> {
         }
         spans.sort_by(|a, b| b.0.total_cmp(&a.0));
         spans.truncate(self.pairs);
-        let stars: Vec<usize> =
+        let mut stars: Vec<usize> =
             (0..self.index.len()).filter(|&d| self.free[d] && self.index.whole(d)).collect();
+        if stars.len() > MOST_SEEDS {
+            found.is_bounded = true;
+            stars.sort_by(|&a, &b| self.index.get(a).sigma_px.total_cmp(&self.index.get(b).sigma_px));
+            stars.truncate(MOST_SEEDS);
+            stars.sort_unstable();
+        }
         let mut gaps: Vec<(f64, usize, usize)> = Vec::new();
         for (k, &d) in stars.iter().enumerate() {
             for &e in &stars[k + 1..] {
@@ -337,6 +372,10 @@ impl Search<'_> {
             let first = gaps.partition_point(|g| g.0 < span - reach);
             for &(gap, d, e) in gaps[first..].iter().take_while(|g| g.0 <= span + reach) {
                 debug_assert!(gap >= span - reach);
+                if found.trials >= MOST_TRIALS {
+                    found.is_bounded = true;
+                    return;
+                }
                 for (d, e) in [(d, e), (e, d)] {
                     let pairs = [(i, d), (j, e)].map(|(j, d)| Pair {
                         local: link.template[j],
@@ -361,10 +400,90 @@ impl Search<'_> {
             }
         }
         found.trials += 1;
-        if let Some(s) = self.refine(pose, about, slack_rad)
-            && !found.hypotheses.iter().any(|o| o.picks == s.picks)
-        {
-            found.hypotheses.push(s);
+        if let Some(s) = self.refine(pose, about, slack_rad) {
+            found.keep(s);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+    use crate::detect::Detection;
+
+    /// Side of the picture, px.
+    const SIDE: f64 = 720.0;
+
+    /// Nine nodes about (300, 300) px.
+    fn link() -> Link {
+        let along = |i: f64| Vector2::new(17.0 * i - 70.0, 13.0 * (2.1 * i).sin() + 0.3 * i * i);
+        let template: Vec<Vector2<f64>> = (0..9).map(|i| along(f64::from(i))).collect();
+        let n = template.len();
+        Link {
+            nodes: (0..n).collect(),
+            template,
+            slack_px: vec![0.05; n],
+            whole_px: vec![0.0; n],
+            area_px: vec![(0.0, 0.0); n],
+            home: Vector2::new(300.0, 300.0),
+            excess_px: 0.0,
+        }
+    }
+
+    fn spot(place: Vector2<f64>, sigma_px: f32) -> Detection {
+        Detection { x_px: place.x, y_px: place.y, sigma_px, ..Default::default() }
+    }
+
+    /// Spots anywhere in the picture.
+    fn noise(count: usize, sigma_px: f32) -> Vec<Detection> {
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        (0..count)
+            .map(|_| spot(Vector2::new(SIDE * rng.random::<f64>(), SIDE * rng.random::<f64>()), sigma_px))
+            .collect()
+    }
+
+    fn run(link: &Link, detections: &[Detection]) -> Found {
+        let (index, free) = (DetectionIndex::new(detections), vec![true; detections.len()]);
+        Search {
+            link,
+            anchors: &[],
+            index: &index,
+            free: &free,
+            window: None,
+            reach_sigma: REACH_SIGMA,
+            floor_px: 0.05,
+            pairs: PAIRS,
+        }
+        .run()
+    }
+
+    #[test]
+    fn the_work_is_bounded_however_much_stands_out() {
+        let link = link();
+        for (count, sigma_px, is_bounded) in
+            [(40, 0.1, false), (150, 0.1, false), (1000, 0.1, true), (6000, 0.1, true), (399, 3.0, true)]
+        {
+            let found = run(&link, &noise(count, sigma_px));
+            assert_eq!(found.is_bounded, is_bounded, "{count}: {} trials", found.trials);
+            assert!(found.trials <= MOST_TRIALS && found.hypotheses.len() <= found.trials, "{count}");
+            // None twice.
+            let different: HashSet<_> = found.hypotheses.iter().map(|h| h.picks.clone()).collect();
+            assert_eq!(different.len(), found.hypotheses.len(), "{count}");
+        }
+    }
+
+    #[test]
+    fn a_body_whose_centres_are_known_best_is_found_among_thousands_of_spots() {
+        let link = link();
+        let mut detections = noise(3000, 0.3);
+        detections.extend(link.template.iter().map(|t| spot(t + link.home, 0.05)));
+        let found = run(&link, &detections);
+        assert!(found.is_bounded);
+        let best = &found.hypotheses[0];
+        assert_eq!(best.inliers, 9);
+        assert!((best.fit.pose.translation.vector - link.home).norm() < 0.1);
     }
 }

@@ -104,7 +104,8 @@ pub fn open(name: &str, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
             };
         }
     }
-    let source = ffmpeg::FfmpegSource::open(name, &input, options)?;
+    let mut source = ffmpeg::FfmpegSource::open(name, &input, options)?;
+    source.turn_as_tagged();
     if options.decoder != Decoder::Opencv {
         return Ok(Box::new(source));
     }

@@ -1,9 +1,11 @@
 //! Decodes compressed film through OpenCV's `VideoCapture`: a second, independent decoder to check the first against.
 //!
 //! Owns: [`OpencvSource`]. OpenCV makes blue, green and red of every picture and we make brightness of these,
-//! so it costs more and gives 8 bits only. Its times of frames are wrong at the end of streams with reordered
-//! frames (version 4.6 gives 0), so times are the container's. It turns films of 90 and 270 degrees the wrong way
-//! (version 4.6 again) and mirrors none, so pictures are turned here.
+//! so it costs more and gives 8 bits only. It says nothing of damage: it leaves out pictures, or makes up pixels. So the
+//! first decoder reads the same film beside it, and tells times and damage; pixels are OpenCV's. Its times of frames are
+//! wrong at the end of streams with reordered frames (version 4.6 gives 0): a picture whose time is not later than a
+//! frame's is that frame's. It turns films of 90 and 270 degrees the wrong way (version 4.6 again) and mirrors none, so
+//! pictures are turned here.
 
 use std::fs::File;
 use std::os::fd::AsRawFd;
@@ -13,12 +15,24 @@ use opencv::imgproc;
 use opencv::prelude::{MatTraitConst, MatTraitConstManual, VideoCaptureTrait, VideoCaptureTraitConst};
 use opencv::videoio::{self, VideoCapture};
 
-use super::ffmpeg::{FfmpegSource, display_times};
+use super::ffmpeg::FfmpegSource;
 use super::orientation::Orientation;
 use super::{Input, OpenOptions};
 use crate::error::{Error, Fault, FaultKind, Result};
 use crate::frame::{Ending, Frame, FrameSource, PixelFormat, SourceInfo};
+use crate::gaps::Gaps;
 use crate::message::Setting;
+
+/// Frames by which a picture's time may be ahead of the frame that is due: what is further ahead is no time.
+const MOST_LEFT_OUT: f64 = 1000.0;
+
+/// A picture as OpenCV gives it.
+struct Taken {
+    /// Its time, s from the stream's start; 0 where OpenCV does not know it.
+    time_s: f64,
+    /// Its samples, if its size is the recording's.
+    plane: Option<Vec<u8>>,
+}
 
 /// A recording read through OpenCV.
 pub struct OpencvSource {
@@ -26,9 +40,23 @@ pub struct OpencvSource {
     orientation: Orientation,
     capture: VideoCapture,
     color: Mat,
-    next: u64,
-    /// Ticks of all frames; empty if the user gave a rate.
-    times: Vec<i64>,
+    /// The same film through the first decoder.
+    beside: FfmpegSource,
+    /// Ticks are frame numbers: the user gives the rate.
+    counts_frames: bool,
+    /// A picture whose frame is not due yet.
+    ahead: Option<Taken>,
+    /// Whether OpenCV has no more pictures.
+    is_dry: bool,
+    /// Pictures that OpenCV gave, and frames that were due to have one.
+    pictures: u64,
+    frames: u64,
+    /// Whether some picture was taken for the next frame's though its time does not say so.
+    by_order: bool,
+    /// Time of the frame before, s.
+    last_s: Option<f64>,
+    /// OpenCV's pictures have lost their places: in AVI it counts them, and passes over those that are damaged.
+    is_astray: bool,
     ending: Ending,
 }
 
@@ -63,20 +91,72 @@ impl OpencvSource {
             depth_bits: 8,
             ..known.clone()
         };
-        let times = if options.fps.is_some() {
-            Vec::new()
-        } else {
-            display_times(name, input, usize::MAX, u64::MAX)?.0
-        };
+        // Its ticks are those of the container, whatever the user says of the rate.
+        let mut beside = FfmpegSource::open(name, input, &OpenOptions { fps: None, ..options.clone() })?;
+        beside.turn_as_tagged();
         Ok(Self {
             info,
             orientation,
             capture,
             color: Mat::default(),
-            next: 0,
-            times,
+            beside,
+            counts_frames: options.fps.is_some(),
+            ahead: None,
+            is_dry: false,
+            pictures: 0,
+            frames: 0,
+            by_order: false,
+            last_s: None,
+            is_astray: false,
             ending: Ending::Complete,
         })
+    }
+
+    /// The next picture, if there is one.
+    fn take(&mut self) -> Result<Option<Taken>> {
+        if self.is_dry {
+            return Ok(None);
+        }
+        let Some(plane) = read(&mut self.capture, &mut self.color, &self.info, self.orientation)? else {
+            self.is_dry = true;
+            return Ok(None);
+        };
+        self.pictures += 1;
+        let time_s = self.capture.get(videoio::CAP_PROP_POS_MSEC).unwrap_or(0.0) / 1000.0;
+        Ok(Some(Taken { time_s, plane }))
+    }
+
+    /// The picture of the frame of this time, s; `None` where OpenCV left it out.
+    fn picture(&mut self, frame_s: f64) -> Result<Option<Vec<u8>>> {
+        if self.ahead.is_none() {
+            self.ahead = self.take()?;
+        }
+        let step_s = self.last_s.map(|last| frame_s - last).or(self.info.rate_hz.map(|rate| 1.0 / rate));
+        self.last_s = Some(frame_s);
+        let Some(taken) = &self.ahead else { return Ok(None) };
+        let later_s =
+            self.beside.start_s().zip(step_s).map(|(start, step)| (start + taken.time_s - frame_s) / step);
+        match later_s {
+            Some(steps) if steps > 0.5 && steps < MOST_LEFT_OUT => return Ok(None),
+            Some(steps) if steps.abs() <= 0.5 => {}
+            _ => self.by_order = true,
+        }
+        Ok(self.ahead.take().and_then(|taken| taken.plane))
+    }
+
+    /// How it ended, once the first decoder has no more frames.
+    fn end(&mut self) -> Result<Ending> {
+        let ending = self.beside.ending();
+        let is_more = self.ahead.is_some() || self.take()?.is_some();
+        if ending != Ending::Complete || !self.by_order || !is_more && self.pictures == self.frames {
+            return Ok(ending);
+        }
+        let gives = if is_more { "more".to_owned() } else { self.pictures.to_string() };
+        let reason = format!(
+            "OpenCV gives {gives} pictures for {} frames and does not tell which: pictures may be those of frames beside them",
+            self.frames
+        );
+        Ok(Ending::Early { frames: self.frames, byte: None, reason })
     }
 }
 
@@ -156,36 +236,35 @@ impl FrameSource for OpencvSource {
     }
 
     fn next_frame(&mut self) -> Result<Option<Frame>> {
-        let Some(plane) = read(&mut self.capture, &mut self.color, &self.info, self.orientation)? else {
-            if self.next == 0 {
-                return Err(Error::Source(
-                    Fault::new(&self.info.name, "OpenCV decodes no frame of it")
-                        .of_kind(FaultKind::Damaged)
-                        .advice("Leave out " + Setting::Decoder.set_to("opencv")),
-                ));
-            }
-            if let Some(declared) = self.info.declared_frames.filter(|n| *n > self.next) {
-                self.ending = Ending::Early {
-                    frames: self.next,
-                    byte: None,
-                    reason: format!("OpenCV stops after {} of {declared} declared frames", self.next),
-                };
-            }
+        let Some(told) = self.beside.next_frame()? else {
+            self.ending = self.end()?;
             return Ok(None);
         };
-        let index = self.next;
-        self.next += 1;
-        let ticks =
-            usize::try_from(index).ok().and_then(|i| self.times.get(i).copied()).unwrap_or(index as i64);
-        Ok(Some(frame(&self.info, index, ticks, plane)))
+        self.frames += 1;
+        let frame_s = self.beside.info().time_base.seconds(told.ticks);
+        self.is_astray |= told.plane.is_none() && self.info.container == "avi";
+        let plane = self.picture(frame_s)?.filter(|_| told.plane.is_some() && !self.is_astray);
+        if self.is_dry && self.pictures == 0 {
+            return Err(Error::Source(
+                Fault::new(&self.info.name, "OpenCV decodes no frame of it")
+                    .of_kind(FaultKind::Damaged)
+                    .advice("Leave out " + Setting::Decoder.set_to("opencv")),
+            ));
+        }
+        let ticks = if self.counts_frames { told.index as i64 } else { told.ticks };
+        Ok(Some(frame(&self.info, told.index, ticks, plane)))
     }
 
     fn ending(&self) -> Ending {
         self.ending.clone()
     }
 
+    fn gaps(&self) -> Gaps {
+        self.beside.gaps()
+    }
+
     fn stamps(&mut self) -> Result<Option<(Vec<i64>, bool)>> {
-        Ok(Some((self.times.clone(), true)).filter(|t| !t.0.is_empty()))
+        if self.counts_frames { Ok(None) } else { self.beside.stamps() }
     }
 
     fn sample(&mut self, count: usize) -> Result<Vec<Frame>> {

@@ -39,6 +39,22 @@ pub(super) struct SearchOutcome {
     pub(super) seen: BodySeen,
     /// Hypotheses between which nothing decides, each with its expected number of false matches.
     pub(super) undecided: Vec<(PoseHypothesis, f64)>,
+    /// More stood out than is tried.
+    pub(super) is_bounded: bool,
+}
+
+/// What of a frame a body may be, as far as nothing decides.
+pub(super) struct Open {
+    /// For each node whether something that is seen may be it.
+    pub(super) nodes: Vec<bool>,
+    /// More stood out than was tried.
+    pub(super) is_bounded: bool,
+}
+
+impl Open {
+    pub(super) fn new(nodes: usize) -> Self {
+        Self { nodes: vec![false; nodes], is_bounded: false }
+    }
 }
 
 impl Bodies {
@@ -55,17 +71,17 @@ impl Bodies {
         let n = self.mechanism.links[b].nodes.len();
         let nothing =
             |open: Vec<bool>| BodySeen { fit: None, picks: vec![None; n], open, occluded: vec![None; n] };
-        let mut open = vec![false; n];
+        let mut open = Open::new(n);
         if index.is_empty() {
-            return SearchOutcome { seen: nothing(open), undecided: Vec::new() };
+            return SearchOutcome { seen: nothing(open.nodes), undecided: Vec::new(), is_bounded: false };
         }
-        let stands = |s: PoseHypothesis| {
+        let stands = |s: PoseHypothesis, is_bounded: bool| {
             let seen = if self.may_be_twin(b, time, index, &s, known) {
                 nothing(s.picks.iter().map(Option::is_some).collect())
             } else {
                 accepted(s, n)
             };
-            SearchOutcome { seen, undecided: Vec::new() }
+            SearchOutcome { seen, undecided: Vec::new(), is_bounded }
         };
         let forecast = self.forecast(b, time, anchors);
         // A body of one node that hangs on nothing has no angle to be lost.
@@ -81,7 +97,7 @@ impl Bodies {
             free
         };
         if let Some(s) = self.find_near(b, time, index, free, anchors) {
-            return stands(s);
+            return stands(s, false);
         }
         if let Some(w) = forecast.filter(|w| single || w.angle_rad < PI) {
             // The usual case: every node near its expected place, and no other turn can look like it.
@@ -93,7 +109,7 @@ impl Bodies {
                 && s.inliers >= 2
                 && self.chance(&search, &s, 1) < CHANCE_ANYWHERE
             {
-                return stands(s);
+                return stands(s, false);
             }
             let limit = match n {
                 1 if single => CHANCE_SINGLE,
@@ -101,21 +117,25 @@ impl Bodies {
                 _ => CHANCE_EXPECTED,
             };
             match self.resolve(&search, limit, &mut open) {
-                Ok((s, _)) => return stands(s),
+                Ok((s, _)) => return stands(s, open.is_bounded),
                 // What is open where it is expected is not looked for elsewhere.
                 Err(undecided) if single || (n == 1 && !undecided.is_empty()) => {
-                    return SearchOutcome { seen: nothing(open), undecided };
+                    let is_bounded = open.is_bounded;
+                    return SearchOutcome { seen: nothing(open.nodes), undecided, is_bounded };
                 }
                 Err(_) => {}
             }
             if let Some(s) = self.find_last_node(b, time, index, free, anchors) {
-                return stands(s);
+                return stands(s, open.is_bounded);
             }
         }
         let search = self.search(b, index, free, anchors, None);
         match self.resolve(&search, CHANCE_ANYWHERE, &mut open) {
-            Ok((s, _)) => stands(s),
-            Err(undecided) => SearchOutcome { seen: nothing(open), undecided },
+            Ok((s, _)) => stands(s, open.is_bounded),
+            Err(undecided) => {
+                let is_bounded = open.is_bounded;
+                SearchOutcome { seen: nothing(open.nodes), undecided, is_bounded }
+            }
         }
     }
 
@@ -168,7 +188,7 @@ impl Bodies {
     ) -> Option<PoseHypothesis> {
         let a = anchors.first()?;
         let w = self.motions[b].settled_forecast(time)?.hung(a.local, a.place);
-        let mut open = vec![false; self.mechanism.links[b].nodes.len()];
+        let mut open = Open::new(self.mechanism.links[b].nodes.len());
         let search = self.search(b, index, free, anchors, Some(w));
         self.resolve(&search, CHANCE_EXPECTED, &mut open).ok().map(|(s, _)| s)
     }
@@ -250,9 +270,10 @@ impl Bodies {
         &self,
         search: &Search<'_>,
         limit: f64,
-        open: &mut [bool],
+        open: &mut Open,
     ) -> Result<(PoseHypothesis, f64), Vec<(PoseHypothesis, f64)>> {
         let found = search.run();
+        open.is_bounded |= found.is_bounded;
         let mut hypotheses = found.hypotheses.into_iter();
         let Some(best) = hypotheses.next() else { return Err(Vec::new()) };
         let chance = self.chance(search, &best, found.trials);
@@ -274,7 +295,7 @@ impl Bodies {
         let undecided: Vec<(PoseHypothesis, f64)> =
             rivals.into_iter().chain([best]).map(|s| (s, chance)).collect();
         for (s, _) in &undecided {
-            for (o, p) in open.iter_mut().zip(&s.picks) {
+            for (o, p) in open.nodes.iter_mut().zip(&s.picks) {
                 *o |= p.is_some();
             }
         }

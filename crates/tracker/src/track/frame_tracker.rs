@@ -10,9 +10,11 @@ use super::motion_priors::MotionPriors;
 use super::occluded::find_occluded;
 use super::seen::{BodySeen, accepted};
 use super::tentative::{Tentative, follow};
+use crate::error::Result;
 use crate::rigid::body::Mechanism;
 use crate::rigid::index::DetectionIndex;
 use crate::rigid::search::PoseHypothesis;
+use crate::stop::Stop;
 
 /// Follows bodies through frames in either direction of time.
 #[derive(Debug, Clone)]
@@ -21,23 +23,29 @@ pub struct FrameTracker {
     pub bodies: Bodies,
     /// For each body hypotheses that may be it and wait for their motion to decide.
     tentative: Vec<Vec<Tentative>>,
+    /// Frames in which more stood out than is tried.
+    pub bounded_frames: u64,
 }
 
 impl FrameTracker {
     /// A tracker that knows no pose yet.
     pub fn new(mechanism: Mechanism, priors: MotionPriors) -> Self {
         let tentative = vec![Vec::new(); mechanism.links.len()];
-        Self { bodies: Bodies::new(mechanism, priors), tentative }
+        Self { bodies: Bodies::new(mechanism, priors), tentative, bounded_frames: 0 }
     }
 
     /// Names the detections of one frame. `time` in frames may go either way. Bodies that are already known in
     /// this frame are given in `known` and stay as they are.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Interrupted`] once `stop` was asked for; the tracker is then of no use any more.
     pub fn step(
         &mut self,
         time: f64,
         index: &DetectionIndex<'_>,
         known: Option<&[BodySeen]>,
-    ) -> Vec<BodySeen> {
+        stop: &Stop,
+    ) -> Result<Vec<BodySeen>> {
         let n = self.bodies.mechanism.links.len();
         let mut seen: Vec<BodySeen> = match known {
             Some(k) => k.to_vec(),
@@ -52,6 +60,7 @@ impl FrameTracker {
         let given: Vec<bool> = seen.iter().map(|s| s.fit.is_some()).collect();
         let mut undecided: Vec<Vec<(PoseHypothesis, f64)>> = (0..n).map(|_| Vec::new()).collect();
         let mut settled = vec![false; n];
+        let mut is_bounded = false;
         // Step 1: each body by itself, twice, since a body that was found can hold its neighbours.
         for round in 0..2 {
             for k in 0..n {
@@ -64,7 +73,9 @@ impl FrameTracker {
                 if round == 1 && anchors.is_empty() && self.bodies.indistinguishable[b].is_empty() {
                     continue;
                 }
+                stop.heed()?;
                 let got = self.bodies.find(b, time, index, &free, &anchors, &seen);
+                is_bounded |= got.is_bounded;
                 if got.seen.fit.is_some() || seen[b].picks.is_empty() || round == 1 {
                     seen[b] = got.seen;
                     undecided[b] = got.undecided;
@@ -81,6 +92,7 @@ impl FrameTracker {
                 self.tentative[b].clear();
                 continue;
             }
+            stop.heed()?;
             let anchors = self.bodies.anchors(b, &seen);
             let mut waiting = std::mem::take(&mut undecided[b]);
             // Drop hypotheses that could be an indistinguishable body not found yet.
@@ -109,7 +121,8 @@ impl FrameTracker {
                 self.bodies.motions[b].add(time, f);
             }
         }
-        seen
+        self.bounded_frames += u64::from(is_bounded);
+        Ok(seen)
     }
 
     /// Looks for one body with all others as `known` says.

@@ -32,6 +32,8 @@ pub struct TrackSummary {
     pub ambiguous: Vec<u64>,
     /// For each node, whether it was seen in the last frame.
     pub seen_last: Vec<bool>,
+    /// Frames in which more stood out than is tried for where a body may be ([`crate::rigid::search::MOST_SEEDS`]).
+    pub bounded_frames: u64,
 }
 
 /// Receives one frame's stamp and its nodes, in the rig's order.
@@ -110,6 +112,7 @@ pub fn track_recording(
         out.write(store, &after.tracker.bodies.mechanism, p, sink)?;
     }
     out.hand_out(true, sink)?;
+    out.summary.bounded_frames = before.tracker.bounded_frames + after.tracker.bounded_frames;
     Ok(out.summary)
 }
 
@@ -137,7 +140,7 @@ fn learn(
         stop.heed()?;
         store.read(i, &mut scratch);
         let index = DetectionIndex::new(&scratch);
-        let seen = tracker.step(i as f64, &index, None);
+        let seen = tracker.step(i as f64, &index, None, stop)?;
         estimator.add(&tracker.bodies.mechanism, &seen, &index);
     }
     estimator.apply(&mut mechanism, &mut priors);
@@ -240,7 +243,7 @@ impl<'a> Pass<'a> {
         self.stop.heed()?;
         self.store.read(i, &mut self.scratch);
         let index = DetectionIndex::new(&self.scratch);
-        let seen = self.tracker.step(i as f64, &index, None);
+        let seen = self.tracker.step(i as f64, &index, None, self.stop)?;
         let now = self.first + self.pending.len();
         for (b, s) in seen.iter().enumerate() {
             if s.fit.is_some() {

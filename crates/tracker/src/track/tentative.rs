@@ -5,6 +5,7 @@
 use nalgebra::Vector2;
 
 use super::bodies::Bodies;
+use super::body_search::Open;
 use super::false_matches::CHANCE_ANYWHERE;
 use crate::rigid::forecast::Motion;
 use crate::rigid::index::DetectionIndex;
@@ -50,7 +51,7 @@ pub(super) fn follow(
         };
         let w = anchors.first().map_or(w, |a| w.hung(a.local, a.place));
         let search = bodies.search(b, index, free, anchors, Some(w));
-        let mut open = vec![false; link.nodes.len()];
+        let mut open = Open::new(link.nodes.len());
         match bodies.resolve(&search, f64::INFINITY, &mut open) {
             Ok((s, chance)) => {
                 let chance = chance.min(1.0);

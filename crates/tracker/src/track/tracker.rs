@@ -12,6 +12,7 @@ use crate::pixel_aspect::PixelAspect;
 use crate::rig::Rig;
 use crate::rigid::body::Mechanism;
 use crate::rigid::index::DetectionIndex;
+use crate::stop::Stop;
 use crate::store::FrameStamp;
 
 /// Follows the nodes of a given rig through a live recording, frame by frame. Nothing is filled in later.
@@ -56,7 +57,7 @@ impl Tracker {
         self.last = Some(*stamp);
         let detections: Vec<Detection> = detections.iter().map(|d| d.to_square(self.pixel_aspect)).collect();
         let index = DetectionIndex::new(&detections);
-        let seen = self.frame_tracker.step(stamp.index as f64, &index, None);
+        let seen = self.frame_tracker.step(stamp.index as f64, &index, None, &Stop::default())?;
         let mut row = observations(&self.frame_tracker.bodies.mechanism, &seen, &detections);
         for (k, occluded) in occlusions(&self.frame_tracker.bodies.mechanism, &seen).into_iter().enumerate() {
             // Live, a part is believed only if the marker was seen in the frame before.

@@ -164,3 +164,127 @@ fn a_named_pipe_is_read_once_and_its_samples_come_again() {
     }
     writer.join().unwrap();
 }
+
+#[test]
+fn damaged_slices_of_ffv1_are_seen_by_their_sums() {
+    if !have_ffmpeg() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    for (name, arguments) in [
+        ("a.mkv", &["-g", "1"][..]),
+        ("b.mkv", &["-g", "10"]),
+        ("c.mkv", &["-g", "10", "-slices", "9", "-coder", "1", "-context", "1"]),
+        ("a.avi", &["-g", "10"]),
+        ("a.nut", &["-g", "1"]),
+        ("a.mov", &["-g", "10"]),
+    ] {
+        let arguments = [&["-c:v", "ffv1", "-level", "3"], arguments].concat();
+        let path = encode(folder.path(), name, COUNT, &arguments);
+        let whole = std::fs::read(&path).unwrap();
+        let truth = read_all(&mut *open(path.to_str().unwrap(), &OpenOptions::default()).unwrap());
+        assert!(truth.len() == COUNT && truth.iter().all(|f| f.plane.is_some()), "{name}");
+        // Frames that are left where a group of pictures is lost at most; where the file's structure is hit, more are.
+        let mut few_lost = 0;
+        for part in 1..8 {
+            let at = whole.len() * part / 8;
+            for length in [1, 8, 60] {
+                let mut bytes = whole.clone();
+                bytes[at..at + length].iter_mut().for_each(|b| *b = b.wrapping_mul(31).wrapping_add(17));
+                std::fs::write(&path, &bytes).unwrap();
+                let Ok(mut source) = open(path.to_str().unwrap(), &OpenOptions::default()) else { continue };
+                let frames = read_all(&mut *source);
+                let mut whole_frames = 0;
+                for frame in frames.iter().filter(|f| f.plane.is_some()) {
+                    whole_frames += 1;
+                    // A container's time stamps have no sums: only what is shown is looked at.
+                    let i = told(frame).filter(|i| *i < COUNT);
+                    let i = i.unwrap_or_else(|| panic!("{name} {at} {length}: frame {}", frame.index));
+                    assert_eq!(samples(frame), samples(&truth[i]), "{name} {at} {length} picture {i}");
+                }
+                // Up to the next key frame.
+                let is_told = frames.len() > whole_frames
+                    || source.gaps().is_damage()
+                    || source.ending() != Ending::Complete;
+                assert!(is_told, "{name} {at} {length}");
+                few_lost += usize::from(whole_frames >= COUNT - 12);
+            }
+        }
+        assert!(few_lost >= 15, "{name}: {few_lost} of 21");
+    }
+}
+
+#[test]
+fn what_goes_on_from_a_lost_picture_of_ffv1_is_not_believed() {
+    if !have_ffmpeg() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["a.mkv", "a.nut", "a.avi"] {
+        let path = encode(folder.path(), name, COUNT, &["-c:v", "ffv1", "-level", "3", "-g", "10"]);
+        let whole = std::fs::read(&path).unwrap();
+        let truth = read_all(&mut *open(path.to_str().unwrap(), &OpenOptions::default()).unwrap());
+        for part in 1..6 {
+            let at = whole.len() * part / 6;
+            for length in [1, 400, 6000] {
+                std::fs::write(&path, [&whole[..at], &whole[at + length..]].concat()).unwrap();
+                let Ok(mut source) = open(path.to_str().unwrap(), &OpenOptions::default()) else { continue };
+                let frames = read_all(&mut *source);
+                for frame in frames.iter().filter(|f| f.plane.is_some()) {
+                    let i = told(frame).filter(|i| *i < COUNT);
+                    let i = i.unwrap_or_else(|| panic!("{name} {at} {length}: frame {}", frame.index));
+                    assert_eq!(samples(frame), samples(&truth[i]), "{name} {at} {length} picture {i}");
+                }
+                let is_told = frames.iter().any(|f| f.plane.is_none())
+                    || source.gaps().is_damage()
+                    || source.ending() != Ending::Complete;
+                assert!(is_told, "{name} {at} {length}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_file_that_ends_inside_what_holds_pictures_ended_early() {
+    if !have_ffmpeg() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let fragments = ["-g", "10", "-movflags", "frag_keyframe+empty_moov"];
+    for (name, codec) in [("a.mp4", "libx264"), ("b.mp4", "libvpx-vp9"), ("a.mov", "libx264")] {
+        let path = encode(folder.path(), name, 60, &[&["-c:v", codec], &fragments[..]].concat());
+        let whole = std::fs::read(&path).unwrap();
+        let mut boxes = Vec::new();
+        let mut at = 0;
+        while at + 8 <= whole.len() {
+            boxes.push((at, whole[at + 4..at + 8].to_vec()));
+            at += u32::from_be_bytes(whole[at..at + 4].try_into().unwrap()) as usize;
+        }
+        let headers: Vec<usize> =
+            boxes.iter().filter(|(_, kind)| kind == b"moof").map(|(at, _)| *at).collect();
+        let index = boxes.iter().find(|(_, kind)| kind == b"mfra").unwrap().0;
+        assert_eq!(headers.len(), 6, "{name}");
+        // Inside the fifth fragment's header, at its first bytes, and inside what it holds.
+        for (keep, least) in [(headers[4] + 5, 38), (headers[4] + 60, 38), (headers[5] - 300, 38)] {
+            std::fs::write(&path, &whole[..keep]).unwrap();
+            let mut source = open(path.to_str().unwrap(), &OpenOptions::default()).unwrap();
+            let frames = read_all(&mut *source);
+            assert!((least..50).contains(&frames.len()), "{name} {keep}: {}", frames.len());
+            assert!(matches!(source.ending(), Ending::Early { .. }), "{name} {keep}");
+        }
+        // The index behind the last fragment is needed by nobody.
+        std::fs::write(&path, &whole[..index + 20]).unwrap();
+        let mut source = open(path.to_str().unwrap(), &OpenOptions::default()).unwrap();
+        assert_eq!((read_all(&mut *source).len(), source.ending()), (60, Ending::Complete), "{name}");
+    }
+    // In ticks longer than a frame the length does not tell that the last picture lacks.
+    let path = encode(folder.path(), "a.mkv", 60, &["-vf", "setpts=N/1500/TB", "-r", "1500", "-c:v", "ffv1"]);
+    let whole = std::fs::read(&path).unwrap();
+    for percent in 90..100 {
+        std::fs::write(&path, &whole[..whole.len() * percent / 100]).unwrap();
+        let mut source = open(path.to_str().unwrap(), &OpenOptions::default()).unwrap();
+        let frames = read_all(&mut *source);
+        let is_told = source.ending() != Ending::Complete || frames.iter().any(|f| f.plane.is_none());
+        assert!(is_told || frames.len() == 60, "{percent} %: {}", frames.len());
+    }
+}

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::path::Path;
 
 use tiff::encoder::{TiffEncoder, colortype};
-use tracker::frame::{Ending, PixelFormat, RateOrigin};
+use tracker::frame::{Ending, FrameSource, PixelFormat, RateOrigin};
 use tracker::source::{OpenOptions, open};
 
 use crate::film::{HEIGHT, WIDTH, encode, have_ffmpeg, index_of, picture, read_all, samples};
@@ -70,11 +70,55 @@ fn gaps_keep_their_place_and_broken_pictures_are_frames_without_pixels() {
         let told = samples(frame).map(|v| index_of(&v, 255).unwrap());
         assert_eq!(told, if [5, 6, 10].contains(&i) { None } else { Some(i) }, "frame {i}");
     }
+    let words = |source: &dyn FrameSource| -> Vec<(u64, String)> {
+        source.reasons().into_iter().map(|r| (r.frame, r.words)).collect()
+    };
+    let lacks = "no picture has its number".to_owned();
+    assert_eq!(words(&*source), [(5, lacks.clone()), (6, lacks), (10, "f011.png: it is cut".to_owned())]);
     // A broken last picture is an early end.
     std::fs::write(folder.path().join("f020.png"), &bytes[..40]).unwrap();
     let mut source = open(folder.path().to_str().unwrap(), &with_fps(100.0)).unwrap();
     assert_eq!(read_all(&mut *source).len(), 19);
-    assert!(matches!(source.ending(), Ending::Early { frames: 19, .. }));
+    assert!(
+        matches!(source.ending(), Ending::Early { frames: 19, reason, .. } if reason == "f020.png: it is cut")
+    );
+}
+
+#[test]
+fn a_picture_of_another_size_or_depth_is_an_empty_frame_that_says_so() {
+    if !have_ffmpeg() {
+        return;
+    }
+    for (odd, arguments, words) in [
+        (4, &["-vf", "scale=64:48"][..], "f004.png is 64 x 48 px, the others are 196 x 116 px"),
+        (1, &["-vf", "transpose=1"], "f001.png is 116 x 196 px, the others are 196 x 116 px"),
+        (
+            9,
+            &["-pix_fmt", "gray16be"],
+            "f009.png is 196 x 116 px of 16 bits, the others are 196 x 116 px of 8 bits",
+        ),
+        (12, &["-vf", "crop=196:115:0:0"], "f012.png is 196 x 115 px, the others are 196 x 116 px"),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let other = tempfile::tempdir().unwrap();
+        encode(folder.path(), "f%03d.png", 12, &[]);
+        encode(other.path(), "f%03d.png", 12, arguments);
+        let name = format!("f{odd:03}.png");
+        std::fs::copy(other.path().join(&name), folder.path().join(&name)).unwrap();
+        let mut source = open(folder.path().to_str().unwrap(), &with_fps(100.0)).unwrap();
+        let warned = source.info().warnings.iter().any(|w| w.to_string().contains(words));
+        // Those among the nine that are looked at before.
+        assert!(warned || ![1, 12].contains(&odd), "{odd}: {:?}", source.info().warnings);
+        let frames = read_all(&mut *source);
+        if odd == 12 {
+            assert!(matches!(source.ending(), Ending::Early { frames: 11, reason, .. } if reason == words));
+            continue;
+        }
+        let empty: Vec<u64> = frames.iter().filter(|f| f.plane.is_none()).map(|f| f.index).collect();
+        assert_eq!(empty, [odd - 1]);
+        let told: Vec<(u64, String)> = source.reasons().into_iter().map(|r| (r.frame, r.words)).collect();
+        assert_eq!(told, [(odd - 1, words.to_owned())]);
+    }
 }
 
 #[test]
@@ -190,7 +234,7 @@ fn a_first_picture_of_another_size_is_the_odd_one() {
         let mut source = open(folder.path().to_str().unwrap(), &with_fps(100.0)).unwrap();
         assert_eq!((source.info().width, source.info().height), (8, 6));
         if odd != 7 {
-            let expected = format!("picture {} (img_{odd:03}.pgm) is 3 x 2 px", odd - 1);
+            let expected = format!("frame {}: img_{odd:03}.pgm is 3 x 2 px", odd - 1);
             assert!(
                 source.info().warnings.iter().any(|w| w.to_string().contains(&expected)),
                 "{:?}",

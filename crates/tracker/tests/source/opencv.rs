@@ -7,7 +7,7 @@ use tracker::detect::{DetectSettings, Detection, Detector, Levels};
 use tracker::frame::Ending;
 use tracker::source::{Decoder, OpenOptions, open};
 
-use crate::film::{WIDTH, encode, have_ffmpeg, read_all, real, samples};
+use crate::film::{WIDTH, encode, have_ffmpeg, index_of, read_all, real, samples};
 
 /// Centre of what is brighter than the middle of the picture's range, weighted by how much brighter.
 fn centre(values: &[u32]) -> (f64, f64) {
@@ -226,5 +226,58 @@ fn a_name_that_is_not_utf_8_is_read() {
         let mut source = open(&tracker::name::text(&path), &options).unwrap();
         assert_eq!(source.sample(3).unwrap().len(), 3, "{name:?}");
         assert_eq!(read_all(&mut *source).len(), 6, "{name:?}");
+    }
+}
+
+#[test]
+fn opencv_s_pictures_have_the_damage_and_the_times_that_the_first_decoder_tells() {
+    if !have_ffmpeg() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    const COUNT: usize = 60;
+    let open_with = |path: &Path, decoder| {
+        open(path.to_str().unwrap(), &OpenOptions { decoder, ..OpenOptions::default() }).unwrap()
+    };
+    for (name, arguments) in [
+        ("a.mp4", &["-c:v", "libx264", "-g", "20", "-bf", "2", "-movflags", "faststart"][..]),
+        ("a.mkv", &["-c:v", "ffv1", "-level", "3", "-g", "1"]),
+        ("a.mov", &["-c:v", "png", "-movflags", "faststart"]),
+        ("a.avi", &["-c:v", "mjpeg", "-q:v", "2", "-pix_fmt", "yuvj420p"]),
+        ("a.webm", &["-c:v", "libvpx-vp9", "-g", "20", "-deadline", "realtime"]),
+        ("a.ts", &["-c:v", "libx264", "-g", "20", "-bf", "2"]),
+        ("a.mpg", &["-vf", "setpts=N/50/TB", "-r", "50", "-c:v", "mpeg2video", "-q:v", "2"]),
+    ] {
+        let path = encode(folder.path(), name, COUNT, arguments);
+        let whole = std::fs::read(&path).unwrap();
+        let middle = whole.len() / 2;
+        let mut noise = whole.clone();
+        noise[middle..middle + 60].iter_mut().for_each(|b| *b = b.wrapping_mul(31).wrapping_add(17));
+        let cut_out = [&whole[..middle], &whole[middle + 1500..]].concat();
+        let cut_off = whole[..whole.len() * 83 / 100].to_vec();
+        for (how, bytes) in
+            [("whole", &whole), ("noise", &noise), ("cut out", &cut_out), ("cut off", &cut_off)]
+        {
+            std::fs::write(&path, bytes).unwrap();
+            // A film whose index is cut out of it cannot be opened at all.
+            let Ok(mut first) = open(path.to_str().unwrap(), &OpenOptions::default()) else { continue };
+            let mut second = open_with(&path, Decoder::Opencv);
+            let (a, b) = (read_all(&mut *first), read_all(&mut *second));
+            let lost = |frames: &[tracker::frame::Frame]| frames.iter().filter(|f| f.plane.is_none()).count();
+            if how == "whole" {
+                assert_eq!((lost(&b), second.ending()), (0, Ending::Complete), "{name}");
+            }
+            assert_eq!(second.gaps(), first.gaps(), "{name} {how}");
+            let is_damaged = lost(&a) > 0 || first.gaps().is_damage() || first.ending() != Ending::Complete;
+            let is_told = lost(&b) > 0 || second.gaps().is_damage() || second.ending() != Ending::Complete;
+            assert!(is_told || !is_damaged, "{name} {how}");
+            for (p, q) in a.iter().zip(&b) {
+                assert_eq!((p.index, p.ticks), (q.index, q.ticks), "{name} {how}");
+                if let (Some(u), Some(v)) = (samples(p), samples(q)) {
+                    let told = [u, v].map(|pixels| index_of(&pixels, 255));
+                    assert_eq!(told[0], told[1], "{name} {how} frame {}", p.index);
+                }
+            }
+        }
     }
 }

@@ -234,3 +234,91 @@ fn pixels_of_another_shape_in_mid_film_are_refused_unless_one_shape_is_given() {
         assert_eq!(refusal(&path, &given), "");
     }
 }
+
+/// A film of pictures as they are coded, one after another.
+fn film_of(folder: &Path, ending: &str, to: &str, pictures: &[Vec<u8>]) -> PathBuf {
+    let (from, path) = (folder.join(format!("coded.{ending}")), folder.join(to));
+    std::fs::write(&from, pictures.concat()).unwrap();
+    if from != path {
+        let pipe = if ending == "png" { "png_pipe" } else { "mjpeg" };
+        let status = std::process::Command::new("ffmpeg")
+            .args(["-v", "error", "-y", "-framerate", "100", "-f", pipe, "-i"])
+            .arg(&from)
+            .args(["-c", "copy"])
+            .arg(&path)
+            .status();
+        assert!(status.unwrap().success());
+    }
+    path
+}
+
+#[test]
+fn pictures_inside_films_are_turned_as_they_say() {
+    if !have_ffmpeg() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    for number in 1..=8u16 {
+        // What the picture alone gives is held to the standard's figure above.
+        let alone = folder.path().join("a.jpg");
+        std::fs::write(&alone, jpeg(number, false)).unwrap();
+        let (size, _, warned) = first(&alone);
+        let stored: Vec<u32> = picture(3).iter().map(|v| u32::from(*v)).collect();
+        for big_endian in [false, true] {
+            let pictures = vec![jpeg(number, big_endian); 4];
+            for to in ["a.mjpeg", "a.avi", "a.mov", "a.mkv"] {
+                let path = film_of(folder.path(), "jpg", to, &pictures);
+                let (own, pixels, own_warned) = first(&path);
+                assert_eq!(own, size, "{to} {number}");
+                let is_told = |words: &str| words.contains("turned as the file says");
+                assert_eq!(is_told(&own_warned), is_told(&warned), "{to} {number}: {own_warned}");
+                // JPEG loses some levels; its two decoders differ by some too.
+                let truth = seen(&stored, number).1;
+                let off = pixels.iter().zip(&truth).filter(|(a, b)| a.abs_diff(**b) > 40).count();
+                assert!(off * 100 < truth.len(), "{to} {number}: {off} px");
+                let all = read_all(&mut *source(&path));
+                assert!(all.iter().all(|f| f.plane.is_some()), "{to} {number}");
+            }
+        }
+        let path = film_of(folder.path(), "png", "p.mov", &vec![png(number, false); 3]);
+        assert_eq!((first(&path).0, first(&path).1), seen(&stored, number), "PNG {number}");
+    }
+}
+
+#[test]
+fn a_film_s_picture_that_is_to_be_turned_otherwise_is_not_believed() {
+    if !have_ffmpeg() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let untagged = coded(".jpg");
+    let pictures = [jpeg(6, false), untagged, jpeg(8, false), jpeg(6, true)];
+    let path = film_of(folder.path(), "jpg", "a.avi", &pictures);
+    let frames = read_all(&mut *source(&path));
+    let whole: Vec<bool> = frames.iter().map(|f| f.plane.is_some()).collect();
+    assert_eq!(whole, [true, true, false, true]);
+}
+
+#[test]
+fn pictures_through_a_pipe_are_turned_as_they_say() {
+    let folder = tempfile::tempdir().unwrap();
+    let stored: Vec<u32> = picture(3).iter().map(|v| u32::from(*v)).collect();
+    for number in [3u16, 6, 8] {
+        for pictures in [vec![png(number, true); 3], vec![jpeg(number, true); 3]] {
+            let pipe = folder.path().join(format!("pipe{number}-{}", pictures[0].len()));
+            assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+            let into = pipe.clone();
+            let is_png = pictures[0].starts_with(b"\x89PNG");
+            let writer = std::thread::spawn(move || std::fs::write(into, pictures.concat()));
+            let (size, pixels, warnings) = first(&pipe);
+            // The reader has left: what it did not take is not written.
+            let _ = writer.join().unwrap();
+            let truth = seen(&stored, number);
+            assert_eq!(size, truth.0, "{number}");
+            assert!(warnings.contains("turned as the file says"), "{number}: {warnings}");
+            let most = if is_png { 0 } else { 40 };
+            let off = pixels.iter().zip(&truth.1).filter(|(a, b)| a.abs_diff(**b) > most).count();
+            assert!(off * 100 <= if is_png { 0 } else { truth.1.len() }, "{number}: {off} px");
+        }
+    }
+}

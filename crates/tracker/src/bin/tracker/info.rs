@@ -134,6 +134,7 @@ fn look(source: &mut dyn FrameSource, count: bool) -> anyhow::Result<Seen> {
         seen.counted = Some(frames);
         seen.is_whole = true;
         seen.damage.gaps = source.gaps();
+        seen.damage.reasons = source.reasons();
         seen.brightest = seen.brightest.max(peak_of(&mut batch)?);
     }
     Ok(seen)
@@ -192,6 +193,7 @@ fn as_text(source: &dyn FrameSource, seen: &Seen, times: &Times, front: &Command
     if let Some(frames) = seen.counted {
         let lost = match seen.damage.undecoded.frames {
             0 => String::new(),
+            lost if !seen.damage.reasons.is_empty() => format!("; {lost} cannot be used"),
             lost => format!("; {lost} cannot be decoded"),
         };
         row("decoded", format!("{} frames{lost}", frames - seen.damage.undecoded.frames));

@@ -350,6 +350,12 @@ impl Packet {
         }
     }
 
+    /// Marks it as damaged, so that no decoder gets it.
+    pub(super) fn set_corrupt(&mut self) {
+        // SAFETY: never null after `new`, and this value owns it.
+        unsafe { (*self.0).flags |= ffi::AV_PKT_FLAG_CORRUPT };
+    }
+
     /// Replaces the packet's display time.
     pub(super) fn set_pts(&mut self, pts: i64) {
         // SAFETY: never null after `new`.

@@ -85,7 +85,8 @@ impl FfmpegSource {
     /// A transport stream is cut anywhere by those who record it.
     pub(super) fn ends_in_an_element(&self) -> bool {
         let declares = || self.info.declared_frames.is_some() || self.feed.demuxer.declared_end().is_some();
-        let is_certain = self.info.container == "matroska,webm" && !declares();
+        let is_certain =
+            self.feed.ends_in_pictures() || self.info.container == "matroska,webm" && !declares();
         self.feed.ends_broken() && (!self.feed.declares_length() || is_certain)
     }
 

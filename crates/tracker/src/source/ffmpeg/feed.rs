@@ -11,8 +11,10 @@ use super::decode::{Decoder, Received};
 use super::demux::{Demuxer, Packet, Read};
 use super::fields::{FieldOrder, Fields};
 use super::frame_numbers::FrameNumbers;
+use super::slice_sums::SliceSums;
 use super::slots::Slots;
 use super::structure::{Fit, Structure};
+use super::tags::Tags;
 use crate::error::Result;
 
 /// Frames in a row that cannot be read before the rest of a file is given up.
@@ -65,6 +67,8 @@ pub(super) struct Feed {
     slots: Option<Slots>,
     fields: Option<Fields>,
     numbers_in_film: Option<FrameNumbers>,
+    sums: Option<SliceSums>,
+    tags: Option<Tags>,
     has_single_fields: bool,
     /// Time and duration of the packet read last, ticks.
     last: Option<(i64, i64)>,
@@ -86,7 +90,8 @@ impl Feed {
         let structure = is_file.then(|| Structure::of(&container, name, id, is_alone)).flatten();
         let slots = (is_file && container == "avi").then(|| Slots::read(name, demuxer.index())).flatten();
         let fields = Fields::of(&demuxer);
-        let numbers_in_film = FrameNumbers::of(demuxer.parameters().codec_id, demuxer.codec_bytes());
+        let codec = demuxer.parameters().codec_id;
+        let numbers_in_film = FrameNumbers::of(codec, demuxer.codec_bytes());
         let mut feed = Self {
             demuxer,
             name: name.to_owned(),
@@ -95,6 +100,8 @@ impl Feed {
             slots,
             fields,
             numbers_in_film,
+            sums: SliceSums::of(codec),
+            tags: Tags::of(codec),
             has_single_fields: false,
             last: None,
             numbers: 0,
@@ -143,6 +150,11 @@ impl Feed {
         self.ends_broken
     }
 
+    /// Once [`Feed::ends_broken`] is known: whether the file ends inside something that holds pictures, whatever it declares.
+    pub(super) fn ends_in_pictures(&self) -> bool {
+        self.structure.as_ref().is_some_and(Structure::ends_in_pictures)
+    }
+
     /// Which field is first, for interlaced film: as the container says, else as the first picture does.
     pub(super) fn field_order(&self, name: &str) -> Result<Option<FieldOrder>> {
         let parameters = self.demuxer.parameters();
@@ -185,12 +197,22 @@ impl Feed {
                 Some(after) => given.is_damaged |= after.fit == Fit::Broken,
                 None => {
                     let rest = self.structure.as_mut().map_or(Fit::Whole, Structure::rest);
-                    self.ends_broken = rest != Fit::Whole && !self.is_declared_end();
+                    self.ends_broken =
+                        rest != Fit::Whole && (self.ends_in_pictures() || !self.is_declared_end());
                     given.is_damaged |= self.ends_broken;
                     given.is_cut |= self.ends_broken;
                 }
             }
         }
+        if let Some(sums) = &mut self.sums {
+            let is_after_loss = given.after_loss || given.after_damage;
+            if sums.is_damaged(given.packet.bytes(), is_after_loss, given.is_damaged) {
+                given.is_damaged = true;
+                // It may decode to anything, to interlaced pictures too.
+                given.packet.set_corrupt();
+            }
+        }
+        given.is_damaged |= self.tags.as_mut().is_some_and(|tags| tags.differs(given.packet.bytes()));
         Ok(Some(given))
     }
 

@@ -20,14 +20,17 @@ mod lost;
 mod order;
 mod reach;
 mod sample;
+mod slice_sums;
 mod slots;
 mod source;
 mod stamps;
+mod start;
 mod structure;
+mod tags;
+mod turning;
 mod units;
 mod watch;
 mod words;
 
 pub use source::FfmpegSource;
-pub(crate) use stamps::display_times;
 use words::{codec_name, message};

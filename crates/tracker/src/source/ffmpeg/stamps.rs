@@ -264,7 +264,7 @@ fn count_back(times: &mut [i64], step: f64) {
 ///
 /// # Errors
 /// [`Error::Source`] if the file cannot be read.
-pub(crate) fn display_times(
+pub(super) fn display_times(
     name: &str,
     input: &Input,
     most: usize,

@@ -18,6 +18,6 @@ mod stack;
 mod tiff_layout;
 mod tiff_page;
 
-pub(crate) use orientation_tag::is_turned;
+pub(crate) use orientation_tag::{is_turned, told as orientation_told};
 pub use sequence::SequenceSource;
 pub use stack::StackSource;

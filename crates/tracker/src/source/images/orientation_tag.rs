@@ -1,8 +1,8 @@
-//! Reads how a picture file says that it is to be turned: the tag Orientation of TIFF, and of EXIF in JPEG and PNG.
+//! Reads how a picture file says that it is to be turned: the tag Orientation of TIFF, and of EXIF in JPEG, PNG and WebP.
 //!
-//! Owns: [`of_file`], [`of_tiff`], [`is_turned`]. Must not: turn anything.
+//! Owns: [`told`], [`of_file`], [`of_tiff`], [`is_turned`]. Must not: turn anything.
 
-use std::io::{Read, Seek};
+use std::io::{Cursor, Read, Seek};
 use std::path::Path;
 
 use tiff::decoder::Decoder;
@@ -17,16 +17,30 @@ const SHORT: usize = 3;
 /// Bytes of an entry of such a directory.
 const ENTRY_BYTES: usize = 12;
 
+/// What the bytes of a picture file say; `None` if nothing.
+pub(crate) fn told(bytes: &[u8]) -> Option<Orientation> {
+    match bytes {
+        [b'I', b'I', 42 | 43, 0, ..] | [b'M', b'M', 0, 42 | 43, ..] => {
+            Decoder::new(Cursor::new(bytes)).ok().and_then(|mut decoder| tag_of_page(&mut decoder))
+        }
+        _ => by_exif(bytes),
+    }
+}
+
+/// What the EXIF block of a JPEG, PNG or WebP file says.
+fn by_exif(bytes: &[u8]) -> Option<Orientation> {
+    let block = match bytes {
+        [0x89, b'P', b'N', b'G', b'\r', b'\n', 0x1a, b'\n', ..] => in_png(bytes),
+        [0xff, 0xd8, ..] => in_jpeg(bytes),
+        [b'R', b'I', b'F', b'F', _, _, _, _, b'W', b'E', b'B', b'P', ..] => in_webp(bytes),
+        _ => None,
+    };
+    block.and_then(tag).and_then(Orientation::from_tag)
+}
+
 /// What the bytes of a JPEG or PNG file say.
 pub(super) fn of_file(bytes: &[u8]) -> Orientation {
-    let block = if bytes.starts_with(b"\x89PNG\r\n\x1a\n") {
-        in_png(bytes)
-    } else if bytes.starts_with(b"\xff\xd8") {
-        in_jpeg(bytes)
-    } else {
-        None
-    };
-    block.and_then(tag).and_then(Orientation::from_tag).unwrap_or_default()
+    by_exif(bytes).unwrap_or_default()
 }
 
 /// Whether a JPEG or PNG file says that it is to be turned; not where it cannot be read.
@@ -36,8 +50,12 @@ pub(crate) fn is_turned(path: &Path) -> bool {
 
 /// What the page at which a decoder stands says.
 pub(super) fn of_tiff<R: Read + Seek>(decoder: &mut Decoder<R>) -> Orientation {
+    tag_of_page(decoder).unwrap_or_default()
+}
+
+fn tag_of_page<R: Read + Seek>(decoder: &mut Decoder<R>) -> Option<Orientation> {
     let number = decoder.find_tag_unsigned::<u32>(Tag::Orientation).ok().flatten();
-    number.and_then(Orientation::from_tag).unwrap_or_default()
+    number.and_then(Orientation::from_tag)
 }
 
 /// A number of up to four bytes.
@@ -59,6 +77,21 @@ fn in_png(bytes: &[u8]) -> Option<&[u8]> {
         }
         // A checksum follows each chunk.
         at = end.checked_add(4)?;
+    }
+}
+
+/// The chunk `EXIF`, behind the pixels. Some writers begin it as JPEG does.
+fn in_webp(bytes: &[u8]) -> Option<&[u8]> {
+    let mut at = 12;
+    loop {
+        let length = number(bytes, at + 4, 4, false)?;
+        let data = at.checked_add(8)?;
+        let end = data.checked_add(length)?;
+        if bytes.get(at..at + 4)? == b"EXIF" {
+            let block = bytes.get(data..end)?;
+            return Some(block.strip_prefix(b"Exif\0\0").unwrap_or(block));
+        }
+        at = end.checked_add(length % 2)?;
     }
 }
 

@@ -94,6 +94,21 @@ pub(super) fn format(depth_bits: u32) -> PixelFormat {
     if depth_bits > 8 { PixelFormat::Gray16 } else { PixelFormat::Gray8 }
 }
 
+/// How a picture that stands for no frame is not as the recording's are.
+pub(super) fn other_kind(name: &str, odd: &Picture, info: &SourceInfo) -> String {
+    let own = (odd.width, odd.height, odd.depth_bits);
+    other_size(name, own, (info.width, info.height, info.depth_bits))
+}
+
+/// How a picture differs from most, each width and height in px and depth in bits.
+pub(super) fn other_size(name: &str, own: (u32, u32, u32), usual: (u32, u32, u32)) -> String {
+    let words = |(width, height, bits): (u32, u32, u32)| {
+        let depth = if own.2 == usual.2 { String::new() } else { format!(" of {bits} bits") };
+        format!("{width} x {height} px{depth}")
+    };
+    format!("{name} is {}, the others are {}", words(own), words(usual))
+}
+
 /// The frame of a picture, if its size and depth are the recording's.
 pub(super) fn frame(info: &SourceInfo, index: u64, picture: Option<Picture>) -> Frame {
     let bytes = if info.depth_bits > 8 { 2 } else { 1 };

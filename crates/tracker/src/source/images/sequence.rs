@@ -3,14 +3,15 @@
 //! Owns: [`SequenceSource`].
 
 use std::collections::VecDeque;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
-use super::picture::{Alike, Picture, format, frame, rate};
+use super::picture::{Alike, Picture, format, frame, other_kind, other_size, rate};
 use super::{names, picture_file, pixel_size};
 use crate::error::{Error, Fault, Result};
 use crate::frame::{Ending, Frame, FrameSource, RateClaims, SourceInfo};
+use crate::gaps::{Reason, keep_reason};
 use crate::message::Message;
 use crate::name::text;
 use crate::source::OpenOptions;
@@ -30,7 +31,10 @@ pub struct SequenceSource {
     next_file: usize,
     batch: usize,
     ready: VecDeque<Frame>,
-    damaged: Vec<String>,
+    /// Why frames are empty.
+    empty: Vec<Reason>,
+    /// Why the last of them is.
+    last_empty: String,
     ending: Ending,
 }
 
@@ -63,15 +67,17 @@ fn size_of_most<'a>(
             "Check that the pictures were copied whole; a file with several pictures is given by itself, without its folder",
         )));
     };
-    for (index, path, odd) in pictures.iter().filter(|(.., p)| kind(p) != kind(&pictures[best].2)) {
-        let (name, usual) = (path.file_name().unwrap_or_default().to_string_lossy(), &pictures[best].2);
-        warnings.push(format!(
-            "picture {index} ({name}) is {} x {} px of {} bits, most are {} x {} px of {}: such a frame stays empty",
-            odd.width, odd.height, odd.depth_bits, usual.width, usual.height, usual.depth_bits
-        ).into());
+    let usual = &pictures[best].2;
+    for (index, path, odd) in pictures.iter().filter(|(.., p)| kind(p) != kind(usual)) {
+        let size = other_size(&file_name(path), kind(odd), kind(usual));
+        warnings.push(format!("frame {index}: {size}: such a frame stays empty").into());
     }
     let (_, path, picture) = pictures.swap_remove(best);
     Ok((picture, path))
+}
+
+fn file_name(path: &Path) -> String {
+    text(path.file_name().unwrap_or_default())
 }
 
 /// A file and the picture in it, or what is wrong; `None` where the numbering leaves one out.
@@ -132,7 +138,8 @@ impl SequenceSource {
             next_file: 0,
             batch,
             ready: VecDeque::new(),
-            damaged: Vec::new(),
+            empty: Vec::new(),
+            last_empty: String::new(),
             ending: Ending::Complete,
         })
     }
@@ -159,20 +166,23 @@ impl SequenceSource {
         let files = &self.files[range.clone()];
         let pictures: Vec<_> = threads::install(|| files.par_iter().map(read).collect());
         for (index, picture) in range.zip(pictures) {
-            let picture = match picture {
+            let (picture, problem) = match picture {
                 Some((path, Ok(picture))) => {
                     if self.is_one_of_them(&picture) {
                         self.alike.check(&text(path), index as u64, &picture)?;
                     }
-                    Some(picture)
+                    let problem = other_kind(&file_name(path), &picture, &self.info);
+                    (Some(picture), problem)
                 }
-                Some((_, Err(e))) => {
-                    self.damaged.push(format!("picture {index}: {e}"));
-                    None
-                }
-                None => None,
+                Some((path, Err(e))) => (None, format!("{}: {e}", file_name(path))),
+                None => (None, "no picture has its number".to_owned()),
             };
-            self.ready.push_back(frame(&self.info, index as u64, picture));
+            let frame = frame(&self.info, index as u64, picture);
+            if frame.plane.is_none() {
+                self.last_empty.clone_from(&problem);
+                keep_reason(&mut self.empty, frame.index, problem);
+            }
+            self.ready.push_back(frame);
         }
         self.next_file = end;
         Ok(())
@@ -193,9 +203,8 @@ impl SequenceSource {
         if self.next_file == whole && lost > 0 {
             self.ready.truncate(self.ready.len() - lost);
             let frames = (whole - lost) as u64;
-            let reason =
-                self.damaged.last().cloned().unwrap_or_else(|| "the last pictures do not fit".to_owned());
-            self.ending = Ending::Early { frames, byte: None, reason };
+            self.empty.retain(|reason| reason.frame < frames);
+            self.ending = Ending::Early { frames, byte: None, reason: std::mem::take(&mut self.last_empty) };
         }
     }
 }
@@ -218,6 +227,10 @@ impl FrameSource for SequenceSource {
 
     fn ending(&self) -> Ending {
         self.ending.clone()
+    }
+
+    fn reasons(&self) -> Vec<Reason> {
+        self.empty.clone()
     }
 
     fn sample(&mut self, count: usize) -> Result<Vec<Frame>> {

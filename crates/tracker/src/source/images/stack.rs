@@ -5,12 +5,13 @@ use std::io::BufReader;
 
 use tiff::decoder::Decoder;
 
-use super::picture::{Alike, Picture, format, frame, rate};
+use super::picture::{Alike, Picture, format, frame, other_kind, rate};
 use super::planes::{self, Declared, Planes};
 use super::tiff_layout::{Layout, is_reduced};
 use super::{orientation_tag, pixel_size, tiff_page};
 use crate::error::{Error, Fault, FaultKind, Result};
 use crate::frame::{Ending, Frame, FrameSource, RateClaims, SourceInfo};
+use crate::gaps::{Reason, keep_reason};
 use crate::message::Message;
 use crate::name::path;
 use crate::source::OpenOptions;
@@ -23,6 +24,8 @@ pub struct StackSource {
     alike: Alike,
     pictures: Pictures,
     next: u64,
+    /// Why frames are empty.
+    empty: Vec<Reason>,
     ending: Ending,
 }
 
@@ -143,6 +146,7 @@ impl StackSource {
                 alike,
                 pictures: Pictures::Planes(raw, planes),
                 next: 0,
+                empty: Vec::new(),
                 ending: Ending::Complete,
             });
         }
@@ -154,6 +158,7 @@ impl StackSource {
             alike,
             pictures: Pictures::Pages(Some(Box::new(Pages::open(name)?))),
             next: 0,
+            empty: Vec::new(),
             ending: Ending::Complete,
         })
     }
@@ -232,7 +237,12 @@ impl FrameSource for StackSource {
                     self.alike.check(&self.info.name, self.next, &picture)?;
                 }
                 self.next += 1;
-                return Ok(Some(frame(&self.info, self.next - 1, Some(picture))));
+                let (index, problem) = (self.next - 1, other_kind("the page", &picture, &self.info));
+                let frame = frame(&self.info, index, Some(picture));
+                if frame.plane.is_none() {
+                    keep_reason(&mut self.empty, index, problem);
+                }
+                return Ok(Some(frame));
             }
             Ok(None) => self.ending = self.short().unwrap_or_else(|| self.ending.clone()),
             // Pages are a chain: what follows a broken one is not found.
@@ -252,6 +262,10 @@ impl FrameSource for StackSource {
 
     fn ending(&self) -> Ending {
         self.ending.clone()
+    }
+
+    fn reasons(&self) -> Vec<Reason> {
+        self.empty.clone()
     }
 
     fn sample(&mut self, count: usize) -> Result<Vec<Frame>> {

@@ -9,6 +9,8 @@ use super::{Fit, Walk};
 /// Boxes of a fragmented film's fragment: its header, what it holds.
 const FRAGMENT: [u8; 4] = *b"moof";
 const BODY: [u8; 4] = *b"mdat";
+/// What may follow the last fragment and holds no pictures.
+const NO_PICTURES: [[u8; 4]; 6] = [*b"mfra", *b"free", *b"skip", *b"udta", *b"meta", *b"uuid"];
 
 /// Where the boxes stop to fit together, found before the first packet: there are few.
 #[derive(Debug, Default)]
@@ -20,6 +22,9 @@ pub(super) struct Boxes {
     bodies: VecDeque<Range<u64>>,
     /// It gave one of the first of these.
     is_given: bool,
+    /// The chain of a fragmented film ends in a box that may hold pictures, and does not end with the file: of fragments
+    /// nothing tells how many there are.
+    lacks_fragments: bool,
 }
 
 impl Boxes {
@@ -27,10 +32,14 @@ impl Boxes {
     pub(super) fn new(file: &mut Bytes, is_alone: bool) -> Self {
         let mut boxes = Self::default();
         let (mut at, mut number) = (0, None);
-        let mut follows_header = false;
+        let (mut follows_header, mut is_fragmented) = (false, false);
         while at < file.length() {
             let Some((end, kind)) = header(file, at) else {
-                boxes.breaks.push((at, Fit::Broken));
+                let holds_none = |kind| NO_PICTURES.contains(&kind);
+                boxes.lacks_fragments = is_fragmented && !file.array(at + 4).is_some_and(holds_none);
+                if !is_fragmented || boxes.lacks_fragments {
+                    boxes.breaks.push((at, Fit::Broken));
+                }
                 break;
             };
             if kind == FRAGMENT {
@@ -44,6 +53,7 @@ impl Boxes {
                 boxes.bodies.push_back(at..end);
             }
             follows_header = kind == FRAGMENT;
+            is_fragmented |= follows_header;
             at = end;
         }
         boxes
@@ -88,5 +98,9 @@ impl Walk for Boxes {
 
     fn rest(&mut self, file: &mut Bytes) -> Fit {
         self.reach(file, u64::MAX)
+    }
+
+    fn ends_in_pictures(&self) -> bool {
+        self.lacks_fragments
     }
 }

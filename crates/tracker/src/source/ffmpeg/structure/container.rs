@@ -53,4 +53,9 @@ impl Structure {
     pub(in super::super) fn rest(&mut self) -> Fit {
         self.walk.rest(&mut self.file)
     }
+
+    /// After [`Structure::rest`]: whether the file ends inside something that holds pictures.
+    pub(in super::super) fn ends_in_pictures(&self) -> bool {
+        self.walk.ends_in_pictures()
+    }
 }

@@ -41,6 +41,8 @@ pub(super) struct Matroska {
     passed: bool,
     /// The walk lost its way and waits for a block to go on from.
     adrift: bool,
+    /// The last cluster, or the last block in it, ends past the file.
+    ends_in_pictures: bool,
 }
 
 /// An element's header.
@@ -202,6 +204,14 @@ impl Matroska {
         }
     }
 
+    /// Whether the walk stands at a block that ends past the file.
+    fn is_cut_block(&self, file: &mut Bytes) -> bool {
+        let length = file.length();
+        let cut =
+            |e: Element| (BLOCKS.contains(&e.id) || e.id == GROUP) && e.end.is_some_and(|end| end > length);
+        self.cluster.is_some() && element(file, self.at).is_some_and(cut)
+    }
+
     /// Stands at the block whose content begins at `to`, if its header is there.
     fn resume(&mut self, file: &mut Bytes, to: u64) {
         self.adrift = true;
@@ -244,12 +254,18 @@ impl Walk for Matroska {
     fn rest(&mut self, file: &mut Bytes) -> Fit {
         while !self.adrift && self.at < file.length() {
             if self.step(file, u64::MAX).is_none() {
+                self.ends_in_pictures = self.is_cut_block(file);
                 return Fit::Broken;
             }
         }
+        self.ends_in_pictures = self.cluster.flatten().is_some_and(|end| end > file.length());
         // A cluster or a segment that ends past the file is cut, even where its last block is whole.
         let ends = [self.cluster.flatten(), self.segment_end];
         let whole = !self.adrift && ends.iter().flatten().all(|end| *end <= file.length());
         if whole { Fit::Whole } else { Fit::Broken }
+    }
+
+    fn ends_in_pictures(&self) -> bool {
+        self.ends_in_pictures
     }
 }

@@ -22,6 +22,12 @@ pub(super) trait Walk: Send {
 
     /// Goes on to the end of the file. How all elements up to there fit together.
     fn rest(&mut self, file: &mut Bytes) -> Fit;
+
+    /// After [`Walk::rest`]: whether the file ends inside something that holds pictures, so that some lack whatever length
+    /// the file declares.
+    fn ends_in_pictures(&self) -> bool {
+        false
+    }
 }
 
 /// A container of elements one after the other, each of which says where it ends.

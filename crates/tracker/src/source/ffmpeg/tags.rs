@@ -1,0 +1,58 @@
+//! Reads how the coded pictures of a film say themselves that they are to be turned, as JPEG, PNG, TIFF and WebP can.
+//!
+//! Owns: [`Tags`]. Must not: turn anything.
+
+use ffmpeg_next::ffi;
+
+use crate::source::images::orientation_told;
+use crate::source::orientation::Orientation;
+
+/// Codecs whose packets are whole picture files.
+pub(super) const PICTURES: [ffi::AVCodecID; 5] = [
+    ffi::AVCodecID::AV_CODEC_ID_MJPEG,
+    ffi::AVCodecID::AV_CODEC_ID_PNG,
+    ffi::AVCodecID::AV_CODEC_ID_APNG,
+    ffi::AVCodecID::AV_CODEC_ID_TIFF,
+    ffi::AVCodecID::AV_CODEC_ID_WEBP,
+];
+
+/// What the pictures of a film say.
+pub(super) struct Tags {
+    /// What the first one says; nothing is not turned.
+    first: Option<Orientation>,
+}
+
+impl Tags {
+    /// `None` for a codec whose pictures say nothing.
+    pub(super) fn of(codec: ffi::AVCodecID) -> Option<Self> {
+        PICTURES.contains(&codec).then_some(Self { first: None })
+    }
+
+    /// Whether a picture says otherwise than the first one, as none does that is whole. One that says nothing is like the
+    /// first: some cameras tag the first picture alone.
+    pub(super) fn differs(&mut self, packet: &[u8]) -> bool {
+        let own = orientation_told(packet);
+        let first = *self.first.get_or_insert(own.unwrap_or_default());
+        own.is_some_and(|own| own != first)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_picture_that_says_nothing_is_like_the_first() {
+        // The start of a JPEG picture, with the tag Orientation if it is not 0.
+        let jpeg = |orientation: u8| {
+            let mut bytes =
+                b"\xff\xd8\xff\xe1\0\x22Exif\0\0MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0".to_vec();
+            bytes.extend([orientation, 0, 0, 0, 0, 0, 0]);
+            if orientation == 0 { b"\xff\xd8\xff\xda".to_vec() } else { bytes }
+        };
+        let mut tags = Tags::of(ffi::AVCodecID::AV_CODEC_ID_MJPEG).unwrap();
+        let told: Vec<bool> = [6, 0, 6, 8, 6].map(|tag| tags.differs(&jpeg(tag))).to_vec();
+        assert_eq!(told, [false, false, false, true, false]);
+        assert!(Tags::of(ffi::AVCodecID::AV_CODEC_ID_H264).is_none());
+    }
+}
