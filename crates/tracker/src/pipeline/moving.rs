@@ -379,6 +379,122 @@ fn pointed(film: &WorkFilm, search: &Search, places: &[Pointed]) -> Result<Found
                 let why = format!("at {} {}", shown(k), missed_words(missed, film.shrink() as f64));
                 return Ok(Found::unclear(Unclear::new(why, point_at(&candidates)), candidates));
             }
+            if let Some(collected) = &mut collected {
+                collected.push(stamp.index, time_s, observations);
+            }
+            tally.push(observations);
+        }
+        let mut damage = Damage { gaps: self.gaps.clone(), ..Damage::default() };
+        self.stamps.iter().filter(|s| !s.decoded).for_each(|s| damage.undecoded.push(s.index));
+        let mut warnings = info.warnings.clone();
+        warnings.extend(timing::notes(&timing));
+        warnings.extend(damage.gaps.dropped_words().map(Message::from));
+        warnings.extend(self.notes());
+        let mut doubtful = Vec::new();
+        for (node, usual) in self.doubtful() {
+            let name = rig.nodes[node].name.clone();
+            warnings.push(
+                format!(
+                    "the centre of {name} depends on what is taken for the marker: brightness, colour and outline have centres \
+                     that differ; its standard uncertainty is {usual:.1} px in half of the frames"
+                )
+                .into(),
+            );
+            doubtful.push(name);
+        }
+        let meta = TableMeta {
+            schema_version: SCHEMA_VERSION,
+            tool: TableMeta::this_tool(),
+            settings: self.settings_json(settings, &facts),
+            source: SourceFacts { rate_hz: timing.rate_hz, rate_origin: timing.rate_origin, ..facts },
+            time: Some(timing),
+            ending: match self.ending {
+                Ending::Early { frames, byte, reason } => RunEnding::Early { frames, byte, reason },
+                Ending::Complete if damage.is_damaged() => RunEnding::Damaged,
+                Ending::Complete => RunEnding::Complete,
+            },
+            rig,
+            damage,
+        };
+        if let Some(writer) = writer {
+            writer.finish(&meta)?;
+        }
+        Ok(Outcome::Followed(Box::new(RunSummary {
+            frames: self.rows.len() as u64,
+            resumed: 0,
+            resumable: false,
+            moving: true,
+            doubtful,
+            nodes: tally.summary(),
+            warnings,
+            table: collected.map(|rows| NodeTable { meta: meta.clone(), rows }),
+            meta,
+        })))
+    }
+
+    fn settings_json(&self, settings: &RunSettings, facts: &SourceFacts) -> Value {
+        let detect = DetectSettings { pixel_aspect: facts.pixel_aspect, ..settings.detect.clone() };
+        let mut all = json!({
+            "detect": detect,
+            MOVING: {
+                "bright": self.followed.model.sign > 0.0,
+                "octave": self.followed.model.octave,
+                "radius_px": self.followed.radius_px * self.scale,
+                "confidence": self.followed.confidence,
+                "others": self.followed.others.len(),
+                "copies": self.copies,
+            },
+            "fps": settings.open.fps,
+            "decoder": settings.open.decoder,
+            "frames": settings.frames_json(),
+            "rig": if settings.rig.is_some() { "given" } else { "found" },
+        });
+        if !settings.interlaced_json().is_null() {
+            all["interlaced"] = settings.interlaced_json();
+        }
+        all
+    }
+
+    /// For each node of a given rig the column of the marker that is at its place in the reference frame; `None` where one has
+    /// none.
+    fn named(&self, rig: &Rig) -> Option<Vec<usize>> {
+        let near_px = NAMED_RADII * self.followed.radius_px * self.scale;
+        let row = &self.rows[self.stamps.iter().position(|s| Some(s.index) == rig.reference_frame)?];
+        let mut order = Vec::with_capacity(rig.nodes.len());
+        for node in &rig.nodes {
+            let off = |k: &usize| (row[*k].x_px - node.x_px).hypot(row[*k].y_px - node.y_px);
+            let free = (0..row.len()).filter(|k| !order.contains(k) && row[*k].status.is_seen());
+            order.push(free.min_by(|a, b| off(a).total_cmp(&off(b))).filter(|k| off(k) < near_px)?);
+        }
+        Some(order)
+    }
+
+    /// One body for each node; the reference frame is the first in which all are seen, if there is one.
+    fn rig(&self, facts: &SourceFacts) -> Rig {
+        let image = |o: &Observation| [o.x_px, o.y_px];
+        let whole = self.rows.iter().position(|r| r.iter().all(|o| o.status.is_seen()));
+        let place = |node: usize| match whole {
+            Some(frame) => image(&self.rows[frame][node]),
+            None => self.rows.iter().map(|r| &r[node]).find(|o| o.status.is_seen()).map_or([0.0; 2], image),
+        };
+        let name = |node: usize| format!("body{}", node + 1);
+        let count = self.followed.tracks.len();
+        Rig {
+            schema: RIG_SCHEMA,
+            image_px: [facts.width, facts.height],
+            pixel_aspect: facts.pixel_aspect,
+            reference_frame: whole.map(|f| self.stamps[f].index),
+            region: None,
+            lens: None,
+            camera: None,
+            bodies: (0..count).map(|k| Body { name: name(k) }).collect(),
+            nodes: (0..count)
+                .map(|k| {
+                    let [x_px, y_px] = place(k);
+                    Node { name: format!("n{k}"), body: name(k), x_px, y_px }
+                })
+                .collect(),
+            joints: Vec::new(),
         }
     }
     finish(film, &mut markers)?;
