@@ -178,7 +178,7 @@ mod tests {
             let t = f64::from(k);
             // They meet at frame 50 in one place.
             let mut frame = vec![at(100.0 + 2.0 * t, 100.0 + t), at(300.0 - 2.0 * t, 200.0 - t)];
-            if (48..53).contains(&k) {
+            if (49..53).contains(&k) {
                 frame = vec![at(200.0, 150.0)];
             }
             linker.push(k as usize, &frame);
