@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from pydpend._tracker import plane_places, recorded_places
+from pydpend._native import plane_places, recorded_places
 from pydpend.errors import CHECK, AnglesError, Setting, fault
 from pydpend.kinematics.table import Floats
 
