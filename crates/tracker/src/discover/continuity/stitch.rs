@@ -32,6 +32,8 @@ const CLEAR_RAD: f64 = 0.3;
 /// Agreement of the poses on a joint, px, and in standard uncertainties.
 const JOINT_PX: f64 = 0.3;
 const JOINT_SIGMA: f64 = 8.0;
+/// Misfit of the best fixed point of a body that has none, px.
+const WANDERING_PX: f64 = 5.0;
 
 /// Makes one of two bodies that turn as one. Whether it did.
 pub(super) fn merge(evidence: &Evidence<'_>, bodies: &mut Vec<TrackletBody>) -> bool {
@@ -115,38 +117,61 @@ struct Fitting {
     /// For each marker of `from` that of `to`; `None` is a new one.
     markers: Vec<Option<usize>>,
     off_px: f64,
+    /// Joints with the same third body that agree.
+    common: usize,
 }
 
 /// Makes one of the two pieces of a body that agree best, of those never seen together. Whether it did.
 pub(super) fn stitch(evidence: &Evidence<'_>, bodies: &mut Vec<TrackletBody>) -> bool {
     let joints = joints(evidence, bodies);
-    let mut best: Option<Fitting> = None;
+    // Two bodies that are seen at the same time, or of which one alone turns about a point of the ground.
+    let different = |a: usize, b: usize| {
+        let both = bodies[a].poses.iter().zip(&bodies[b].poses).filter(|(a, b)| a.is_some() && b.is_some());
+        both.count() > NEVER_FRAMES || clash(&joints, bodies, a, b)
+    };
+    let mut all: Vec<Fitting> = Vec::new();
     for to in 0..bodies.len() {
         for from in 0..bodies.len() {
-            let (a, b) = (&bodies[to], &bodies[from]);
-            let order = (a.markers.len(), std::cmp::Reverse(to)) > (b.markers.len(), std::cmp::Reverse(from));
-            let together = a.poses.iter().zip(&b.poses).filter(|(a, b)| a.is_some() && b.is_some()).count();
-            if to == from || !order || together > NEVER_FRAMES {
-                continue;
-            }
-            if let Some(f) = fitting(evidence, bodies, &joints, to, from)
-                && best.as_ref().is_none_or(|x| f.off_px < x.off_px)
-            {
-                best = Some(f);
+            let key = |b: usize| (bodies[b].markers.len(), std::cmp::Reverse(b));
+            if to != from && key(to) > key(from) && !different(to, from) {
+                all.extend(fitting(evidence, bodies, &joints, to, from));
             }
         }
     }
+    // A piece that may be of either of two bodies is that one's with which it has a joint in common, if the other has none.
+    let open = |f: &Fitting| {
+        all.iter().filter(|o| o.common >= f.common.min(1)).any(|o| {
+            [(f.to, f.from), (f.from, f.to)].into_iter().any(|(shared, own)| {
+                let rival = if o.to == shared { o.from } else { o.to };
+                (o.to == shared || o.from == shared) && rival != own && different(own, rival)
+            })
+        })
+    };
+    let best = all.iter().filter(|f| !open(f)).min_by(|x, y| x.off_px.total_cmp(&y.off_px));
     let Some(f) = best else { return false };
-    let mut markers = bodies[f.to].markers.clone();
-    for (tracklets, q) in bodies[f.from].markers.clone().into_iter().zip(f.markers) {
+    let (to, from) = (f.to, f.from);
+    let mut markers = bodies[to].markers.clone();
+    for (tracklets, q) in bodies[from].markers.clone().into_iter().zip(f.markers.clone()) {
         match q {
             Some(q) => markers[q].extend(tracklets),
             None => markers.push(tracklets),
         }
     }
-    bodies[f.to] = TrackletBody::fit(evidence, markers);
-    bodies.remove(f.from);
+    bodies[to] = TrackletBody::fit(evidence, markers);
+    bodies.remove(from);
     true
+}
+
+/// Whether one of two turns about a point of the ground and the other surely about none.
+fn clash(
+    joints: &[Vec<(Option<usize>, Turning)>],
+    bodies: &[TrackletBody],
+    one: usize,
+    other: usize,
+) -> bool {
+    let grounded = |b: usize| joints[b].iter().any(|(o, _)| o.is_none());
+    let wanders = |b: usize| bodies[b].joint(None).is_some_and(|t| t.rms_px > WANDERING_PX);
+    grounded(one) && wanders(other) || grounded(other) && wanders(one)
 }
 
 /// The joints of each body: with which other (`None` is the ground), and where.
@@ -225,7 +250,7 @@ fn fitting(
         },
     };
     let (off_px, markers, _) = ways.swap_remove(first);
-    clear.then_some(Fitting { to, from, markers, off_px })
+    clear.then_some(Fitting { to, from, markers, off_px, common: common.len() })
 }
 
 /// Poses of `b` in `a` in which its farthest two points, markers or common joints, are on two points of the same kind.
