@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 def off_deg(nodes: dp.Nodes, truth_rad: NDArray[np.float64]) -> NDArray[np.float64]:
     """Root mean square error of both angles, (2,), deg, but for a constant."""
-    found = dp.angles(nodes, estimator="rigid")
+    found = dp.angles(nodes, zero="vertical")
     off = found.phi_rad - truth_rad[found.frame]
     off = np.angle(np.exp(1j * (off - np.angle(np.nanmean(np.exp(1j * off), axis=0)))))
     return np.asarray(np.degrees(np.sqrt(np.nanmean(off**2, axis=0))))
@@ -30,9 +30,10 @@ def test_angles_are_those_of_the_plane(tmp_path: Path, view: dict[str, float]) -
     truth = film.truth().phi_rad
     corrected = off_deg(nodes, truth)
     plain = off_deg(dataclasses.replace(nodes, rig=dataclasses.replace(nodes.rig, camera=None)), truth)
-    # Without the camera a tilt of 10 deg costs 0.2 deg and a barrel of 20 % 0.08 deg of the upper link at least.
+    # Measured: 0.0015 deg; without the camera the lower link's is 0.9 deg off under the barrel. About a pivot in the picture's
+    # middle the upper link's angle is right under any barrel.
     assert (corrected < 0.02).all(), corrected
-    assert (plain > 3 * corrected).all(), (plain, corrected)
+    assert plain[1] > 20 * corrected[1], (plain, corrected)
 
 
 def test_a_rig_with_a_camera_survives_its_file(tmp_path: Path) -> None:
