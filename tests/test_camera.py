@@ -30,8 +30,8 @@ def test_angles_are_those_of_the_plane(tmp_path: Path, view: dict[str, float]) -
     truth = film.truth().phi_rad
     corrected = off_deg(nodes, truth)
     plain = off_deg(dataclasses.replace(nodes, rig=dataclasses.replace(nodes.rig, camera=None)), truth)
-    # Measured: 0.0015 deg; without the camera the lower link's is 0.9 deg off under the barrel. About a pivot in the picture's
-    # middle the upper link's angle is right under any barrel.
+    # Measured: 0.0015 deg; without the camera the lower link's is 0.9 deg off under the barrel. About a pivot in the
+    # picture's middle the upper link's angle is right under any barrel.
     assert (corrected < 0.02).all(), corrected
     assert plain[1] > 20 * corrected[1], (plain, corrected)
 

@@ -81,10 +81,16 @@ fn nothing_found(problem: impl Into<Message>, advice: Message) -> Error {
 pub(super) fn by_shape(store: &PlaneView<'_>, stop: &Stop) -> Result<Reading> {
     let mut sample = Sample::take(store, stop)?;
     if sample.frames.is_empty() {
-        return Err(nothing_found("no markers are seen in any frame", "Look at a frame and set " + Setting::Threshold + " or " + Setting::Polarity));
+        return Err(nothing_found(
+            "no markers are seen in any frame",
+            "Look at a frame and set " + Setting::Threshold + " or " + Setting::Polarity,
+        ));
     }
     if sample.at_rest {
-        return Err(nothing_found("nothing moves, so bodies cannot be told apart", "Give a rig with " + Setting::Rig + ", or a longer recording"));
+        return Err(nothing_found(
+            "nothing moves, so bodies cannot be told apart",
+            "Give a rig with " + Setting::Rig + ", or a longer recording",
+        ));
     }
     let mut found = moving_bodies(&mut sample, stop)?;
     let links: Vec<Link> = found.iter().map(|f| f.link.clone()).collect();
@@ -93,11 +99,17 @@ pub(super) fn by_shape(store: &PlaneView<'_>, stop: &Stop) -> Result<Reading> {
         lone::pair_up(&mut found, stop)?;
     }
     if found.is_empty() {
-        return Err(nothing_found("no marker can be followed", "Point at each with " + Setting::Marker + ", or give a rig with " + Setting::Rig));
+        return Err(nothing_found(
+            "no marker can be followed",
+            "Point at each with " + Setting::Marker + ", or give a rig with " + Setting::Rig,
+        ));
     }
     if let Some((a, b)) = bodies::alike(&links, stop)? {
         let (a, b) = (place_words(&found[a], &store.plane()), place_words(&found[b], &store.plane()));
-        return Err(nothing_found(format!("two bodies have the same marker layout, {a} and {b}: they cannot be told apart"), "Move a marker of one of them by some pixels, or say which is which with " + Setting::Rig));
+        return Err(nothing_found(
+            format!("two bodies have the same marker layout, {a} and {b}: they cannot be told apart"),
+            "Move a marker of one of them by some pixels, or say which is which with " + Setting::Rig,
+        ));
     }
     Ok(Reading { sample, found, links })
 }
@@ -106,7 +118,10 @@ pub(super) fn by_shape(store: &PlaneView<'_>, stop: &Stop) -> Result<Reading> {
 pub(super) fn by_continuity(store: &PlaneView<'_>, evidence: &Evidence<'_>, stop: &Stop) -> Result<Reading> {
     let found = continuity::bodies(evidence, stop)?;
     if found.is_empty() {
-        return Err(nothing_found("no marker can be followed", "Point at each with " + Setting::Marker + ", or give a rig with " + Setting::Rig));
+        return Err(nothing_found(
+            "no marker can be followed",
+            "Point at each with " + Setting::Marker + ", or give a rig with " + Setting::Rig,
+        ));
     }
     let standing = Sample::take(store, stop)?.standing;
     let sample = Sample::of(evidence.frames.clone(), standing, store, stop)?;
