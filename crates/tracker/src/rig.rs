@@ -342,7 +342,7 @@ impl Rig {
         let limits = [0.5, 0.5, 1.0, 1.0, 0.5];
         let keys = ["stretch", "stretch", "vanishing", "vanishing", "k1"];
         for ((value, limit), key) in camera.numbers().into_iter().zip(limits).zip(keys) {
-            if !(value.abs() <= limit) {
+            if value.is_nan() || value.abs() > limit {
                 return wrong(
                     name,
                     format!("camera.{key}"),
@@ -352,7 +352,7 @@ impl Rig {
             }
         }
         if let Some(c) = &camera.covariance
-            && (0..NUMBERS).any(|i| !(c[i][i] >= 0.0) || (0..NUMBERS).any(|j| !c[i][j].is_finite()))
+            && (0..NUMBERS).any(|i| c[i][i] < 0.0 || (0..NUMBERS).any(|j| !c[i][j].is_finite()))
         {
             return wrong(
                 name,

@@ -30,6 +30,11 @@ impl<'a> PlaneView<'a> {
         self.store.len()
     }
 
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.store.is_empty()
+    }
+
     /// Stamp of the `i`-th frame.
     pub fn stamp(&self, i: usize) -> FrameStamp {
         self.store.stamp(i)

@@ -82,7 +82,7 @@ pub fn track_recording(
         },
         scratch: Vec::new(),
     };
-    if store.len() == 0 {
+    if store.is_empty() {
         return Ok(out.summary);
     }
     let start = start_frame(store, rig);

@@ -38,10 +38,7 @@ pub(super) fn absorb(evidence: &Evidence<'_>, bodies: &mut [TrackletBody], free:
     let mut changed = false;
     loop {
         let mut again = false;
-        for t in 0..evidence.tracklets.len() {
-            if !free[t] {
-                continue;
-            }
+        for (t, free) in free.iter_mut().enumerate().filter(|(_, free)| **free) {
             let mut claims: Vec<Claim> = Vec::new();
             for (body, b) in bodies.iter().enumerate() {
                 claims.extend(by_pose(evidence, b, t).map(|(cost_px, marker)| Claim {
@@ -64,7 +61,7 @@ pub(super) fn absorb(evidence: &Evidence<'_>, bodies: &mut [TrackletBody], free:
             if rival.is_some_and(|r| r.cost_px < best.cost_px + CLEAR_PX) {
                 continue;
             }
-            free[t] = false;
+            *free = false;
             again = true;
             let mut markers = std::mem::take(&mut bodies[best.body].markers);
             match best.marker {
