@@ -66,11 +66,14 @@ def top_modules() -> list[str]:
 RUST_GROUPS: dict[str, tuple[tuple[str, ...], ...]] = {
     "tracker": (
         ("message", "name", "csv_text", "error", "setting_words", "stop", "output", "packed", "kind"),
-        ("pixel_aspect", "gaps", "frame", "gray", "observation", "timing", "peak_level", "rig", "wanted"),
+        (
+            *("pixel_aspect", "gaps", "frame", "gray", "camera", "observation", "timing", "peak_level"),
+            *("rig", "wanted"),
+        ),
         ("source",),
         ("detect",),
         ("table", "store"),
-        ("rigid",),
+        ("rigid", "link", "calibrate"),
         ("discover", "moving", "track"),
         ("synth",),
         ("residual", "score"),

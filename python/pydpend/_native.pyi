@@ -52,11 +52,13 @@ __all__ = [
     "learn_noise",
     "misplaced",
     "overlay_film",
+    "plane_places",
     "poincare_section",
     "ratios",
     "read_meta",
     "read_rig",
     "read_table",
+    "recorded_places",
     "recording_files",
     "rig_toml",
     "score_places",
@@ -242,6 +244,12 @@ def write_rig(path: str, rig: str) -> None:
 
 def rig_toml(rig: str) -> str:
     """A rig's TOML from its JSON."""
+
+def plane_places(rig: str, recorded_px: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Recorded places (n, 2) in the plane of the bodies, px, and the most that lengths are stretched there, (n, 3)."""
+
+def recorded_places(rig: str, plane_px: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Places (n, 2) of the plane in recorded pixels."""
 
 @final
 class Film:

@@ -32,7 +32,10 @@ from pydpend.tabular import TableResult
 StrPath: TypeAlias = AnyPath
 Codec: TypeAlias = Literal["h264", "ffv1", "mjpeg", "raw"]
 
-PRESETS = ("clean", "noisy", "dim", "glints", "late", "dropout", "occluded", "fast")
+PRESETS = (
+    *("clean", "noisy", "dim", "glints", "late", "dropout", "occluded", "fast"),
+    *("triple", "pairs", "symmetric"),
+)
 """The scenes that come with the program, by which tracking is judged."""
 
 

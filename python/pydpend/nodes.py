@@ -72,7 +72,8 @@ class Joint:
 class Rig:
     """Nodes, bodies and joints, and the picture in which they stand so.
 
-    Places are in recorded pixels, x right, y down; bodies are rigid in square pixels.
+    Places are in recorded pixels, x right, y down; bodies are rigid in square pixels,
+    with a camera in the plane that it films.
 
     Attributes
     ----------
@@ -92,6 +93,8 @@ class Rig:
         Distortion of the lens, as in the rig file.
     pixel_aspect : tuple of int
         Width and height of a pixel (16, 15 for pixels 1.0667 times as wide as high).
+    camera : dict or None
+        Tilt and lens of the camera that films the plane, as in the rig file.
     """
 
     image_px: tuple[int, int]
@@ -102,6 +105,7 @@ class Rig:
     region: dict[str, Any] | None = None
     lens: dict[str, Any] | None = None
     pixel_aspect: tuple[int, int] = (1, 1)
+    camera: dict[str, Any] | None = None
 
     @staticmethod
     def read(path: AnyPath) -> Rig:
@@ -169,7 +173,7 @@ class Rig:
         width, height = self.pixel_aspect
         if width != height:
             value["pixel_aspect"] = f"{width}:{height}"
-        for key in ("reference_frame", "region", "lens"):
+        for key in ("reference_frame", "region", "lens", "camera"):
             if getattr(self, key) is not None:
                 value[key] = getattr(self, key)
         value["body"] = [{"name": name} for name in self.bodies]
@@ -262,6 +266,7 @@ def _rig(value: dict[str, Any]) -> Rig:
         reference_frame=value.get("reference_frame"),
         region=value.get("region"),
         lens=value.get("lens"),
+        camera=value.get("camera"),
         pixel_aspect=(int(wide), int(high)),
     )
 

@@ -27,7 +27,7 @@ mod _native {
     #[pymodule_export]
     use super::live::{LiveTracker, detect};
     #[pymodule_export]
-    use super::rig::{read_rig, rig_toml, write_rig};
+    use super::rig::{plane_places, read_rig, recorded_places, rig_toml, write_rig};
     #[pymodule_export]
     use super::settings::{OutputSettings, OverlaySettings, PyDetectSettings, PyOpenOptions, setting_words};
     #[pymodule_export]

@@ -4,6 +4,7 @@
 
 use std::path::PathBuf;
 
+use numpy::{PyArray2, PyReadonlyArray2, ToPyArray, ndarray::Array2};
 use pyo3::prelude::*;
 use tracker::error::{Error, Fault};
 use tracker::rig::Rig;
@@ -39,4 +40,37 @@ pub fn write_rig(py: Python<'_>, path: PathBuf, rig: &str) -> PyResult<()> {
 #[pyfunction]
 pub fn rig_toml(py: Python<'_>, rig: &str) -> PyResult<String> {
     rig_of_json(rig).and_then(|r| r.to_toml()).map_err(|e| raise(py, e))
+}
+
+/// Places (n, 2) in recorded pixels in the plane in which a rig's bodies are rigid, with the most that lengths about each are
+/// stretched there, (n, 3).
+#[pyfunction]
+pub fn plane_places<'py>(
+    py: Python<'py>,
+    rig: &str,
+    recorded_px: PyReadonlyArray2<'py, f64>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let plane = rig_of_json(rig).map_err(|e| raise(py, e))?.plane();
+    let given = recorded_px.as_array();
+    let mut out = Array2::zeros((given.nrows(), 3));
+    for (to, from) in out.rows_mut().into_iter().zip(given.rows()) {
+        let (place, stretch) = plane.flatten([from[0], from[1]]);
+        to.into_iter().zip([place[0], place[1], stretch]).for_each(|(to, v)| *to = v);
+    }
+    Ok(out.to_pyarray(py))
+}
+
+/// The way back, (n, 2).
+#[pyfunction]
+pub fn recorded_places<'py>(
+    py: Python<'py>,
+    rig: &str,
+    plane_px: PyReadonlyArray2<'py, f64>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let plane = rig_of_json(rig).map_err(|e| raise(py, e))?.plane();
+    let mut out = plane_px.as_array().to_owned();
+    for mut row in out.rows_mut() {
+        [row[0], row[1]] = plane.recorded([row[0], row[1]]);
+    }
+    Ok(out.to_pyarray(py))
 }

@@ -37,6 +37,8 @@
     allow(dead_code, unused_imports, reason = "what only the left-out parts use")
 )]
 
+pub(crate) mod calibrate;
+pub mod camera;
 pub mod csv_text;
 pub mod detect;
 pub mod discover;
@@ -45,6 +47,7 @@ pub mod frame;
 pub mod gaps;
 mod gray;
 pub mod kind;
+pub(crate) mod link;
 pub mod message;
 pub mod moving;
 pub mod name;

@@ -4,7 +4,7 @@
 
 use nalgebra::Vector2;
 
-use crate::pixel_aspect::PixelAspect;
+use crate::camera::Plane;
 
 /// State of a node in a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -75,8 +75,16 @@ impl Observation {
     /// A node in a frame that could not be decoded.
     pub const UNDECODED: Self = Self { status: Status::Undecoded, ..Self::MISSING };
 
-    /// What is known in square pixels, in recorded ones.
-    pub(crate) fn to_recorded(mut self, aspect: PixelAspect) -> Self {
+    /// What is known in the plane, in recorded pixels.
+    pub(crate) fn to_recorded(mut self, plane: &Plane) -> Self {
+        let aspect = plane.pixel_aspect;
+        if let Some(camera) = &plane.camera
+            && self.x_px.is_finite()
+        {
+            let square = camera.to_picture(Vector2::new(self.x_px, self.y_px));
+            self.sigma_px /= camera.flatten(square).1 as f32;
+            [self.x_px, self.y_px] = square.into();
+        }
         if !aspect.is_square() {
             [self.x_px, self.y_px] = aspect.to_recorded(Vector2::new(self.x_px, self.y_px)).into();
             self.area_px = (f64::from(self.area_px) / aspect.ratio()) as f32;

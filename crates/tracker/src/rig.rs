@@ -7,6 +7,7 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
+use crate::camera::{Camera, NUMBERS, Plane};
 use crate::error::{Error, Fault, Place, Result};
 use crate::kind::{self, Kind};
 use crate::message::SETUP;
@@ -103,6 +104,46 @@ pub struct Lens {
     pub distortion: Vec<f64>,
 }
 
+/// Where a camera's numbers come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CameraOrigin {
+    /// The user.
+    Given,
+    /// The recording: bodies are rigid.
+    Found,
+}
+
+/// What the camera makes of the plane in which the bodies move; see [`Camera`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RigCamera {
+    /// Whether it was found in the recording.
+    pub origin: CameraOrigin,
+    /// Logarithm of the stretch along x and along the diagonal, `[a, b]`.
+    pub stretch: [f64; 2],
+    /// The plane's vanishing line, in one over half the picture's diagonal, `[v1, v2]`.
+    pub vanishing: [f64; 2],
+    /// Part by which the lens moves the picture's corners outwards.
+    pub k1: f64,
+    /// Covariance of a, b, v1, v2, k1; `None` is exact.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub covariance: Option<[[f64; NUMBERS]; NUMBERS]>,
+}
+
+impl RigCamera {
+    /// A camera as a rig has it.
+    pub fn of(camera: &Camera, covariance: Option<[[f64; NUMBERS]; NUMBERS]>, origin: CameraOrigin) -> Self {
+        let [a, b, v1, v2, k1] = camera.numbers();
+        Self { origin, stretch: [a, b], vanishing: [v1, v2], k1, covariance }
+    }
+
+    /// a, b, v1, v2, k1.
+    pub fn numbers(&self) -> [f64; NUMBERS] {
+        [self.stretch[0], self.stretch[1], self.vanishing[0], self.vanishing[1], self.k1]
+    }
+}
+
 /// Nodes, bodies, joints and the frame in which they stand so.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -127,6 +168,9 @@ pub struct Rig {
     /// What was said of what to follow; a run with this rig follows the same.
     #[serde(default, skip_serializing_if = "Wanted::is_default")]
     pub wanted: Wanted,
+    /// How the camera stands; `None` faces the bodies' plane squarely.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera: Option<RigCamera>,
     /// Bodies, from the pivot outwards.
     #[serde(rename = "body", default)]
     pub bodies: Vec<Body>,
@@ -216,6 +260,16 @@ impl Rig {
         })
     }
 
+    /// The plane in which bodies are rigid.
+    pub fn plane(&self) -> Plane {
+        let [w, h] = self.image_px.map(f64::from);
+        let size_px = [w * self.pixel_aspect.ratio(), h];
+        Plane {
+            pixel_aspect: self.pixel_aspect,
+            camera: self.camera.as_ref().map(|c| Camera::new(c.numbers(), size_px)),
+        }
+    }
+
     /// Index of a body by its name.
     pub fn body_index(&self, name: &str) -> Option<usize> {
         self.bodies.iter().position(|b| b.name == name)
@@ -276,9 +330,38 @@ impl Rig {
                     .advice("Add [[node]] entries or run " + SETUP),
             ));
         }
+        self.check_camera(name)?;
         self.check_bodies(name)?;
         self.check_nodes(name)?;
         self.check_joints(name)
+    }
+
+    /// A camera that films a plane has numbers near those of a square one, and a covariance is one.
+    fn check_camera(&self, name: &str) -> Result<()> {
+        let Some(camera) = &self.camera else { return Ok(()) };
+        let limits = [0.5, 0.5, 1.0, 1.0, 0.5];
+        let keys = ["stretch", "stretch", "vanishing", "vanishing", "k1"];
+        for ((value, limit), key) in camera.numbers().into_iter().zip(limits).zip(keys) {
+            if value.is_nan() || value.abs() > limit {
+                return wrong(
+                    name,
+                    format!("camera.{key}"),
+                    format!("{value} is no camera's, its size is at most {limit}"),
+                    "Give what was found in a recording of this camera, or leave the camera out",
+                );
+            }
+        }
+        if let Some(c) = &camera.covariance
+            && (0..NUMBERS).any(|i| c[i][i] < 0.0 || (0..NUMBERS).any(|j| !c[i][j].is_finite()))
+        {
+            return wrong(
+                name,
+                "camera.covariance".into(),
+                "it is no covariance: a variance is below 0 or a number is not finite".into(),
+                "Leave it out",
+            );
+        }
+        Ok(())
     }
 
     /// Each body has a name of its own.

@@ -11,7 +11,7 @@ from pydpend.errors import CHECK, AnglesError, Setting, fault, one_of
 from pydpend.kinematics.hanging import Raw, zero_for
 from pydpend.kinematics.linkage import Linkage, Shape, first_shape
 from pydpend.kinematics.linkage_frames import checked_sigma, fit_linkage
-from pydpend.kinematics.markers import BodyMarkers, body_markers, to_image
+from pydpend.kinematics.markers import BodyMarkers, body_markers, sigma_to_image, to_image
 from pydpend.kinematics.pairwise import pair_angles
 from pydpend.kinematics.pose import Pose, fit_pose
 from pydpend.kinematics.table import Floats, LinkAngles
@@ -267,7 +267,7 @@ def _linkage_meta(
     """Places in recorded pixels, lengths and the scale in square ones."""
     meta: dict[str, Any] = {
         "pivot_px": to_image(linkage.shape.pivot_px, rig, mirrored).tolist(),
-        "pivot_sigma_px": np.abs(to_image(linkage.pivot_sigma_px, rig)).tolist(),
+        "pivot_sigma_px": sigma_to_image(linkage.pivot_sigma_px, rig).tolist(),
         "sigma_scale": linkage.sigma_scale,
     }
     if linkage.shape.links == 2:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from pydpend._native import plane_places, recorded_places
 from pydpend.errors import CHECK, AnglesError, Setting, fault
 from pydpend.kinematics.table import Floats
 
@@ -54,17 +55,40 @@ class BodyMarkers:
 
 
 def to_world(xy_px: Floats, rig: Rig, mirrored: bool = False) -> Floats:
-    """Image places (..., 2), y down, to square pixels in world directions, y up.
+    """Image places (..., 2), y down, to square pixels of the bodies' plane in world directions, y up.
 
     With ``mirrored``, which turns x round as well, a film taken from behind, or flipped by the camera, gives the angles
     seen from the front.
     """
-    return np.asarray(xy_px * _scale(rig, mirrored))
+    if rig.camera is None:
+        return np.asarray(xy_px * _scale(rig, mirrored))
+    return np.asarray(_flat(xy_px, rig)[..., :2] * _turn(mirrored))
 
 
 def to_image(xy_px: Floats, rig: Rig, mirrored: bool = False) -> Floats:
     """The way back."""
-    return np.asarray(xy_px / _scale(rig, mirrored))
+    if rig.camera is None:
+        return np.asarray(xy_px / _scale(rig, mirrored))
+    plane = np.asarray(xy_px, dtype=np.float64) * _turn(mirrored)
+    return recorded_places(rig.to_json(), plane.reshape(-1, 2)).reshape(plane.shape)
+
+
+def sigma_to_image(sigma_px: Floats, rig: Rig) -> Floats:
+    """Standard uncertainties (..., 2) of a place along x and y in recorded pixels.
+
+    A camera's stretch, of some percent, is left out.
+    """
+    return np.abs(sigma_px / _scale(rig, mirrored=False))
+
+
+def _flat(xy_px: Floats, rig: Rig) -> Floats:
+    """Image places (..., 2) in the bodies' plane, and the most that lengths are stretched there, (..., 3)."""
+    recorded = np.ascontiguousarray(xy_px, dtype=np.float64)
+    return plane_places(rig.to_json(), recorded.reshape(-1, 2)).reshape((*recorded.shape[:-1], 3))
+
+
+def _turn(mirrored: bool) -> Floats:
+    return np.array([-1.0 if mirrored else 1.0, -1.0])
 
 
 def _scale(rig: Rig, mirrored: bool) -> Floats:
@@ -123,6 +147,8 @@ def body_markers(
             )
         xy = to_world(np.where(seen[..., None], nodes.xy_px[:, index], 0.0), rig, mirrored)
         sigma = np.where(seen, nodes.sigma_px[:, index], 1.0).astype(np.float64)
+        if rig.camera is not None:
+            sigma *= _flat(np.where(seen[..., None], nodes.xy_px[:, index], 0.0), rig)[..., 2]
         reference = np.array([[rig.nodes[i].x_px, rig.nodes[i].y_px] for i in index], dtype=np.float64)
         out.append(
             BodyMarkers(

@@ -2,7 +2,11 @@
 //! tables of `docs/validation.md`, of the tracker and, on the same detections, of the paper's own method.
 //!
 //! `cargo build --release --workspace --locked --example validate`, then
-//! `target/release/examples/validate [--seeds A..B] [--scenes a,b,...] [--rows] [--write FILE]`
+//! `target/release/examples/validate [--seeds A..B] [--scenes a,b,...] [--view TILT,TOWARDS,K1,HEIGHT]
+//! [--rows] [--write FILE]`
+//!
+//! `--view` gives every scene another camera: tilt and its direction in deg, the lens's k1, the height of a pixel. A scene may be
+//! one of the other mechanisms too.
 //!
 //! `--rows` lists every film and every row that should have been given and was not. `--write` puts the tables
 //! between the two comment lines of FILE that name them.
@@ -21,7 +25,7 @@ use films::{Filmed, Followed};
 use rayon::prelude::*;
 use tracker::observation::Status;
 use tracker::score::{FULL, HALF, LIMIT_PX, Score, Tracked};
-use tracker::synth::{NodeTruth, PRESETS, preset};
+use tracker::synth::{NodeTruth, PRESETS, View, preset};
 
 struct Outcome {
     score: Score,
@@ -33,8 +37,10 @@ struct Outcome {
 }
 
 /// One film through detection, discovery and tracking.
-fn run(scene: &str, seed: u64) -> Result<Outcome> {
-    let filmed = Filmed::of(&preset(scene, seed)?)?;
+fn run(scene: &str, seed: u64, view: Option<View>) -> Result<Outcome> {
+    let mut scene = preset(scene, seed)?;
+    scene.camera.view = view;
+    let filmed = Filmed::of(&scene)?;
     let Followed { tracked, status, score, rig_right } = filmed.follow()?;
     let whole = filmed.truth.frames.iter().position(|f| f.nodes.iter().all(|n| n.visible >= FULL));
     let paper = match whole {
@@ -109,6 +115,7 @@ fn missed(filmed: &Filmed, score: &Score, tracked: &Tracked, status: &[Status]) 
 struct Arguments {
     seeds: Vec<u64>,
     scenes: Vec<String>,
+    view: Option<View>,
     rows: bool,
     write: Option<PathBuf>,
 }
@@ -117,6 +124,7 @@ fn arguments() -> Result<Arguments> {
     let mut out = Arguments {
         seeds: (0..20).collect(),
         scenes: PRESETS.map(String::from).to_vec(),
+        view: None,
         rows: false,
         write: None,
     };
@@ -132,10 +140,20 @@ fn arguments() -> Result<Arguments> {
                 let list = given.next().context("--scenes needs names")?;
                 out.scenes = list.split(',').map(String::from).collect();
             }
+            "--view" => {
+                let list = given.next().context("--view needs TILT,TOWARDS,K1,HEIGHT")?;
+                let numbers: Vec<f64> = list.split(',').map(str::parse).collect::<Result<_, _>>()?;
+                let [tilt_deg, towards_deg, k1, pixel_height] = numbers[..] else {
+                    bail!("--view needs TILT,TOWARDS,K1,HEIGHT, not {list}")
+                };
+                out.view = Some(View { tilt_deg, towards_deg, k1, pixel_height, ..View::default() });
+            }
             "--rows" => out.rows = true,
             "--write" => out.write = Some(given.next().context("--write needs a file")?.into()),
             other => {
-                bail!("{other} is not known; there are --seeds A..B, --scenes a,b, --rows and --write FILE")
+                bail!(
+                    "{other} is not known; there are --seeds A..B, --scenes a,b, --view, --rows and --write FILE"
+                )
             }
         }
     }
@@ -154,7 +172,7 @@ fn main() -> Result<ExitCode> {
     let (mut ours, mut papers) = (String::from(OURS), String::from(PAPER));
     for scene in &given.scenes {
         let outcomes: Vec<(u64, Result<Outcome>)> =
-            given.seeds.par_iter().map(|&seed| (seed, run(scene, seed))).collect();
+            given.seeds.par_iter().map(|&seed| (seed, run(scene, seed, given.view))).collect();
         let mut good = Vec::new();
         for (seed, outcome) in outcomes {
             match outcome {

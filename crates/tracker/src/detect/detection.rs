@@ -4,6 +4,7 @@
 
 use nalgebra::Vector2;
 
+use crate::camera::Plane;
 use crate::pixel_aspect::PixelAspect;
 
 /// Facts about a detection that make its centre less trustworthy, as bits.
@@ -51,6 +52,17 @@ impl Detection {
         if !aspect.is_square() {
             [self.x_px, self.y_px] = aspect.to_square(Vector2::new(self.x_px, self.y_px)).into();
             self.area_px = (f64::from(self.area_px) * aspect.ratio()) as f32;
+        }
+        self
+    }
+
+    /// What is known in square pixels, in the plane. The uncertainty grows by the most that the surroundings are stretched in
+    /// any direction.
+    pub(crate) fn to_plane(mut self, plane: &Plane) -> Self {
+        if let Some(camera) = &plane.camera {
+            let (place, stretch) = camera.flatten(Vector2::new(self.x_px, self.y_px));
+            [self.x_px, self.y_px] = place.into();
+            self.sigma_px *= stretch as f32;
         }
         self
     }

@@ -5,8 +5,8 @@
 use nalgebra::{Isometry2, Vector2};
 
 use super::circle::Circle;
+use crate::camera::Plane;
 use crate::error::Result;
-use crate::pixel_aspect::PixelAspect;
 use crate::rig::{Body, Joint, Node, RIG_SCHEMA, Rig};
 use crate::rigid::body::Link;
 use crate::rigid::forecast::hung_at;
@@ -26,6 +26,11 @@ pub struct Found {
 /// Two points agree on a joint within this, px, and this part of the body's reach.
 const JOINT_PX: f64 = 1.0;
 const JOINT_PART: f64 = 0.01;
+
+/// The same for a joint beside those on which bodies hang, px: nothing else would show that it is none.
+const LOOP_PX: f64 = 0.35;
+/// Joints nearer together than this are one, px.
+const ONE_POINT_PX: f64 = 3.0;
 
 struct Held {
     /// Body, or `None` for the ground.
@@ -111,7 +116,7 @@ fn joint(a: &Found, b: Option<&Found>) -> Option<Turning> {
 }
 
 /// The rig of the bodies: joints found, bodies ordered and named, nodes ordered along them, placed as in frame
-/// `reference` of the sample and in recorded pixels, while those of the bodies are square.
+/// `reference` of the sample and in recorded pixels, while those of the bodies are in the plane.
 ///
 /// # Errors
 /// [`crate::error::Error::Interrupted`] once `stop` was asked for.
@@ -121,7 +126,7 @@ pub fn arrange(
     reference: usize,
     reference_frame: Option<u64>,
     image_px: [u32; 2],
-    pixel_aspect: PixelAspect,
+    plane: &Plane,
     stop: &Stop,
 ) -> Result<Rig> {
     let n = found.len();
@@ -195,11 +200,12 @@ pub fn arrange(
     let mut rig = Rig {
         schema: RIG_SCHEMA,
         image_px,
-        pixel_aspect,
+        pixel_aspect: plane.pixel_aspect,
         reference_frame,
         region: None,
         lens: None,
         wanted: Default::default(),
+        camera: None,
         bodies: names.iter().map(|name| Body { name: name.clone() }).collect(),
         nodes: Vec::new(),
         joints: Vec::new(),
@@ -219,7 +225,7 @@ pub fn arrange(
             link.template.iter().map(|&t| (axis.dot(&t), place(&pose(b), t))).collect();
         along.sort_by(|a, b| a.0.total_cmp(&b.0));
         for (_, p) in along {
-            let p = pixel_aspect.to_recorded(p);
+            let p = plane.to_recorded(p);
             rig.nodes.push(Node {
                 name: format!("n{}", rig.nodes.len()),
                 body: names[k].clone(),
@@ -246,10 +252,40 @@ pub fn arrange(
                 (name, vec![names[on].clone(), names[k].clone()], p)
             }
         };
-        let p = pixel_aspect.to_recorded(p);
+        let p = plane.to_recorded(p);
         rig.joints.push(Joint { name, bodies, x_px: p.x, y_px: p.y });
     }
+    for (a, b, t) in loops(&found, &held, stop)? {
+        let ends = [a, b].map(|x| order.iter().position(|&o| o == x).unwrap_or(0));
+        let there = (place(&pose(a), t.first) + place(&pose(b), t.second)) / 2.0;
+        let p = plane.to_recorded(there);
+        rig.joints.push(Joint {
+            name: format!("joint{}", rig.joints.len()),
+            bodies: ends.map(|k| names[k].clone()).to_vec(),
+            x_px: p.x,
+            y_px: p.y,
+        });
+    }
     Ok(rig)
+}
+
+/// Points that two bodies share beside the joints on which they hang: where the chain closes.
+fn loops(found: &[Found], held: &[Option<Held>], stop: &Stop) -> Result<Vec<(usize, usize, Turning)>> {
+    let mut out = Vec::new();
+    let hangs = |a: usize, b: usize| held[a].as_ref().is_some_and(|h| h.on == Some(b));
+    for a in (0..found.len()).filter(|&a| !found[a].is_lone()) {
+        for b in (a + 1..found.len()).filter(|&b| !found[b].is_lone() && !hangs(a, b) && !hangs(b, a)) {
+            stop.heed()?;
+            let Some(t) = joint(&found[a], Some(&found[b])).filter(|t| t.rms_px < LOOP_PX) else { continue };
+            // Three bodies on one point have two joints.
+            let own = held[a].iter().map(|h| h.local);
+            let others = held.iter().flatten().filter(|h| h.on == Some(a)).map(|h| h.there);
+            if own.chain(others).all(|p| (p - t.first).norm() > ONE_POINT_PX) {
+                out.push((a, b, t));
+            }
+        }
+    }
+    Ok(out)
 }
 
 fn longest(link: &Link) -> Vector2<f64> {

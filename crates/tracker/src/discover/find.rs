@@ -1,86 +1,89 @@
 //! Finds the rig of a recording in its detections, step by step.
 //!
-//! Owns: [`discover`], [`Discovery`]. Must not: name markers frame by frame (`track` does), or look at pixels.
+//! Owns: [`discover`]. Must not: name markers frame by frame (`track` does), or look at pixels.
 
 use nalgebra::Vector2;
-use rayon::prelude::*;
 
+use super::arrange;
 use super::arrange::Found;
+use super::continuity::{self, Evidence};
+use super::discovery::Discovery;
+use super::reading::{Explains, Reading, by_continuity, by_shape};
 use super::sample::Sample;
-use super::{arrange, bodies, lone, sample};
-use crate::error::{Error, Fault, FaultKind, Result};
-use crate::message::{Message, Setting};
-use crate::pixel_aspect::PixelAspect;
-use crate::rig::Rig;
-use crate::rigid::body::Link;
+use super::trial::choose;
+use crate::calibrate::{Calibration, words};
+use crate::camera::Plane;
+use crate::error::{Error, Result};
+use crate::link::link;
+use crate::rig::{CameraOrigin, RigCamera};
 use crate::rigid::pose::place;
 use crate::stop::Stop;
-use crate::store::DetectionStore;
-
-/// A rig and what a user should know of it.
-#[derive(Debug, Clone)]
-pub struct Discovery {
-    /// The rig.
-    pub rig: Rig,
-    /// Places that stand still and belong to no body: a ruler, a screw. px.
-    pub standing: Vec<[f64; 2]>,
-    /// What a user should know, a sentence each.
-    pub warnings: Vec<Message>,
-}
-
-/// A recording in which no rig is found.
-fn nothing_found(problem: impl Into<Message>, advice: Message) -> Error {
-    Error::Rig(Fault::new("recording", problem).of_kind(FaultKind::NothingFound).advice(advice))
-}
+use crate::store::{DetectionStore, PlaneView};
 
 /// Finds the rig of a recording of `image_px` (width, height) pixels; its places are in these.
+///
+/// Bodies are first sought by their shapes alone, in frames that differ. Where these do not explain what moves, markers are
+/// followed by nearness, which tells of the camera and of bodies whose shapes tell nothing; then what names most stands.
 ///
 /// # Errors
 /// [`Error::Rig`] if there are no markers or none moves; [`Error::Interrupted`] once `stop` was asked for.
 pub fn discover(store: &DetectionStore, image_px: [u32; 2], stop: &Stop) -> Result<Discovery> {
-    let sample = Sample::take(store, stop)?;
-    if sample.frames.is_empty() {
-        return Err(nothing_found(
-            "no markers are seen in any frame",
-            "Look at a frame and set " + Setting::Threshold + " or " + Setting::Polarity,
-        ));
+    let square = PlaneView::new(store, None);
+    let plain = by_shape(&square, stop);
+    let explains = match &plain {
+        Err(Error::Interrupted) => return Err(Error::Interrupted),
+        Ok(reading) => reading.explains(stop)?,
+        Err(_) => Explains { all: false, fits: true },
+    };
+    let plain = plain.and_then(|r| finish(&square, r, image_px, None, stop));
+    if explains.all && explains.fits {
+        return plain;
     }
-    let mut warnings = Vec::new();
-    if sample.at_rest {
-        return Err(nothing_found(
-            "nothing moves, so bodies cannot be told apart",
-            "Give a rig with " + Setting::Rig + ", or a longer recording",
-        ));
-    }
-    let mut sample = sample;
-    let mut found = moving_bodies(&mut sample, stop)?;
+    let tracklets = link(&square, stop)?;
+    let evidence = Evidence::new(&tracklets, stop)?;
+    let size_px = [f64::from(image_px[0]) * store.pixel_aspect().ratio(), f64::from(image_px[1])];
+    let camera = continuity::camera(&evidence, size_px, stop)?;
+    let view = PlaneView::new(store, camera.as_ref().map(|c| c.camera));
+    let finished = |r: Reading| finish(&view, r, image_px, camera.as_ref(), stop);
+    let bent = evidence.through(view.plane().camera.as_ref());
+    let near = by_continuity(&view, &bent, stop).and_then(finished);
+    let readings = if camera.is_none() {
+        vec![plain, near]
+    } else {
+        let flat = by_shape(&view, stop).and_then(finished);
+        // Bodies that are not rigid without the camera stand only if nothing else does.
+        if explains.fits { vec![plain, flat, near] } else { vec![flat, near, plain] }
+    };
+    choose(store, &tracklets, readings, stop)
+}
+
+/// The rig of a reading, and what a user should know of it.
+fn finish(
+    store: &PlaneView<'_>,
+    reading: Reading,
+    image_px: [u32; 2],
+    camera: Option<&Calibration>,
+    stop: &Stop,
+) -> Result<Discovery> {
+    let mut warnings: Vec<_> = reading.left_out_words().into_iter().collect();
+    let Reading { sample, found, .. } = reading;
     let standing = sample.standing.clone();
-    let links: Vec<Link> = found.iter().map(|f| f.link.clone()).collect();
-    if links.is_empty() || lone::others_move(&sample, &links, stop)? {
-        warnings.extend(add_lone(&mut found, store, &sample, &links, stop)?);
-    }
-    if found.is_empty() {
-        return Err(nothing_found(
-            "no marker can be followed",
-            "Point at each with " + Setting::Marker + ", or give a rig with " + Setting::Rig,
-        ));
-    }
-    if let Some((a, b)) = bodies::alike(&links, stop)? {
-        let (a, b) =
-            (place_words(&found[a], store.pixel_aspect()), place_words(&found[b], store.pixel_aspect()));
-        return Err(nothing_found(
-            format!("two bodies have the same marker layout, {a} and {b}: they cannot be told apart"),
-            "Move a marker of one of them by some pixels, or say which is which with " + Setting::Rig,
-        ));
-    }
-    let aspect = store.pixel_aspect();
-    let (reference, whole) = reference(&sample, &found, image_px, aspect, stop)?;
+    let plane = store.plane();
+    let (reference, whole) = reference(&sample, &found, image_px, &plane, stop)?;
     if !whole {
         warnings
             .push("no frame shows every marker: their places are put together from several frames".into());
     }
     let index = store.stamp(sample.frames[reference]).index;
-    let mut rig = arrange::arrange(&found, reference, Some(index), image_px, aspect, stop)?;
+    let mut rig = arrange::arrange(&found, reference, Some(index), image_px, &plane, stop)?;
+    rig.camera = camera.map(|c| {
+        let covariance = std::array::from_fn(|i| std::array::from_fn(|j| c.covariance[(i, j)]));
+        RigCamera::of(&c.camera, Some(covariance), CameraOrigin::Found)
+    });
+    if let Some(camera) = camera {
+        let width_px = f64::from(image_px[0]) * plane.pixel_aspect.ratio();
+        warnings.push(words(camera, width_px).into());
+    }
     let lost = rig.leave_out_unreachable();
     if !lost.is_empty() {
         warnings.push(
@@ -109,48 +112,8 @@ pub fn discover(store: &DetectionStore, image_px: [u32; 2], stop: &Stop) -> Resu
             .into(),
         );
     }
-    let standing = standing.iter().map(|p| aspect.to_recorded(*p).into()).collect();
+    let standing = standing.iter().map(|p| plane.to_recorded(*p).into()).collect();
     Ok(Discovery { rig, standing, warnings })
-}
-
-/// Bodies with their poses. Those that do not move are no bodies: their points are counted among the standing.
-fn moving_bodies(sample: &mut Sample, stop: &Stop) -> Result<Vec<Found>> {
-    loop {
-        let links = bodies::find_bodies(sample, stop)?;
-        let mut found: Vec<Found> = links
-            .iter()
-            .map(|link| Found { link: link.clone(), poses: Vec::with_capacity(sample.frames.len()) })
-            .collect();
-        let posed: Vec<_> = sample
-            .moving
-            .par_iter()
-            .map(|frame| stop.heed().map(|()| bodies::poses(&links, frame)))
-            .collect::<Result<_>>()?;
-        for frame in posed {
-            for (f, s) in found.iter_mut().zip(frame) {
-                f.poses.push(s.map(|s| s.fit.pose));
-            }
-        }
-        let mut changed = false;
-        for f in &found {
-            // A point near a joint hardly moves; a body stands still only if all of it does.
-            let still: Option<Vec<Vector2<f64>>> = f
-                .link
-                .template
-                .iter()
-                .map(|&t| {
-                    let places: Vec<Vector2<f64>> = f.poses.iter().flatten().map(|p| place(p, t)).collect();
-                    sample::still_place(&places)
-                })
-                .collect();
-            for place in still.into_iter().flatten() {
-                changed |= sample.stands(place);
-            }
-        }
-        if !changed {
-            return Ok(found);
-        }
-    }
 }
 
 /// The frame of the sample in which most nodes are seen, the first of those, and whether it shows all.
@@ -158,12 +121,12 @@ fn reference(
     sample: &Sample,
     found: &[Found],
     image_px: [u32; 2],
-    aspect: PixelAspect,
+    plane: &Plane,
     stop: &Stop,
 ) -> Result<(usize, bool)> {
     let [w, h] = image_px.map(f64::from);
-    let inside = |square: Vector2<f64>| {
-        let p = aspect.to_recorded(square);
+    let inside = |there: Vector2<f64>| {
+        let p = plane.to_recorded(there);
         p.x > 0.0 && p.y > 0.0 && p.x < w - 1.0 && p.y < h - 1.0
     };
     let all: usize = found.iter().map(|f| f.link.nodes.len()).sum();
@@ -190,35 +153,4 @@ fn reference(
         }
     }
     Ok((index, best.1 == all))
-}
-
-/// Adds markers that are on no body of three, and pairs of them; what to know of those that are too many.
-fn add_lone(
-    found: &mut Vec<Found>,
-    store: &DetectionStore,
-    sample: &Sample,
-    links: &[Link],
-    stop: &Stop,
-) -> Result<Option<Message>> {
-    let (alone, left_out) = lone::find_lone(store, sample, &sample.standing, links, stop)?;
-    found.extend(alone);
-    lone::pair_up(found, stop)?;
-    Ok(left_out_words(left_out))
-}
-
-/// What to know of markers that move by themselves and are too many.
-fn left_out_words(left_out: usize) -> Option<Message> {
-    let others = if left_out == 1 { "one more is".to_owned() } else { format!("{left_out} more are") };
-    let words = format!(
-        "markers move by themselves: the {} that are seen longest are followed, {others} not. Leave out what are no markers \
-         with ",
-        lone::MOST_LONE
-    );
-    (left_out > 0).then(|| Message::from(words) + Setting::Threshold)
-}
-
-/// Where a body was found, for a message.
-fn place_words(found: &Found, aspect: PixelAspect) -> String {
-    let at = aspect.to_recorded(found.link.home + found.link.template[0]);
-    format!("one with a marker at ({:.0}, {:.0}) px", at.x, at.y)
 }

@@ -13,7 +13,7 @@ use crate::error::Result;
 use crate::rigid::body::Link;
 use crate::rigid::pose::{Pair, fit_pose, place};
 use crate::stop::Stop;
-use crate::store::DetectionStore;
+use crate::store::PlaneView;
 
 /// Frames linked at most.
 const FRAMES: usize = 3000;
@@ -104,7 +104,7 @@ pub fn others_move(sample: &Sample, links: &[Link], stop: &Stop) -> Result<bool>
 /// # Errors
 /// [`crate::error::Error::Interrupted`] once `stop` was asked for.
 pub fn find_lone(
-    store: &DetectionStore,
+    store: &PlaneView<'_>,
     sample: &Sample,
     standing: &[Vector2<f64>],
     links: &[Link],

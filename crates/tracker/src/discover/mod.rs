@@ -6,10 +6,15 @@ pub(crate) mod advice;
 mod arrange;
 mod bodies;
 mod circle;
+mod continuity;
+mod discovery;
 mod find;
 mod lone;
 mod median;
+mod reading;
 mod sample;
 mod signature;
+mod trial;
 
-pub use find::{Discovery, discover};
+pub use discovery::Discovery;
+pub use find::discover;

@@ -9,7 +9,7 @@ use crate::detect::Detection;
 use crate::error::Result;
 use crate::rigid::index::DetectionIndex;
 use crate::stop::Stop;
-use crate::store::DetectionStore;
+use crate::store::PlaneView;
 
 /// Frames looked at, at most.
 const FRAMES: usize = 3000;
@@ -45,7 +45,7 @@ impl Sample {
     ///
     /// # Errors
     /// [`crate::error::Error::Interrupted`] once `stop` was asked for.
-    pub fn take(store: &DetectionStore, stop: &Stop) -> Result<Self> {
+    pub fn take(store: &PlaneView<'_>, stop: &Stop) -> Result<Self> {
         let n = store.len();
         let mut all: Vec<(usize, Vec<Detection>)> = Vec::new();
         let mut scratch = Vec::new();
@@ -97,6 +97,27 @@ impl Sample {
 }
 
 impl Sample {
+    /// Frames that are given, with what stands still known.
+    pub fn of(
+        frames: Vec<usize>,
+        standing: Vec<Vector2<f64>>,
+        store: &PlaneView<'_>,
+        stop: &Stop,
+    ) -> Result<Self> {
+        let still: Vec<Detection> =
+            standing.iter().map(|p| Detection { x_px: p.x, y_px: p.y, ..Default::default() }).collect();
+        let index = DetectionIndex::new(&still);
+        let mut moving = Vec::with_capacity(frames.len());
+        for &i in &frames {
+            stop.heed()?;
+            let mut seen = Vec::new();
+            store.read(i, &mut seen);
+            seen.retain(|d| index.nearest(at(d), SAME_PLACE_PX).is_none());
+            moving.push(seen);
+        }
+        Ok(Self { frames, moving, standing, at_rest: false })
+    }
+
     /// Counts a place among the standing, and what is seen there no longer among the moving. Whether there was
     /// any such.
     pub fn stands(&mut self, still: Vector2<f64>) -> bool {

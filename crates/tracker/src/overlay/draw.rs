@@ -329,6 +329,7 @@ mod tests {
             region: None,
             lens: None,
             wanted: Default::default(),
+            camera: None,
             bodies: vec![Body { name: "b".into() }],
             nodes: vec![node("n0", 30.0), node("n1", 90.0)],
             joints: vec![],

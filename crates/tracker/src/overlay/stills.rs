@@ -52,6 +52,7 @@ pub fn candidates(frame: &Frame, aspect: PixelAspect, all: &[Candidate]) -> Resu
         reference_frame: None,
         region: None,
         lens: None,
+        camera: None,
         wanted: Default::default(),
         bodies: Vec::new(),
         nodes: Vec::new(),

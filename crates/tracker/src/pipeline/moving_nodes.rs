@@ -283,6 +283,7 @@ impl Moving {
             reference_frame: whole.map(|f| self.stamps[f].index),
             region: settings.detect.region.clone(),
             lens: None,
+            camera: None,
             wanted: wanted.clone(),
             bodies: (0..count).map(|k| Body { name: name(k) }).collect(),
             nodes: (0..count)

@@ -73,7 +73,8 @@ impl Mechanism {
     /// The mechanism of a checked rig, in square pixels. `slack_px` is how well the rig's places are known.
     pub fn new(rig: &Rig, slack_px: f64) -> Self {
         let bodies = rig.node_bodies();
-        let square = |x: f64, y: f64| rig.pixel_aspect.to_square(Vector2::new(x, y));
+        let plane = rig.plane();
+        let square = |x: f64, y: f64| plane.to_plane(Vector2::new(x, y));
         let at = |i: usize| square(rig.nodes[i].x_px, rig.nodes[i].y_px);
         let links: Vec<Link> = (0..rig.bodies.len())
             .map(|b| {

@@ -179,6 +179,20 @@ impl DetectionStore {
         }
     }
 
+    /// A copy of some frames.
+    ///
+    /// # Errors
+    /// [`Error::Table`] if they cannot be read back.
+    pub fn stretch(&self, frames: std::ops::Range<usize>) -> Result<Self> {
+        let mut out = Self::new().of_pixels(self.pixel_aspect);
+        for i in frames {
+            let (stamp, detections) =
+                self.with_block(i, |block, k| (block.stamp(k), block.detections(k).to_vec()))?;
+            out.push(stamp, &detections)?;
+        }
+        Ok(out)
+    }
+
     /// Remembers what went wrong.
     fn lost(&self, i: usize, fault: Error) -> FrameStamp {
         self.fault.get_or_init(|| fault);

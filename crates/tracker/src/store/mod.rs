@@ -6,9 +6,11 @@
 
 mod block;
 mod detection_store;
+mod plane_view;
 mod spool;
 mod stamp;
 
 pub use detection_store::{DetectionStore, MEMORY_BOUND_BYTES};
+pub use plane_view::PlaneView;
 pub use spool::{Finished, Spool};
 pub use stamp::FrameStamp;

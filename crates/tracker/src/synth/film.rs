@@ -2,16 +2,19 @@
 //!
 //! Owns: [`Film`]. Must not: paint.
 
+use nalgebra::Vector2;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
 use super::canvas::ground;
-use super::motion::{Mechanism, MotionTable};
+use super::coverage::Quad;
+use super::motion::{Mechanism, MotionTable, Pose, bar};
 use super::scene::{Glint, Scene, within};
+use crate::camera::Camera;
 use crate::error::Result;
 use crate::frame::{PixelFormat, TimeBase};
 use crate::pixel_aspect::PixelAspect;
-use crate::rig::{Body, Joint, Node, RIG_SCHEMA, Rig};
+use crate::rig::{Body, CameraOrigin, Joint, Node, RIG_SCHEMA, Rig, RigCamera};
 
 /// A scene ready to be filmed. Shared between threads; nothing in it changes.
 #[derive(Debug, Clone)]
@@ -28,6 +31,8 @@ pub struct Film {
     /// For each marker the index of its link.
     pub(super) marker_links: Vec<usize>,
     pub(super) time_base: TimeBase,
+    /// What the camera makes of the links' plane; `None` is nothing.
+    pub(super) camera: Option<Camera>,
 }
 
 impl Film {
@@ -69,6 +74,7 @@ impl Film {
             glints,
             marker_links: scene.markers.iter().filter_map(|m| scene.link_index(&m.link)).collect(),
             time_base: scene.time_base()?,
+            camera: camera(scene),
             scene: scene.clone(),
         })
     }
@@ -110,13 +116,13 @@ impl Film {
         self.mechanism.poses(self.time_s(index), &mut poses);
         let nodes = (scene.markers.iter().zip(&self.marker_links))
             .map(|(m, &l)| {
-                let [x_px, y_px] = poses[l].point(m.at_px);
+                let [x_px, y_px] = self.seen(poses[l].point(m.at_px));
                 Node { name: m.name.clone(), body: m.link.clone(), x_px, y_px }
             })
             .collect();
         let mut joints = Vec::new();
         for (i, l) in scene.links.iter().enumerate() {
-            let [x_px, y_px] = poses[i].joint;
+            let [x_px, y_px] = self.seen(poses[i].joint);
             let (name, bodies) = match &l.parent {
                 Some(p) => (format!("joint{i}"), vec![p.clone(), l.name.clone()]),
                 None if l.velocity_px_s.is_some() => continue,
@@ -134,6 +140,7 @@ impl Film {
             region: None,
             lens: None,
             wanted: Default::default(),
+            camera: self.camera.map(|c| RigCamera::of(&c, None, CameraOrigin::Given)),
             bodies: scene
                 .links
                 .iter()
@@ -143,6 +150,38 @@ impl Film {
             nodes,
             joints,
         }
+    }
+
+    /// Where in the picture a place of the links' plane is.
+    pub(super) fn seen(&self, plane: [f64; 2]) -> [f64; 2] {
+        self.camera.map_or(plane, |c| c.to_picture(plane.into()).into())
+    }
+
+    /// How much larger than in the plane small things are in the picture: the root of what their area gains.
+    pub(super) fn scale(&self, plane: [f64; 2]) -> f64 {
+        self.camera.map_or(1.0, |c| {
+            c.slopes(c.to_picture(Vector2::from(plane))).by_picture.determinant().abs().powf(-0.5)
+        })
+    }
+
+    /// The bar of link `index` in the picture; `None` if it has none. It is drawn straight from end to end, as wide as in its
+    /// middle: markers are seen where they are, and a bar only hides and is hidden.
+    pub(super) fn seen_bar(&self, index: usize, pose: &Pose) -> Option<Quad> {
+        let quad = bar(&self.scene, index, pose)?;
+        if self.camera.is_none() {
+            return Some(quad);
+        }
+        let [from, to] = quad.u.map(|u| Vector2::from(self.seen(pose.point([u, 0.0]))));
+        let along = (to - from).normalize();
+        let half =
+            0.5 * (quad.v[1] - quad.v[0]) * self.scale(pose.point([0.5 * (quad.u[0] + quad.u[1]), 0.0]));
+        Some(Quad {
+            origin: from.into(),
+            along: along.into(),
+            across: [along.y, -along.x],
+            u: [0.0, (to - from).norm()],
+            v: [-half, half],
+        })
     }
 
     pub(super) fn hidden_links(&self, index: u64) -> Vec<bool> {
@@ -191,4 +230,13 @@ fn glints(scene: &Scene) -> Vec<Glint> {
     }
     all.sort_by_key(|g| g.first);
     all
+}
+
+/// The camera of a scene.
+fn camera(scene: &Scene) -> Option<Camera> {
+    let v = scene.camera.view?;
+    let size_px = scene.image_px.map(f64::from);
+    let focal_px = v.focal_widths * size_px[0];
+    let (tilt, towards) = (v.tilt_deg.to_radians(), v.towards_deg.to_radians());
+    Some(Camera::tilted(tilt, towards, focal_px, v.k1, v.pixel_height, size_px))
 }

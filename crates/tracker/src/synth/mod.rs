@@ -45,8 +45,8 @@ mod write_options;
 
 pub use film::Film;
 pub use motion::MotionTable;
-pub use presets::{PRESETS, paper_layout, preset};
-pub use scene::Scene;
+pub use presets::{MECHANISMS, PRESETS, paper_layout, preset};
+pub use scene::{Scene, View};
 pub use sink::files as film_files;
 pub use source::SyntheticSource;
 pub use truth::{FrameTruth, NodeTruth};

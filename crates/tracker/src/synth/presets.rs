@@ -11,6 +11,9 @@ use crate::error::{Error, Fault, Result};
 /// Names of the scenes that [`preset`] makes, in the order in which tables list them.
 pub const PRESETS: [&str; 8] = ["clean", "noisy", "dim", "glints", "late", "dropout", "occluded", "fast"];
 
+/// Names of other mechanisms that [`preset`] makes, with the light and the motion of `clean`.
+pub const MECHANISMS: [&str; 3] = ["triple", "pairs", "symmetric"];
+
 /// Length of the upper link from pivot to elbow, px.
 pub const UPPER_PX: f64 = 160.0;
 
@@ -62,6 +65,55 @@ pub fn paper_layout(
     (links, markers)
 }
 
+/// Links that hang on each other and their markers; each link has its length, px, and its markers' places along and across it.
+fn chain(pivot_px: [f64; 2], parts: &[(&str, f64, &[[f64; 2]])]) -> (Vec<Link>, Vec<Marker>) {
+    let (paper, shown) = paper_layout(pivot_px, 6.0, 200.0, 24.0);
+    let mut links: Vec<Link> = Vec::new();
+    let mut markers: Vec<Marker> = Vec::new();
+    let mut joint_px = pivot_px;
+    for &(name, length_px, places) in parts {
+        let parent = links.last().map(|l: &Link| l.name.clone());
+        let (name, along_px) = (name.to_string(), [-14.0, length_px + 14.0]);
+        for &at_px in places {
+            let node = format!("n{}", markers.len());
+            markers.push(Marker { name: node, link: name.clone(), at_px, ..shown[0].clone() });
+        }
+        links.push(Link { name, parent, joint_px, along_px, ..paper[0].clone() });
+        joint_px = [length_px, 0.0];
+    }
+    (links, markers)
+}
+
+/// The links and markers of a scene by its name.
+fn layout(name: &str) -> (Vec<Link>, Vec<Marker>) {
+    let pivot_px = [360.0, 360.0];
+    match name {
+        "triple" => chain(
+            pivot_px,
+            &[
+                ("first", 112.0, &[[24.0, -6.0], [58.0, 8.0], [86.0, -7.0]]),
+                ("second", 112.0, &[[27.0, 22.0], [55.0, -22.0], [91.0, 23.0]]),
+                ("third", 90.0, &[[25.0, -24.0], [50.0, 23.0], [84.0, -22.0], [100.0, 22.0]]),
+            ],
+        ),
+        "pairs" => chain(
+            pivot_px,
+            &[
+                ("upper", UPPER_PX, &[[48.0, -7.0], [122.0, 6.0]]),
+                ("lower", 144.0, &[[50.0, 23.0], [138.0, -22.0]]),
+            ],
+        ),
+        "symmetric" => chain(
+            pivot_px,
+            &[
+                ("upper", UPPER_PX, &[[40.0, 0.0], [80.0, 0.0], [120.0, 0.0]]),
+                ("lower", 144.0, &[[40.0, 24.0], [80.0, 24.0], [120.0, 24.0]]),
+            ],
+        ),
+        _ => paper_layout(pivot_px, 6.0, 200.0, 24.0),
+    }
+}
+
 /// A scene by its name, 720 x 720 px: the paper's layout tumbling about the middle of the image.
 ///
 /// | name | what is hard about it |
@@ -75,19 +127,24 @@ pub fn paper_layout(
 /// | `occluded` | the whole lower link hidden for 300 frames, three times |
 /// | `fast` | 250 frames a second, up to 50 px per frame |
 ///
+/// | `triple` | three links of three, three and four markers |
+/// | `pairs` | two links of two markers |
+/// | `symmetric` | two links of three markers in a row, equally far apart and alike |
+///
 /// All but `fast` have 500 frames a second; all have an exposure of 0.4 ms. The seed changes motion, noise and the
 /// times of mishaps.
 ///
 /// # Errors
-/// [`Error::Argument`] for a name that is not in [`PRESETS`].
+/// [`Error::Argument`] for a name that is neither in [`PRESETS`] nor in [`MECHANISMS`].
 pub fn preset(name: &str, seed: u64) -> Result<Scene> {
-    if !PRESETS.contains(&name) {
-        return Err(Error::Argument(
-            Fault::new("preset", format!("{name:?} is not one"))
-                .advice(format!("Choose one of {}", PRESETS.join(", "))),
-        ));
+    if !PRESETS.contains(&name) && !MECHANISMS.contains(&name) {
+        return Err(Error::Argument(Fault::new("preset", format!("{name:?} is not one")).advice(format!(
+            "Choose one of {}, {}",
+            PRESETS.join(", "),
+            MECHANISMS.join(", ")
+        ))));
     }
-    let (mut links, markers) = paper_layout([360.0, 360.0], 6.0, 200.0, 24.0);
+    let (mut links, markers) = layout(name);
     links[0].motion =
         Some(LinkMotion::Tumble { phi_rad: 6.0 * (part(seed, 1) - 0.5), rate_rad_s: 7.0, frequency_hz: 2.0 });
     links[1].motion = Some(LinkMotion::Tumble {
@@ -95,6 +152,13 @@ pub fn preset(name: &str, seed: u64) -> Result<Scene> {
         rate_rad_s: 14.0,
         frequency_hz: 3.0,
     });
+    if let Some(third) = links.get_mut(2) {
+        third.motion = Some(LinkMotion::Tumble {
+            phi_rad: 6.0 * (part(seed, 5) - 0.5),
+            rate_rad_s: 14.0,
+            frequency_hz: 3.0,
+        });
+    }
     let mut s = Scene {
         schema: SCENE_SCHEMA,
         image_px: [720, 720],
@@ -204,7 +268,7 @@ mod tests {
 
     #[test]
     fn every_preset_is_a_scene_and_survives_toml() {
-        for name in PRESETS {
+        for name in PRESETS.into_iter().chain(MECHANISMS) {
             let scene = preset(name, 5).unwrap();
             assert_eq!(Scene::parse(&scene.to_toml().unwrap(), name).unwrap(), scene);
             assert_ne!(preset(name, 6).unwrap().links, scene.links);

@@ -7,7 +7,7 @@
 use super::canvas::Canvas;
 use super::coverage::Quad;
 use super::film::Film;
-use super::motion::{Pose, bar};
+use super::motion::Pose;
 use super::noise;
 use super::scene::within;
 use crate::frame::Frame;
@@ -31,11 +31,11 @@ pub(super) fn instants(film: &Film, index: u64, poses: &mut Vec<Pose>) -> usize 
         film.mechanism.poses(t + exposure * (0.5 * k as f64 - 0.5), poses);
         for (i, l) in film.scene.links.iter().enumerate() {
             for end in l.along_px {
-                place.push(poses[i].point([end, 0.0]));
+                place.push(film.seen(poses[i].point([end, 0.0])));
             }
         }
-        place
-            .extend(film.scene.markers.iter().zip(&film.marker_links).map(|(m, &l)| poses[l].point(m.at_px)));
+        let markers = film.scene.markers.iter().zip(&film.marker_links);
+        place.extend(markers.map(|(m, &l)| film.seen(poses[l].point(m.at_px))));
     }
     let way = (0..places[0].len())
         .map(|i| {
@@ -73,12 +73,13 @@ fn expected(film: &Film, index: u64, out: &mut Vec<f32>) {
                 continue;
             }
             let l = &scene.links[i];
-            if let Some(quad) = bar(scene, i, &poses[i]) {
+            if let Some(quad) = film.seen_bar(i, &poses[i]) {
                 canvas.quad(&quad, l.level * l.light);
             }
             for (j, m) in scene.markers.iter().enumerate() {
                 if film.marker_links[j] == i && !hidden_markers[j] {
-                    canvas.disc(poses[i].point(m.at_px), m.radius_px, m.level * l.light);
+                    let at = poses[i].point(m.at_px);
+                    canvas.disc(film.seen(at), m.radius_px * film.scale(at), m.level * l.light);
                 }
             }
         }

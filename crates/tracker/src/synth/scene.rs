@@ -89,6 +89,33 @@ pub struct Camera {
     pub hot_pixels: u32,
     /// What a hot pixel adds to its level.
     pub hot_level: f64,
+    /// How the camera stands and what its lens does; `None` faces the links squarely, through a lens that keeps lines
+    /// straight.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub view: Option<View>,
+}
+
+/// How the camera stands and what its lens does. Links keep their places in the plane that a square camera would film; markers,
+/// bars and joints are given there.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct View {
+    /// Angle between the camera's axis and the plane's perpendicular, deg.
+    pub tilt_deg: f64,
+    /// Where in the picture the plane comes nearer, deg from right towards down.
+    pub towards_deg: f64,
+    /// Focal length in widths of the picture.
+    pub focal_widths: f64,
+    /// Part by which the lens moves the picture's corners outwards; below 0 is a barrel.
+    pub k1: f64,
+    /// Height of a pixel, in widths.
+    pub pixel_height: f64,
+}
+
+impl Default for View {
+    fn default() -> Self {
+        Self { tilt_deg: 0.0, towards_deg: 30.0, focal_widths: 2.0, k1: 0.0, pixel_height: 1.0 }
+    }
 }
 
 impl Default for Camera {
@@ -102,6 +129,7 @@ impl Default for Camera {
             saturation: None,
             hot_pixels: 0,
             hot_level: 0.0,
+            view: None,
         }
     }
 }

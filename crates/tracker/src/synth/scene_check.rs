@@ -2,7 +2,7 @@
 //!
 //! Owns: [`Scene::check`]. Must not: change a scene.
 
-use super::scene::{LinkMotion, SCENE_SCHEMA, Scene};
+use super::scene::{LinkMotion, SCENE_SCHEMA, Scene, View};
 use crate::error::{Error, Fault, Place, Result};
 use crate::message::Message;
 
@@ -107,7 +107,27 @@ impl Checker<'_> {
         self.number("camera.read_noise", c.read_noise, 0.0)?;
         self.number("camera.shot_gain", c.shot_gain, 0.0)?;
         self.number("camera.hot_level", c.hot_level, 0.0)?;
+        c.view.map_or(Ok(()), |v| self.view(&v))?;
         c.saturation.map_or(Ok(()), |v| self.number("camera.saturation", v, 1.0))
+    }
+
+    fn view(&self, v: &View) -> Result<()> {
+        self.finite("camera.view.towards_deg", &[v.towards_deg])?;
+        let within = |key: &str, value: f64, [least, most]: [f64; 2]| {
+            if (least..=most).contains(&value) {
+                return Ok(());
+            }
+            self.fault(
+                format!("camera.view.{key}"),
+                format!("{value} is no such camera's"),
+                &format!("Give {least} to {most}"),
+            )
+        };
+        within("tilt_deg", v.tilt_deg, [0.0, 45.0])?;
+        within("focal_widths", v.focal_widths, [0.5, 100.0])?;
+        // Beyond it the picture of a barrel folds before its corners.
+        within("k1", v.k1, [-0.3, 0.5])?;
+        within("pixel_height", v.pixel_height, [0.5, 2.0])
     }
 
     fn links(&self, s: &Scene) -> Result<()> {

@@ -4,7 +4,6 @@
 
 use super::coverage::{Quad, disc_rectangle_area};
 use super::film::Film;
-use super::motion::bar;
 use super::render::{instant_s, instants};
 use super::scene::within;
 
@@ -60,7 +59,8 @@ impl Film {
             self.mechanism.poses(time_s + instant_s(scene.camera.exposure_s, k, n), &mut poses);
             for (j, m) in scene.markers.iter().enumerate() {
                 let link = self.marker_links[j];
-                let at = poses[link].point(m.at_px);
+                let plane = poses[link].point(m.at_px);
+                let at = self.seen(plane);
                 nodes[j].mean_x_px += at[0] / n as f64;
                 nodes[j].mean_y_px += at[1] / n as f64;
                 if black || hidden_links[link] || hidden_markers[j] {
@@ -68,8 +68,9 @@ impl Film {
                 }
                 quads.clear();
                 discs.clear();
-                quads
-                    .extend((0..link).filter(|&i| !hidden_links[i]).filter_map(|i| bar(scene, i, &poses[i])));
+                quads.extend(
+                    (0..link).filter(|&i| !hidden_links[i]).filter_map(|i| self.seen_bar(i, &poses[i])),
+                );
                 quads.extend(scene.screens.iter().map(|s| Quad {
                     origin: [0.0, 0.0],
                     along: [1.0, 0.0],
@@ -81,16 +82,18 @@ impl Film {
                     let front = self.marker_links[o];
                     let before = front < link || (front == link && o > j);
                     if before && !hidden_links[front] && !hidden_markers[o] {
-                        let p = poses[front].point(other.at_px);
-                        discs.push([p[0], p[1], other.radius_px]);
+                        let there = poses[front].point(other.at_px);
+                        let p = self.seen(there);
+                        discs.push([p[0], p[1], other.radius_px * self.scale(there)]);
                     }
                 }
-                nodes[j].visible += visible_part(at, m.radius_px, &quads, &discs, size) / n as f64;
+                nodes[j].visible +=
+                    visible_part(at, m.radius_px * self.scale(plane), &quads, &discs, size) / n as f64;
             }
         }
         self.mechanism.poses(time_s, &mut poses);
         for (j, m) in scene.markers.iter().enumerate() {
-            [nodes[j].x_px, nodes[j].y_px] = poses[self.marker_links[j]].point(m.at_px);
+            [nodes[j].x_px, nodes[j].y_px] = self.seen(poses[self.marker_links[j]].point(m.at_px));
         }
         FrameTruth { frame: index, time_s, nodes, phi_rad: poses.iter().map(|p| p.phi_rad).collect() }
     }

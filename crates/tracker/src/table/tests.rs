@@ -21,6 +21,7 @@ pub(crate) fn meta(names: &[(String, usize)], bodies: &[String]) -> TableMeta {
         region: None,
         lens: None,
         wanted: Default::default(),
+        camera: None,
         bodies: bodies.iter().map(|name| Body { name: name.clone() }).collect(),
         nodes: names
             .iter()

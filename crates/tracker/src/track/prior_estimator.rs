@@ -264,6 +264,7 @@ mod tests {
             region: None,
             lens: None,
             wanted: Default::default(),
+            camera: None,
             bodies: vec![Body { name: "b".into() }],
             nodes: nodes.collect(),
             joints: vec![Joint { name: "pivot".into(), bodies: vec!["b".into()], x_px: 300.0, y_px: 300.0 }],

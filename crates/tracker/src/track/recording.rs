@@ -10,16 +10,16 @@ use super::occlusion_filter::OcclusionFilter;
 use super::prior_estimator::PriorEstimator;
 use super::rows::{Returns, observations, occlusions};
 use super::seen::BodySeen;
+use crate::camera::Plane;
 use crate::detect::Detection;
 use crate::error::{Error, Fault, Result};
 use crate::observation::{Observation, Status};
-use crate::pixel_aspect::PixelAspect;
 use crate::rig::Rig;
 use crate::rigid::body::Mechanism;
 use crate::rigid::forecast::Motion;
 use crate::rigid::index::DetectionIndex;
 use crate::stop::Stop;
-use crate::store::{DetectionStore, FrameStamp};
+use crate::store::{DetectionStore, FrameStamp, PlaneView};
 
 /// What came of a recording.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -67,11 +67,13 @@ pub fn track_recording(
                 .advice(format!("Give the detections' own, {}", store.pixel_aspect())),
         ));
     }
+    let plane = rig.plane();
+    let store = &PlaneView::new(store, plane.camera);
     let mechanism = Mechanism::new(rig, 0.3);
     let priors = MotionPriors::unknown(&mechanism, 0.05);
     let n = mechanism.nodes;
     let mut out = Output {
-        pixel_aspect: rig.pixel_aspect,
+        plane,
         occlusion_filter: OcclusionFilter::default(),
         returns: Returns::new(n),
         summary: TrackSummary {
@@ -121,7 +123,7 @@ const LEARNING_FRAMES: usize = 4000;
 
 /// Follows the markers from the reference picture on, only to learn.
 fn learn(
-    store: &DetectionStore,
+    store: &PlaneView<'_>,
     rig: &Rig,
     start: usize,
     mut mechanism: Mechanism,
@@ -159,14 +161,14 @@ fn started(rig: &Rig, start: usize, mechanism: Mechanism, priors: MotionPriors) 
 }
 
 /// Index in the store of the reference picture; 0 where there is none in it.
-fn start_frame(store: &DetectionStore, rig: &Rig) -> usize {
+fn start_frame(store: &PlaneView<'_>, rig: &Rig) -> usize {
     let Some(reference) = rig.reference_frame else { return 0 };
     let first = store.stamp(0).index;
     reference.checked_sub(first).map_or(0, |i| if (i as usize) < store.len() { i as usize } else { 0 })
 }
 
 struct Output {
-    pixel_aspect: PixelAspect,
+    plane: Plane,
     occlusion_filter: OcclusionFilter,
     returns: Returns,
     summary: TrackSummary,
@@ -176,7 +178,7 @@ struct Output {
 impl Output {
     fn write(
         &mut self,
-        store: &DetectionStore,
+        store: &PlaneView<'_>,
         mechanism: &Mechanism,
         p: Pending,
         sink: &mut Sink<'_>,
@@ -193,7 +195,7 @@ impl Output {
             if !stamp.decoded {
                 row.fill(Observation::UNDECODED);
             }
-            row.iter_mut().for_each(|o| *o = o.to_recorded(self.pixel_aspect));
+            row.iter_mut().for_each(|o| *o = o.to_recorded(&self.plane));
             self.returns.mark(&mut row);
             let s = &mut self.summary;
             s.frames += 1;
@@ -211,7 +213,7 @@ impl Output {
 
 /// One direction of time: steps, and fills gaps from behind once a body is settled again.
 struct Pass<'a> {
-    store: &'a DetectionStore,
+    store: &'a PlaneView<'a>,
     stop: &'a Stop,
     tracker: FrameTracker,
     pending: VecDeque<Pending>,
@@ -225,7 +227,7 @@ struct Pass<'a> {
 }
 
 impl<'a> Pass<'a> {
-    fn new(store: &'a DetectionStore, tracker: FrameTracker, stop: &'a Stop) -> Self {
+    fn new(store: &'a PlaneView<'a>, tracker: FrameTracker, stop: &'a Stop) -> Self {
         let n = tracker.bodies.mechanism.links.len();
         Self {
             store,
@@ -276,7 +278,7 @@ impl<'a> Pass<'a> {
         let end = self.pending.len() - SETTLED;
         let mut tracker = self.tracker.clone();
         tracker.bodies.motions[b].forget();
-        let time = |p: &Pending, store: &DetectionStore| (p.stamp.index - store.stamp(0).index) as f64;
+        let time = |p: &Pending, store: &PlaneView<'_>| (p.stamp.index - store.stamp(0).index) as f64;
         for p in self.pending.range(end..).rev() {
             if let Some(f) = &p.seen[b].fit {
                 tracker.bodies.motions[b].add(time(p, self.store), f);

@@ -2,6 +2,7 @@
 //! of several markers is used twice, every frame has its row.
 
 pub(crate) mod bed;
+mod cameras;
 mod noise;
 mod swing;
 mod worst;

@@ -5,10 +5,10 @@
 use super::frame_tracker::FrameTracker;
 use super::motion_priors::MotionPriors;
 use super::rows::{Returns, observations, occlusions};
+use crate::camera::Plane;
 use crate::detect::Detection;
 use crate::error::{Error, Fault, Result};
 use crate::observation::Observation;
-use crate::pixel_aspect::PixelAspect;
 use crate::rig::Rig;
 use crate::rigid::body::Mechanism;
 use crate::rigid::index::DetectionIndex;
@@ -19,7 +19,7 @@ use crate::store::FrameStamp;
 #[derive(Debug, Clone)]
 pub struct Tracker {
     frame_tracker: FrameTracker,
-    pixel_aspect: PixelAspect,
+    plane: Plane,
     returns: Returns,
     last: Option<FrameStamp>,
 }
@@ -34,8 +34,8 @@ impl Tracker {
         let mechanism = Mechanism::new(rig, 0.3);
         let priors = MotionPriors::unknown(&mechanism, 0.05);
         let returns = Returns::new(mechanism.nodes);
-        let (frame_tracker, pixel_aspect) = (FrameTracker::new(mechanism, priors), rig.pixel_aspect);
-        Ok(Self { frame_tracker, pixel_aspect, returns, last: None })
+        let frame_tracker = FrameTracker::new(mechanism, priors);
+        Ok(Self { frame_tracker, plane: rig.plane(), returns, last: None })
     }
 
     /// The nodes in the next frame, in the rig's order; detections and nodes are in recorded pixels.
@@ -55,7 +55,8 @@ impl Tracker {
             ));
         }
         self.last = Some(*stamp);
-        let detections: Vec<Detection> = detections.iter().map(|d| d.to_square(self.pixel_aspect)).collect();
+        let detections: Vec<Detection> =
+            detections.iter().map(|d| d.to_square(self.plane.pixel_aspect).to_plane(&self.plane)).collect();
         let index = DetectionIndex::new(&detections);
         let seen = self.frame_tracker.step(stamp.index as f64, &index, None, &Stop::default())?;
         let mut row = observations(&self.frame_tracker.bodies.mechanism, &seen, &detections);
@@ -65,7 +66,7 @@ impl Tracker {
                 row[k] = Observation::MISSING;
             }
         }
-        row.iter_mut().for_each(|o| *o = o.to_recorded(self.pixel_aspect));
+        row.iter_mut().for_each(|o| *o = o.to_recorded(&self.plane));
         self.returns.mark(&mut row);
         Ok(row)
     }

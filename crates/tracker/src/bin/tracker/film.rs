@@ -3,12 +3,15 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use clap::builder::PossibleValuesParser;
 use tracker::csv_text::Cells;
 use tracker::error::Error;
 use tracker::output;
 use tracker::pipeline::{Observer, Stage};
 use tracker::synth::encode::Codec;
-use tracker::synth::{Film, MotionTable, PRESETS, Scene, WriteOptions, film_files, preset, write};
+use tracker::synth::{
+    Film, MECHANISMS, MotionTable, PRESETS, Scene, View, WriteOptions, film_files, preset, write,
+};
 
 use crate::print;
 use crate::reading::word;
@@ -24,8 +27,9 @@ pub struct Args {
     /// The scene, TOML.
     #[arg(required_unless_present = "preset", conflicts_with = "preset")]
     scene: Option<PathBuf>,
-    /// A scene that comes with the program: clean, noisy, dim, glints, late, dropout, occluded, fast.
-    #[arg(long, value_name = "NAME", value_parser = PRESETS)]
+    /// A scene that comes with the program: clean, noisy, dim, glints, late, dropout, occluded, fast; triple, pairs,
+    /// symmetric.
+    #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(PRESETS.iter().chain(&MECHANISMS)))]
     preset: Option<String>,
     /// Where the film goes.
     #[arg(short, long, value_name = "OUTPUT", required_unless_present_any = ["print_scene", "rig"])]
@@ -51,6 +55,18 @@ pub struct Args {
     /// Frames per second; replaces the scene's.
     #[arg(long, value_name = "F")]
     fps: Option<f64>,
+    /// Angle by which the camera is off facing the links squarely, deg; replaces the scene's.
+    #[arg(long, value_name = "DEG")]
+    tilt: Option<f64>,
+    /// Where in the picture the links then come nearer, deg from right towards down; replaces the scene's.
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
+    towards: Option<f64>,
+    /// Part by which the lens moves the picture's corners outwards; below 0 is a barrel; replaces the scene's.
+    #[arg(long, value_name = "K", allow_negative_numbers = true)]
+    k1: Option<f64>,
+    /// Height of a pixel in widths; replaces the scene's.
+    #[arg(long, value_name = "H")]
+    pixel_height: Option<f64>,
     /// Codec of a video file: h264 (small, lossy, plays everywhere), ffv1 (without loss, 8 to 16 bit), mjpeg (pictures,
     /// lossy) or raw (uncompressed); by the ending if not given.
     #[arg(long, value_parser = word::<Codec>(), requires = "output")]
@@ -88,6 +104,16 @@ impl Args {
         scene.seed = self.seed.unwrap_or(scene.seed);
         scene.frames = self.frame_count.unwrap_or(scene.frames);
         scene.rate_hz = self.fps.unwrap_or(scene.rate_hz);
+        if self.tilt.or(self.towards).or(self.k1).or(self.pixel_height).is_some() {
+            let view = scene.camera.view.unwrap_or_default();
+            scene.camera.view = Some(View {
+                tilt_deg: self.tilt.unwrap_or(view.tilt_deg),
+                towards_deg: self.towards.unwrap_or(view.towards_deg),
+                k1: self.k1.unwrap_or(view.k1),
+                pixel_height: self.pixel_height.unwrap_or(view.pixel_height),
+                ..view
+            });
+        }
         Ok(scene)
     }
 }

@@ -223,6 +223,7 @@ impl Swing {
             region: None,
             lens: None,
             wanted: Default::default(),
+            camera: None,
             bodies: vec![Body { name: "upper".into() }, Body { name: "lower".into() }],
             nodes,
             joints: vec![
