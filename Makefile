@@ -56,18 +56,18 @@ check: build
 validate: build
 	cargo build $(CARGO_FLAGS) --example validate
 	target/release/examples/validate --seeds 200..220 --write docs/validation.md
-	$(PY) -m tests.validate_kinematics
-	$(PY) -m tests.validate_resume
-	$(PY) -m tests.mutate --mutants 300
-	for sweep in angles default physics; do $(PY) -m tests.validate_$$sweep || exit 1; done
-	for part in energy inertias ratios slow all none added; do $(PY) -m tests.validate_damping $$part || exit 1; done
+	$(PY) -m tests.validation.validate_kinematics
+	$(PY) -m tests.validation.validate_resume
+	$(PY) -m tests.validation.mutate --mutants 300
+	for sweep in angles default physics; do $(PY) -m tests.validation.validate_$$sweep || exit 1; done
+	for part in energy inertias ratios slow all none added; do $(PY) -m tests.validation.validate_damping $$part || exit 1; done
 
 wheel: .make/system .make/venv
 	tools/wheel.sh
 
 bench: build
 	cargo bench --workspace --locked
-	$(PY) -m tests.bench_tables
+	$(PY) -m tests.validation.bench_tables
 
 fixtures: build
 	$(PY) fixtures/make.py
