@@ -13,6 +13,10 @@ impl FfmpegSource {
         Err(Error::Source(Fault::without("ffmpeg", name, "it is film that FFmpeg reads")))
     }
 
+    pub(crate) fn turn_as_tagged(&mut self) {
+        match *self {}
+    }
+
     pub(crate) fn is_finished(&self) -> bool {
         match *self {}
     }
