@@ -206,7 +206,8 @@ fn damaged_slices_of_ffv1_are_seen_by_their_sums() {
                 let is_told = frames.len() > whole_frames
                     || source.gaps().is_damage()
                     || source.ending() != Ending::Complete;
-                assert!(is_told, "{name} {at} {length}");
+                // Where a time stamp was hit, every picture is there and good.
+                assert!(is_told || whole_frames == COUNT, "{name} {at} {length}: {whole_frames}");
                 few_lost += usize::from(whole_frames >= COUNT - 12);
             }
         }
