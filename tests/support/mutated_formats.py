@@ -195,7 +195,7 @@ def dp_config(folder: Path) -> str:
     """The options of a run as TOML."""
     from pydpend.analyse import Options, write_config
 
-    return write_config(Options(inputs=(str(folder / "drop.parquet"),), fps=500.0, start_s=0.1, threads=2))
+    return write_config(Options(inputs=(str(folder / "drop.parquet"),), unwrap=True, start_s=0.1))
 
 
 def _copied(*names: str) -> Callable[[Path], None]:
