@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -37,11 +37,8 @@ def bob(k: int) -> tuple[float, float]:
     return 160 + 160 * np.sin(angle), 40 + 160 * np.cos(angle)
 
 
-def film(path: Path, frames: int, *, moving: bool = True, seed: int = 3) -> None:
-    """H.264 as a phone makes it (crf 23), with noise of two grey levels."""
-    rng = np.random.default_rng(seed)
-    behind = ground(seed)
-    y, x = np.mgrid[:H, :W]
+def encode(path: Path, crf: int, pictures: Iterable[NDArray[np.float64]]) -> None:
+    """Writes gray pictures as H.264 of 60 frames per s."""
     command = [
         "ffmpeg",
         "-v",
@@ -56,27 +53,27 @@ def film(path: Path, frames: int, *, moving: bool = True, seed: int = 3) -> None
         "-r",
         "60",
     ]
-    command += [
-        "-i",
-        "-",
-        "-c:v",
-        "libx264",
-        "-preset",
-        "veryfast",
-        "-crf",
-        "23",
-        "-pix_fmt",
-        "yuv420p",
-        str(path),
-    ]
-    with subprocess.Popen(command, stdin=subprocess.PIPE) as encoder:
+    command += ["-i", "-", "-c:v", "libx264", "-preset", "veryfast", "-crf", str(crf), "-pix_fmt", "yuv420p"]
+    with subprocess.Popen([*command, str(path)], stdin=subprocess.PIPE) as encoder:
         assert encoder.stdin is not None
-        for k in range(frames):
-            u, v = bob(k) if moving else (90.0, 90.0)
-            part = np.clip(RADIUS + 0.5 - np.hypot(x - u, y - v), 0, 1)
-            picture = behind + (235 - behind) * part + rng.normal(0, 2, behind.shape)
+        for picture in pictures:
             encoder.stdin.write(np.clip(np.round(picture), 0, 255).astype(np.uint8).tobytes())
     assert encoder.returncode == 0
+
+
+def film(path: Path, frames: int, *, moving: bool = True, seed: int = 3) -> None:
+    """H.264 as a phone makes it (crf 23), with noise of two grey levels."""
+    rng = np.random.default_rng(seed)
+    behind = ground(seed)
+    y, x = np.mgrid[:H, :W]
+
+    def picture(k: int) -> NDArray[np.float64]:
+        u, v = bob(k) if moving else (90.0, 90.0)
+        part = np.clip(RADIUS + 0.5 - np.hypot(x - u, y - v), 0, 1)
+        seen: NDArray[np.float64] = behind + (235 - behind) * part + rng.normal(0, 2, behind.shape)
+        return seen
+
+    encode(path, 23, map(picture, range(frames)))
 
 
 def test_a_bob_before_texture_is_followed_without_settings_and_says_so(tmp_path: Path) -> None:
@@ -138,43 +135,16 @@ def two(path: Path, frames: int = 150, seed: int = 5) -> None:
     rng = np.random.default_rng(seed)
     behind = ground(seed)
     y, x = np.mgrid[:H, :W]
-    command = [
-        "ffmpeg",
-        "-v",
-        "error",
-        "-y",
-        "-f",
-        "rawvideo",
-        "-pix_fmt",
-        "gray",
-        "-s",
-        f"{W}x{H}",
-        "-r",
-        "60",
-    ]
-    command += [
-        "-i",
-        "-",
-        "-c:v",
-        "libx264",
-        "-preset",
-        "veryfast",
-        "-crf",
-        "18",
-        "-pix_fmt",
-        "yuv420p",
-        str(path),
-    ]
-    with subprocess.Popen(command, stdin=subprocess.PIPE) as encoder:
-        assert encoder.stdin is not None
-        for k in range(frames):
-            picture = behind.copy()
-            for u, v, radius, level in ((*large(k), 11.0, 240.0), (*small(k), 5.0, 12.0)):
-                part = np.clip(radius + 0.5 - np.hypot(x - u, y - v), 0, 1)
-                picture += (level - picture) * part
-            picture += rng.normal(0, 2, picture.shape)
-            encoder.stdin.write(np.clip(np.round(picture), 0, 255).astype(np.uint8).tobytes())
-    assert encoder.returncode == 0
+
+    def picture(k: int) -> NDArray[np.float64]:
+        seen: NDArray[np.float64] = behind.copy()
+        for u, v, radius, level in ((*large(k), 11.0, 240.0), (*small(k), 5.0, 12.0)):
+            part = np.clip(radius + 0.5 - np.hypot(x - u, y - v), 0, 1)
+            seen += (level - seen) * part
+        seen += rng.normal(0, 2, seen.shape)
+        return seen
+
+    encode(path, 18, map(picture, range(frames)))
 
 
 def large(k: int) -> tuple[float, float]:

@@ -189,7 +189,8 @@ pub fn refine(start: Camera, sets: &[RigidSet], sigma_px: f64, stop: &Stop) -> R
     let mut free = [true; NUMBERS];
     let mut camera = start;
     loop {
-        let Some((fitted, covariance, count, chi2)) = fit(camera, free, sets, sigma_px, stop)? else {
+        let Some(Fit { camera: fitted, covariance, count, chi2 }) = fit(camera, free, sets, sigma_px, stop)?
+        else {
             return Ok(None);
         };
         // The group that says least goes first, if it says less than chance may (Bayes' criterion).
@@ -219,15 +220,24 @@ pub fn refine(start: Camera, sets: &[RigidSet], sigma_px: f64, stop: &Stop) -> R
     }
 }
 
-/// The camera with some numbers free, its covariance, how many coordinates it comes from, and chi-square for each degree of freedom.
-#[allow(clippy::type_complexity, reason = "one fit")]
+/// A camera that was fitted with some of its numbers free.
+struct Fit {
+    camera: Camera,
+    covariance: Matrix5<f64>,
+    /// Coordinates that it comes from.
+    count: usize,
+    /// Chi-square for each degree of freedom.
+    chi2: f64,
+}
+
+/// Fits the numbers that are `free` with shapes and poses; `None` where the equations have no solution.
 fn fit(
     start: Camera,
     free: [bool; NUMBERS],
     sets: &[RigidSet],
     sigma_px: f64,
     stop: &Stop,
-) -> Result<Option<(Camera, Matrix5<f64>, usize, f64)>> {
+) -> Result<Option<Fit>> {
     let mut camera = start;
     let mut shapes: Vec<Vec<Vector2<f64>>> = sets.iter().map(|s| s.shape.clone()).collect();
     let all: usize = shapes.iter().map(|s| 2 * s.len()).sum();
@@ -273,7 +283,7 @@ fn fit(
             covariance[(a - all, b - all)] = inverse[(i, j)] * now.scale.max(1.0);
         }
     }
-    Ok(Some((camera, covariance, now.count, now.scale)))
+    Ok(Some(Fit { camera, covariance, count: now.count, chi2: now.scale }))
 }
 
 /// The normal equations of what is free, with the prior on the camera.

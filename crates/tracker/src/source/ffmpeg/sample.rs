@@ -8,7 +8,7 @@ use super::decode::{Decoder, Picture, Received};
 use super::demux::{Demuxer, Packet, Read};
 use super::fields::{self, FieldOrder};
 use super::layout::Layout;
-use super::source::{FfmpegSource, Shared};
+use super::source::FfmpegSource;
 use super::watch::Fate;
 use crate::error::{Error, Fault, FaultKind, Result};
 use crate::frame::{Bytes, Frame, SourceInfo};
@@ -19,6 +19,15 @@ use crate::source::{Interlaced, cores};
 const PIPE_BYTES: usize = 64 << 20;
 /// Stride over the frames after a key frame.
 const STRIDE: usize = 4;
+
+/// A plane that two frames share.
+struct Shared(Arc<dyn Bytes>);
+
+impl Bytes for Shared {
+    fn bytes(&self) -> &[u8] {
+        self.0.bytes()
+    }
+}
 
 impl FfmpegSource {
     /// Opens the file again, once for each thread, and decodes at places spread by time. Key frames are taken;

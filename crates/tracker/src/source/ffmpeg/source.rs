@@ -3,7 +3,6 @@
 //! Owns: [`FfmpegSource`]. Must not: print, or guess what a frame that could not be decoded held.
 
 use std::collections::VecDeque;
-use std::sync::Arc;
 
 use ffmpeg_next::ffi;
 
@@ -491,14 +490,5 @@ impl FrameSource for FfmpegSource {
 
     fn sample(&mut self, count: usize) -> Result<Vec<Frame>> {
         if self.can_reopen { self.sample_file(count) } else { self.sample_pipe(count) }
-    }
-}
-
-/// A plane that two frames share.
-pub(super) struct Shared(pub(super) Arc<dyn Bytes>);
-
-impl Bytes for Shared {
-    fn bytes(&self) -> &[u8] {
-        self.0.bytes()
     }
 }
