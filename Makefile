@@ -10,7 +10,7 @@ help:
 	@echo "make demo      set up, build, and go from the bundled film to out/demo/report.html"
 	@echo "make test      set up, build, and run every test, Rust and Python"
 	@echo "make check     format, lint and type checks"
-	@echo "make validate  the long accuracy sweeps, into docs/validation.md's tables (about an hour)"
+	@echo "make validate  the long accuracy sweeps, into docs/validation/identity.md's tables (about an hour)"
 	@echo "make wheel     build the wheel, install it into a new environment and use it there"
 	@echo "make bench     the speed figures (criterion), and the ratios beside them"
 	@echo "make fixtures  make the bundled recordings again from their seeds"
@@ -55,7 +55,7 @@ check: build
 # Long: the eight scenes by twenty seeds, real motion filmed, then the estimators' sweeps.
 validate: build
 	cargo build $(CARGO_FLAGS) --example validate
-	target/release/examples/validate --seeds 200..220 --write docs/validation.md
+	target/release/examples/validate --seeds 200..220 --write docs/validation/identity.md
 	$(PY) -m tests.validation.validate_kinematics
 	$(PY) -m tests.validation.validate_resume
 	$(PY) -m tests.validation.mutate --mutants 300

@@ -1,4 +1,4 @@
-"""Kinematics of the ball bearings (paper Sections 4.2 to 4.4, Table 4; docs/physics.md section 3).
+"""Kinematics of the ball bearings (paper Sections 4.2 to 4.4, Table 4; docs/reference/physics.md section 3).
 
 Rates are counter-clockwise positive. ``dI`` is the diameter of the inner race where the balls run, ``dB`` the
 diameter of a ball; rolling without slipping fixes the ball carrier's rate ``omega_D`` and the ball's spin

@@ -1,4 +1,4 @@
-"""Small oscillations, Poincaré sections and the largest Lyapunov exponent (docs/physics.md sections 10 and 11)."""
+"""Small oscillations, Poincaré sections, largest Lyapunov exponent (docs/reference/physics.md sections 10 and 11)."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def modes(model: Model, damping: Damping | None = None) -> Modes:
     """Modes of ``M a + C w + K phi = 0``: mass matrix at rest, viscous moments, weight moments.
 
     1.108 and 2.267 Hz for ``derived("A")``: the decisive test on the last seconds of any recording (Table 7 would give
-    1.17 and 5.68 Hz). docs/physics.md section 10.
+    1.17 and 5.68 Hz). docs/reference/physics.md section 10.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def poincare(
     direction: int = 1,
     tolerance: float = 1e-11,
 ) -> Section:
-    """States at which a link passes an angle: a Poincaré section (docs/physics.md section 11).
+    """States at which a link passes an angle: a Poincaré section (docs/reference/physics.md section 11).
 
     Parameters
     ----------
@@ -188,7 +188,7 @@ def lyapunov(
 ) -> Exponent:
     """Largest Lyapunov exponent of a motion: mean growth of an exactly carried tangent vector.
 
-    docs/physics.md section 11.
+    docs/reference/physics.md section 11.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Angles, rates and accelerations of the links from noisy angles (docs/physics.md section 9).
+"""Angles, rates and accelerations of the links from noisy angles (docs/reference/physics.md section 9).
 
 `states` is a Kalman smoother (compiled, ``crates/dynamics``), the accurate way, with covariances;
 `savitzky_golay` the simple one. Plain differences are no way: at 500 frames a second and 0.1 degrees the
@@ -118,10 +118,10 @@ def states(
     white_jerk: bool = False,
     seed: int = 0,
 ) -> LinkStates:
-    """Smoothed states at every time, also where a link was not seen, by a Kalman smoother (docs/physics.md section 9).
+    """Smoothed states at every time, also where a link was not seen, by a Kalman smoother.
 
-    The covariances are calibrated by passing noise through the smoother; between and beyond the samples of a long gap
-    they are those of the process.
+    The equations are in docs/reference/physics.md section 9. The covariances are calibrated by passing noise through
+    the smoother; between and beyond the samples of a long gap they are those of the process.
 
     Parameters
     ----------

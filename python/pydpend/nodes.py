@@ -387,7 +387,8 @@ class Nodes:
         Returns
         -------
         pandas.DataFrame
-            One row per frame and node, in the columns of the file (docs/conventions.md); names are categories.
+            One row per frame and node, in the columns of the file (docs/reference/conventions.md);
+            names are categories.
         """
         frame: pd.DataFrame = self.to_arrow().to_pandas()
         return frame
@@ -398,7 +399,7 @@ class Nodes:
         Returns
         -------
         pyarrow.Table
-            One row per frame and node, in the columns of the file (docs/conventions.md).
+            One row per frame and node, in the columns of the file (docs/reference/conventions.md).
         """
         import pyarrow as pa
 

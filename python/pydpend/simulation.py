@@ -1,4 +1,4 @@
-"""Simulation of the double pendulum with exact dry friction (paper Section 7; docs/physics.md section 8).
+"""Simulation of the double pendulum with exact dry friction (paper Section 7; docs/reference/physics.md section 8).
 
 The integrator is compiled (``crates/dynamics``): DOP853, an eighth-order pair with dense output, between
 located events at which joints begin to stick or to slip.
@@ -26,7 +26,7 @@ LAWS = FORCES
 TOLERANCE = 3e-13
 """Local error allowed per step by default, in rad, relative rate, and share of the energy: 60 s of a free
 drop without damping then keep their energy to a few 1e-11, with damping and stick-slip better
-(docs/validation.md)."""
+(docs/validation/physics.md)."""
 
 
 @dataclass(frozen=True)
@@ -140,8 +140,8 @@ def simulate(
 ) -> Simulation:
     """The motion from a state, sampled at given times.
 
-    The equations of motion of Eqs. 26-29 with the laws of `Damping` (docs/physics.md section 8). Dry friction is exact,
-    with stick and slip.
+    The equations of motion of Eqs. 26-29 with the laws of `Damping` (docs/reference/physics.md section 8). Dry friction
+    is exact, with stick and slip.
 
     Parameters
     ----------
@@ -157,7 +157,7 @@ def simulate(
         Whether joint 2 is held as it is (Section 3.1's second pin; w1 and w2 must be equal): a single pendulum.
     smooth_width_rad_s : float, optional
         Take ``tanh(rate / width)`` for the sign of dry friction, width in rad/s, under which joints creep and never
-        stick (docs/physics.md Eq. 6.9 gives its error).
+        stick (docs/reference/physics.md Eq. 6.9 gives its error).
     tolerance : float
         Local error allowed per step, in rad, relative rate, and share of the energy.
 

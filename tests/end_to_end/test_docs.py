@@ -16,9 +16,7 @@ ROOT = Path(__file__).parent.parent.parent
 
 def commands(page: str) -> str:
     """The shell blocks of a page, in order."""
-    return "\n".join(
-        re.findall(r"^```sh\n(.*?)^```$", (ROOT / "docs" / page).read_text("utf-8"), re.M | re.S)
-    )
+    return "\n".join(re.findall(r"^```sh\n(.*?)^```$", (ROOT / page).read_text("utf-8"), re.M | re.S))
 
 
 def followed(page: str, folder: Path) -> subprocess.CompletedProcess[str]:
@@ -36,14 +34,14 @@ def followed(page: str, folder: Path) -> subprocess.CompletedProcess[str]:
 
 
 def test_the_tutorial(tmp_path: Path) -> None:
-    done = followed("tutorial.md", tmp_path)
+    done = followed("docs/tutorial/film-to-damping.md", tmp_path)
     assert done.returncode == 0, done.stderr
     # Tried without being done: only the fit depends on the laws.
     assert re.findall(r"^to do +(.*)$", done.stdout, re.M) == ["Damping fit"]
     with (tmp_path / "out/tutorial/run/fit/coefficients.csv").open(encoding="utf-8") as f:
         found = {row["name"]: (float(row["value"]), float(row["sigma"])) for row in csv.DictReader(f)}
     truth = json.loads((ROOT / "fixtures/demo/truth.json").read_text("utf-8"))["damping"]
-    page = (ROOT / "docs/tutorial.md").read_text("utf-8")
+    page = (ROOT / "docs/tutorial/film-to-damping.md").read_text("utf-8")
     table = re.findall(r"^\| (\w+) \| ([\d.e+-]+) ± ([\d.e+-]+) \| ([\d.e+-]+) \|", page, re.M)
     assert {row[0] for row in table} == set(truth)
     for name, value, sigma, made in table:
@@ -56,30 +54,27 @@ def test_the_tutorial(tmp_path: Path) -> None:
 
 
 def test_the_how_to(tmp_path: Path) -> None:
-    done = followed("your-pendulum.md", tmp_path)
+    done = followed("docs/how-to/your-pendulum.md", tmp_path)
     assert done.returncode == 0, done.stderr
     for name in ("rig.toml", "rig.png", "try.parquet", "run.toml"):
         assert (tmp_path / "out/own" / name).stat().st_size > 100
 
 
 def test_angles_and_encoder(tmp_path: Path) -> None:
-    together = tmp_path / "both.md"
-    together.write_text(
-        "".join((ROOT / "docs" / name).read_text("utf-8") for name in ("angles.md", "encoder.md"))
-    )
-    done = followed(str(together), tmp_path)
+    page = "docs/how-to/angles-and-encoder.md"
+    done = followed(page, tmp_path)
     assert done.returncode == 0, done.stderr
     printed = re.findall(r"^(\S.*)$", done.stdout, re.M)
     for line in re.findall(
         r"^    (phi\d: .*|zero from .*|\d+ holds: .*|linearity .*|gain .*|residual RMS .*)$",
-        together.read_text("utf-8"),
+        (ROOT / page).read_text("utf-8"),
         re.M,
     ):
         # The words are the page's; the numbers too, but for the last digits that a better tracker moves.
         words = re.sub(r"[-+]?\d[\d.]*", "#", line)
         (same,) = [p for p in printed if re.sub(r"[-+]?\d[\d.]*", "#", p) == words and p[:4] == line[:4]]
-        for page, found in zip(re.findall(r"\d[\d.]*", line), re.findall(r"\d[\d.]*", same), strict=True):
-            assert float(found) == pytest.approx(float(page), rel=0.15, abs=0.01)
+        for said, found in zip(re.findall(r"\d[\d.]*", line), re.findall(r"\d[\d.]*", same), strict=True):
+            assert float(found) == pytest.approx(float(said), rel=0.15, abs=0.01)
     for name in (
         "angles.png",
         "methods.png",

@@ -169,7 +169,7 @@ def _made() -> Path:
         + "".join(f"{360 * k},{5 + 0.65 * k + 1e-3 * (i % 3):.4f}\n" for k in range(-3, 4) for i in range(5))
     )
     dp.calibrate(dp.read_holds([folder / "holds.csv"])).write(folder / "encoder.json")
-    shutil.copy(FIXTURES.parent / "docs" / "model-a.toml", folder / "model.toml")
+    shutil.copy(FIXTURES.parent / "docs" / "reference" / "model-a.toml", folder / "model.toml")
     constants = zip(CONSTANTS, dp.derived("A").constants().tolist(), strict=True)
     (folder / "constants.toml").write_text(
         "g_m_s2 = 9.81\n[constants]\n" + "".join(f"{name} = {value!r}\n" for name, value in constants)

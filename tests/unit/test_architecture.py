@@ -1,4 +1,4 @@
-"""Arrows go right only (docs/architecture.md): read from the imports, not from what anyone says."""
+"""Arrows go right only (docs/explanation/architecture.md): read from the imports, not from what anyone says."""
 
 from __future__ import annotations
 

@@ -127,8 +127,8 @@ def test_constants_from_a_file(tmp_path: Path) -> None:
 
 
 def test_table_8_as_a_file_of_parts_gives_the_same_constants() -> None:
-    """The example of docs/model.md is configuration A: same numbers through the user's own way."""
-    model = read_model(Path(__file__).parents[2] / "docs" / "model-a.toml")
+    """The example of docs/reference/model.md is configuration A: same numbers through the user's own way."""
+    model = read_model(Path(__file__).parents[2] / "docs" / "reference" / "model-a.toml")
     right = derived("A")
     np.testing.assert_allclose(model.constants(), right.constants(), rtol=1e-12)
     # The file's numbers are independent where Table 8's identical parts are fully correlated, but the upper

@@ -1,4 +1,4 @@
-"""Angles and encoder at full length: the numbers of docs/validation.md (run by ``make validate``, not by
+"""Angles and encoder at full length: the numbers of docs/validation/angles.md (run by ``make validate``, not by
 pytest).
 
 Usage: python -m tests.validation.validate_angles

@@ -185,7 +185,7 @@ fn what_cannot_be_written_is_refused() {
 
 /// An encoder moves whole markers by what it spares, which their pixels do not show: their bodies do.
 ///
-/// Prints the table of `docs/validation.md`:
+/// Prints the table of `docs/validation/detection.md`:
 /// `cargo test --release --workspace --test film_files -- codec --nocapture`.
 #[test]
 fn stated_uncertainties_hold_through_every_codec() {

@@ -1,7 +1,7 @@
 """Damping of each joint from the angles of one or several free decays.
 
 Writes fit.json, coefficients.csv, and per recording a table of energies, one of residuals and
-figures into DIR; with several recordings also trials.json and its figure. docs/damping.md says
+figures into DIR; with several recordings also trials.json and its figure. docs/explanation/damping.md says
 what is estimated and how to read it.
 
   pydpend fit trial1.parquet trial2.parquet trial3.parquet -o damping/

@@ -1,4 +1,4 @@
-"""Moving parts and their energies (paper Section 4.1 and 8.1, Eqs. 20 and 21; docs/physics.md section 2).
+"""Moving parts and their energies (paper Section 4.1 and 8.1, Eqs. 20 and 21; docs/reference/physics.md section 2).
 
 A part's energies and its share of the reduced constants are arithmetic on named quantities, so floats, arrays
 of Monte Carlo samples, complex steps and SymPy symbols may go in. Lengths, masses and inertias may have any

@@ -1,4 +1,4 @@
-"""Damping: every coefficient with an error bar that is true (paper Section 7.1 and beyond; docs/damping.md)."""
+"""Damping: every coefficient with an error bar that is true (Section 7.1 and beyond; docs/explanation/damping.md)."""
 
 from __future__ import annotations
 

@@ -43,7 +43,7 @@ def fit_damping(
     progress: Progress | None = None,
     **keywords: Unpack[FitKeywords],
 ) -> DampingFit:
-    """Damping coefficients of a double pendulum from its free motion (Section 7.1; docs/damping.md).
+    """Damping coefficients of a double pendulum from its free motion (Section 7.1; docs/explanation/damping.md).
 
     Parameters
     ----------

@@ -33,7 +33,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DampingFit(JsonResult, TableResult):
-    """Damping coefficients with everything needed to judge them (Section 7.1; docs/damping.md).
+    """Damping coefficients with everything needed to judge them (Section 7.1; docs/explanation/damping.md).
 
     Attributes
     ----------

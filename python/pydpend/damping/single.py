@@ -96,7 +96,7 @@ def same_links(recordings: Sequence[LinkAngles], model: Model) -> None:
                 fault(
                     a.name,
                     f"angles of one link, but the model {model.name!r} has two",
-                    "Give a one-link model (docs/model.md), or "
+                    "Give a one-link model (docs/reference/model.md), or "
                     + Setting("pinned", True)
                     + " if the elbow of the two is "
                     "pinned straight",
@@ -107,7 +107,7 @@ def same_links(recordings: Sequence[LinkAngles], model: Model) -> None:
                 fault(
                     a.name,
                     f"angles of two links, but the model {model.name!r} has one",
-                    "Give a two-link model (docs/model.md), or a table of one link",
+                    "Give a two-link model (docs/reference/model.md), or a table of one link",
                 )
             )
 

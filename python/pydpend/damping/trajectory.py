@@ -27,7 +27,7 @@ Floats = NDArray[np.float64]
 
 SEGMENT_S = 1.0
 """Length of the segments. On the paper's trials one second makes the trials' coefficients agree better and
-predicts 2-s windows of the other trial better than 0.25 or 0.5 s (docs/validation.md)."""
+predicts 2-s windows of the other trial better than 0.25 or 0.5 s (docs/validation/damping.md)."""
 FLOOR = 0.05
 """Smallest slack, relative to what a segment's own samples determine its state to: information is then
 shared over 1/0.05 = 20 segments. Tighter, a segment near the upright answers to the rounding of its own integration."""

@@ -26,7 +26,8 @@ def covariance(solution: Solution, *, model_error: bool) -> Floats:
     """Covariance (G, G) of the common unknowns.
 
     Each source of error counts with the variance it has, not with the one the fit allowed it: the angles' noise with
-    chi-square, the jumps with what they show of the slack (`Solution.jumps_shown`; docs/damping.md has the derivation).
+    chi-square, the jumps with what they show of the slack (`Solution.jumps_shown`; derived in
+    docs/explanation/damping.md).
     With model error also the sandwich from the scores of blocks of about a second, and of each standard error the
     larger one is taken. Where the angles determine nothing, it is not finite (`information.check_errors`).
     """

@@ -49,8 +49,8 @@ def angles(
         paper's Eqs. 30-32 with a circular mean.
     zero : str, float, sequence of float or Nodes
         ``"rest"`` finds the stretches in which all links hang still, and believes them if nothing in the recording
-        contradicts that (docs/angles.md); ``"vertical"`` is the picture's vertical, with the camera's roll as
-        standard uncertainty, 1 deg or as in ``"vertical=0.5"``; the nodes of another recording with the same rig and
+        contradicts that (docs/explanation/angles.md); ``"vertical"`` is the picture's vertical, with the camera's roll
+        as standard uncertainty, 1 deg or as in ``"vertical=0.5"``; the nodes of another recording with the same rig and
         camera take the rest from there; one number per link says at what angles, in rad, the links stand in the rig's
         reference picture; ``"reference_frame"`` says 0 for both.
     bodies : sequence of str, optional

@@ -63,7 +63,8 @@ KNOWN_RAD = np.radians(5.0)
 
 TOLERANCE_RAD = np.radians([0.5, 5.0])
 """Least and most by which a rest may lie off the zero of a wide swing whose stated uncertainty is small: dry friction
-lets a joint stop off its zero, and fast tumbling followed by cubics was seen to miss by 3 deg (docs/validation.md)."""
+lets a joint stop off its zero, and fast tumbling followed by cubics was seen to miss by 3 deg
+(docs/validation/robustness.md)."""
 
 SIGMAS = 6.0
 """Beyond so many standard uncertainties of the swing's zero another zero is not the same."""

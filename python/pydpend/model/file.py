@@ -1,4 +1,4 @@
-"""A pendulum's TOML file: parts, or reduced constants (docs/model.md)."""
+"""A pendulum's TOML file: parts, or reduced constants (docs/reference/model.md)."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ _KIND = {
 
 
 def read_model(path: AnyPath) -> Model:
-    """A pendulum from a TOML file of parts or of reduced constants (docs/model.md has the form).
+    """A pendulum from a TOML file of parts or of reduced constants (docs/reference/model.md has the form).
 
     Parameters
     ----------
@@ -72,11 +72,13 @@ def read_model(path: AnyPath) -> Model:
     """
     path = path_of(path)
     expect(path, ("model",), ModelError)
-    data = read_toml(path, ModelError, "docs/model.md has examples")
+    data = read_toml(path, ModelError, "docs/reference/model.md has examples")
     if ("constants" in data) == ("part" in data):
         raise ModelError(
             fault(
-                str(path), "needs either a table [constants] or tables [[part]]", "docs/model.md has examples"
+                str(path),
+                "needs either a table [constants] or tables [[part]]",
+                "docs/reference/model.md has examples",
             )
         )
     return _from_constants(data, path) if "constants" in data else _from_parts(data, path)

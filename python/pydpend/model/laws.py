@@ -19,10 +19,10 @@ FORCES = tuple(name for name, law in LAW_TABLE.items() if law.is_force)
 
 @dataclass(frozen=True)
 class Damping:
-    """One coefficient per law of damping, SI, 0 where the law is off (Table 5 corrected; docs/physics.md section 6).
+    """One coefficient per law of damping, SI, 0 where the law is off (Table 5 corrected).
 
     Joint 2's moments act on both links, equal and opposite, and see the relative rate ``w2 - w1`` (errata 13, 14); the
-    drags see absolute rates.
+    drags see absolute rates (docs/reference/physics.md section 6).
 
     Parameters
     ----------

@@ -1,5 +1,5 @@
 //! The eight scenes by many seeds, without settings and without a file between: discover, track, score. Prints the
-//! tables of `docs/validation.md`, of the tracker and, on the same detections, of the paper's own method.
+//! tables of `docs/validation/identity.md`, of the tracker and, on the same detections, of the paper's own method.
 //!
 //! `cargo build --release --workspace --locked --example validate`, then
 //! `target/release/examples/validate [--seeds A..B] [--scenes a,b,...] [--view TILT,TOWARDS,K1,HEIGHT]

@@ -24,7 +24,7 @@ use crate::table::{NodeSummary, RunEnding, SourceFacts};
 use crate::wanted::{Pointed, Wanted};
 
 /// Confidence from which on what moves is named: right results of the films with truth have 0.2 to 0.8, and of the wrong ones
-/// none has more than 0.16 (docs/validation.md, "What moves").
+/// none has more than 0.16 (docs/validation/moving.md).
 const LEAST_CONFIDENCE: f64 = 0.2;
 /// Part of the decoded frames in which one marker at least must be seen for the rig to be believed.
 const LEAST_SEEN: f64 = 0.5;

@@ -21,7 +21,7 @@ pub const REACH_SIGMA: f64 = 5.1;
 /// Pairs of nodes from which a free body is sought.
 pub const PAIRS: usize = 60;
 /// Detections that pairs of nodes are sought among, at most: those whose centres are known best. Bodies have tens of nodes, and
-/// every scene that was followed without a bound has fewer (docs/validation.md); noise has thousands, and its pairs millions.
+/// every scene that was followed without a bound has fewer (docs/validation/identity.md); noise has thousands, and its pairs millions.
 pub const MOST_SEEDS: usize = 400;
 /// Poses that one search tests, at most: 0.1 s of work.
 pub const MOST_TRIALS: usize = 50_000;

@@ -199,7 +199,7 @@ fn frames_cut_out_of_a_file_are_lost_and_the_others_keep_their_times() {
                 if let Some(i) = told(frame) {
                     let time = base.seconds(frame.ticks) - first;
                     // Behind some cuts in Matroska the H.264 decoder gives one picture as that of the next frame, and tells no
-                    // error: the damage of the film is told, that picture's is not (docs/validation.md).
+                    // error: the damage of the film is told, that picture's is not (docs/validation/recordings.md).
                     let late = if name == "h.mkv" { 0.002 } else { 0.0 };
                     assert!(
                         (time - 0.002 * i as f64).abs() < 0.001_01 + late,

@@ -1,6 +1,6 @@
 //! Centres of the film maker's markers against the Cramer-Rao bound of the rendered model.
 //!
-//! `cargo test --release --workspace --lib -- accuracy --nocapture` prints the table of `docs/validation.md`.
+//! `cargo test --release --workspace --lib -- accuracy --nocapture` prints the table of `docs/validation/detection.md`.
 
 use std::sync::Arc;
 

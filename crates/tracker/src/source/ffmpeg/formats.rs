@@ -10,7 +10,7 @@ use std::ptr;
 
 use ffmpeg_next::ffi;
 
-/// Films and streams of pictures that hold all of themselves, by the names of FFmpeg's demuxers. `docs/recordings.md`
+/// Films and streams of pictures that hold all of themselves, by the names of FFmpeg's demuxers. `docs/reference/recordings.md`
 /// lists the same.
 pub(crate) const READ: &str = concat!(
     // Containers.
@@ -129,7 +129,7 @@ mod tests {
 
     #[test]
     fn the_documentation_lists_what_is_opened() {
-        let page = include_str!("../../../../../docs/recordings.md");
+        let page = include_str!("../../../../../docs/reference/recordings.md");
         let films = page.split("## Films").nth(1).unwrap();
         let listed =
             |row: &str| row.split('`').skip(1).step_by(2).map(str::to_owned).collect::<Vec<String>>();
