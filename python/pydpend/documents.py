@@ -139,6 +139,20 @@ class Table:
                 self._wrong(f"{self.place(key)}[{i}]", value, "text")
         return tuple(self.values[key])
 
+    def numbers_or_nan(self, key: str) -> tuple[float, ...]:
+        """A list of numbers, NaN where there is null."""
+        return tuple(
+            math.nan if v is None else self._number(f"{self.place(key)}[{i}]", v)
+            for i, v in enumerate(self.items(key, "numbers"))
+        )
+
+    def flags(self, key: str) -> tuple[bool, ...]:
+        """A list of truth values."""
+        for i, value in enumerate(self.items(key, "truth values")):
+            if not isinstance(value, bool):
+                self._wrong(f"{self.place(key)}[{i}]", value, "true or false")
+        return tuple(self.values[key])
+
     def array(self, key: str, *shape: int) -> NDArray[np.float64]:
         """Finite numbers in lists within lists, of this shape; -1 stands for any length."""
         nested = self._nested(self.place(key), self._get(key), shape)

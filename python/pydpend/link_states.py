@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from pydpend import _native
 from pydpend.errors import AnglesError, fault
-from pydpend.tabular import TableResult, by_link, html_table
+from pydpend.tabular import TableResult, by_link, html_rows
 
 Array = npt.NDArray[np.float64]
 
@@ -90,9 +90,7 @@ class LinkStates(TableResult):
 
     def _repr_html_(self) -> str:
         """The first rows, for a notebook."""
-        columns = self.to_columns()
-        rows = ([f"{v[i]:.6g}" for v in columns.values()] for i in range(min(5, self.t_s.size)))
-        return html_table(repr(self)[1:-1], list(columns), rows)
+        return html_rows(repr(self)[1:-1], self.to_columns())
 
     def to_columns(self) -> dict[str, Array]:
         """The states as columns of a table.

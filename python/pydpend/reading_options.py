@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Any, TypeVar
 
 from pydpend import _native
 from pydpend._typing import Frames, PixelAspect, Region
@@ -118,6 +119,14 @@ class ReadingOptions(DetectOptions, OpenOptions):
     def reading_key(self) -> dict[str, Any]:
         """All that the nodes of a film depend on besides the film and its rig."""
         return {name: value for name, value in self.reading().items() if name != "threads"}
+
+
+T = TypeVar("T", OpenOptions, ReadingOptions)
+
+
+def given(options: type[T], arguments: Mapping[str, Any]) -> T:
+    """The options among the arguments of a function, which has all of them by their names: ``given(T, locals())``."""
+    return options(**{field.name: arguments[field.name] for field in fields(options)})
 
 
 def aspect_text(aspect: PixelAspect | None) -> str | None:

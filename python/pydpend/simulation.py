@@ -16,7 +16,7 @@ import numpy.typing as npt
 from pydpend import _native
 from pydpend.errors import SimulationError, fault
 from pydpend.model import FORCES, LAW_TABLE, Damping, Model, parameters
-from pydpend.tabular import TableResult, by_link, html_table
+from pydpend.tabular import TableResult, by_link, html_rows
 
 Array = npt.NDArray[np.float64]
 
@@ -104,9 +104,7 @@ class Simulation(TableResult):
 
     def _repr_html_(self) -> str:
         """The first rows, for a notebook."""
-        columns = self.to_columns()
-        rows = ([f"{v[i]:.6g}" for v in columns.values()] for i in range(min(5, self.t_s.size)))
-        return html_table(repr(self)[1:-1], list(columns), rows)
+        return html_rows(repr(self)[1:-1], self.to_columns())
 
     def to_columns(self) -> dict[str, Array]:
         """The motion as columns of a table.

@@ -71,6 +71,12 @@ def by_link(columns: Mapping[str, NDArray[np.float64]]) -> dict[str, NDArray[np.
     return out
 
 
+def html_rows(title: str, columns: Mapping[str, NDArray[np.float64]], most: int = 5) -> str:
+    """The first rows of a table of numbers, for a notebook."""
+    rows = zip(*([f"{value:.6g}" for value in values[:most]] for values in columns.values()), strict=True)
+    return html_table(title, list(columns), rows)
+
+
 def html_table(title: str, header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     """A small table for a notebook."""
     head = "".join(f"<th>{escape(cell)}</th>" for cell in header)

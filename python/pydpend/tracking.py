@@ -7,8 +7,6 @@ from __future__ import annotations
 
 import json
 import os
-import sys
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple, TypeAlias
 
@@ -29,7 +27,8 @@ from pydpend._typing import (
 from pydpend.errors import ArgumentError, fault
 from pydpend.nodes import Nodes, Rig, nodes_of, read_nodes
 from pydpend.output import AnyPath
-from pydpend.reading_options import OpenOptions, ReadingOptions
+from pydpend.progress import callback
+from pydpend.reading_options import OpenOptions, ReadingOptions, given
 from pydpend.tabular import TableResult
 from pydpend.wanted import Numbers, Pairs, Places, wanted_arguments
 
@@ -52,41 +51,6 @@ def _rig(rig: Rig | Path | None) -> str | None:
 def _files(rig: Rig | Path | None) -> list[str]:
     """Files that are read besides the recording."""
     return [] if rig is None or isinstance(rig, Rig) else [os.fsdecode(rig)]
-
-
-class _Bar:
-    """A bar on a terminal's standard error or in a notebook."""
-
-    def __init__(self) -> None:
-        self._stage = ""
-        self._bar: Any = None
-
-    def __call__(self, stage: str, done: int, total: int | None) -> None:
-        from tqdm.auto import tqdm
-
-        if stage != self._stage:
-            self.close()
-            self._stage = stage
-            self._bar = tqdm(total=total, desc=stage, unit=" frames", leave=False)
-        self._bar.update(done - self._bar.n)
-
-    def close(self) -> None:
-        if self._bar is not None:
-            self._bar.close()
-            self._bar = None
-
-
-def _callback(
-    progress: Progress,
-) -> tuple[Callable[[str, int, int | None], object] | None, Callable[[], None]]:
-    """The callback to use, and what to call at the end."""
-    if callable(progress):
-        return progress, lambda: None
-    notebook = "ipykernel" in sys.modules
-    if progress is True or (progress is None and (notebook or sys.stderr.isatty())):
-        bar = _Bar()
-        return bar, bar.close
-    return None, lambda: None
 
 
 def track(
@@ -194,25 +158,11 @@ def track(
         On Ctrl-C, within two seconds. What was done until then is the exception's ``nodes``, and with `output` it is
         kept there, to go on with ``resume=True``.
     """
-    reading = ReadingOptions(
-        fps=fps,
-        decoder=decoder,
-        interlaced=interlaced,
-        pixel_aspect=pixel_aspect,
-        allow_protocol=allow_protocol,
-        threads=threads,
-        frames=frames,
-        threshold=threshold,
-        polarity=polarity,
-        centroid=centroid,
-        region=region,
-        min_area_px=min_area_px,
-        max_area_px=max_area_px,
-    )
+    reading = given(ReadingOptions, locals())
     existing = "resume" if resume else "replace" if force else "refuse"
     target = None if output is None else os.fsdecode(output)
     written = _native.OutputSettings(target, existing=existing, safe_csv=safe_csv, reads=_files(rig))
-    callback, close = _callback(progress)
+    told, close = callback(progress)
     try:
         columns, warnings, stopped = _native.track(
             os.fsdecode(path),
@@ -222,7 +172,7 @@ def track(
             reading.opened(),
             wanted_arguments(marker, markers, also, same),
             written,
-            callback,
+            told,
         )
     finally:
         close()
@@ -317,24 +267,10 @@ def setup(
     Where it is not clear what is to be followed, the exception's ``picture`` shows what was found, each with its number
     and its path, and its ``candidates`` say a line of each; the file `picture` is then that picture.
     """
-    reading = ReadingOptions(
-        fps=fps,
-        decoder=decoder,
-        interlaced=interlaced,
-        pixel_aspect=pixel_aspect,
-        allow_protocol=allow_protocol,
-        threads=threads,
-        frames=frames,
-        threshold=threshold,
-        polarity=polarity,
-        centroid=centroid,
-        region=region,
-        min_area_px=min_area_px,
-        max_area_px=max_area_px,
-    )
+    reading = given(ReadingOptions, locals())
     target = None if output is None else os.fsdecode(output)
     written = _native.OutputSettings(target, existing="replace" if force else "refuse")
-    callback, close = _callback(progress)
+    told, close = callback(progress)
     try:
         text, warnings, drawn = _native.setup(
             os.fsdecode(path),
@@ -344,7 +280,7 @@ def setup(
             wanted_arguments(marker, markers, also, same),
             written,
             None if picture is None else os.fsdecode(picture),
-            callback,
+            told,
         )
     finally:
         close()
@@ -442,17 +378,10 @@ def overlay(
     KeyboardInterrupt
         On Ctrl-C, within two seconds; what was drawn is a whole film.
     """
+    opening = given(OpenOptions, locals())
     table = [] if isinstance(nodes, Nodes) else [os.fsdecode(nodes)]
     if not isinstance(nodes, Nodes):
         nodes = read_nodes(nodes)
-    opening = OpenOptions(
-        fps=fps,
-        decoder=decoder,
-        interlaced=interlaced,
-        pixel_aspect=pixel_aspect,
-        allow_protocol=allow_protocol,
-        threads=threads,
-    )
     drawing = _native.OverlaySettings(
         every=_count("every", every),
         width=None if width is None else _count("width", width),
@@ -460,7 +389,7 @@ def overlay(
         quality=_count("quality", quality),
     )
     film = _native.OutputSettings(os.fsdecode(output), existing="replace" if force else "refuse", reads=table)
-    callback, close = _callback(progress)
+    told, close = callback(progress)
     try:
         frame, t_s = _native.overlay_film(
             os.fsdecode(recording),
@@ -469,7 +398,7 @@ def overlay(
             opening.opened(),
             drawing,
             film,
-            callback,
+            told,
         )
     finally:
         close()
@@ -517,13 +446,6 @@ def info(
     ArgumentError
         If an argument makes no sense.
     """
-    opening = OpenOptions(
-        fps=fps,
-        decoder=decoder,
-        interlaced=interlaced,
-        pixel_aspect=pixel_aspect,
-        allow_protocol=allow_protocol,
-        threads=threads,
-    )
+    opening = given(OpenOptions, locals())
     known: dict[str, Any] = json.loads(_native.info(os.fsdecode(path), opening.opened()))
     return known

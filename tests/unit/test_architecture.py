@@ -46,6 +46,7 @@ GROUPS: tuple[tuple[str, ...], ...] = (
         "reading_options",
         "nodes",
         "live",
+        "progress",
         "wanted",
         "tracking",
         "filming",

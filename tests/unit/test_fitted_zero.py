@@ -61,9 +61,9 @@ def test_a_wrong_zero_changes_no_coefficient_and_is_told(
         assert abs(found.value - right.coefficients[name].value) < 0.1 * found.sigma, name
         assert abs(found.value - getattr(TRUTH, name)) < 4 * found.sigma, name
     given = fit.inputs[0]
-    turned = (np.array(given["zeros_deg"]) - off_deg + 180) % 360 - 180
-    np.testing.assert_array_less(np.abs(turned), 5 * np.array(given["zeros_sigma_deg"]))
-    assert given["zeros_off"] == [abs(v) > 0.5 for v in off_deg]
+    turned = (np.array(given.zeros_deg) - off_deg + 180) % 360 - 180
+    np.testing.assert_array_less(np.abs(turned), 5 * np.array(given.zeros_sigma_deg))
+    assert given.zeros_off == tuple(abs(v) > 0.5 for v in off_deg)
     words = " and ".join(f"{abs(v):.1f} deg (phi{j})" for j, v in enumerate(off_deg, 1) if v)
     assert f"swing: the zero was off by {words}; " in " ".join(fit.notes)
     (warning,) = [w for w in told.warnings(fit) if "the zero of its angles was off by" in w]
@@ -71,7 +71,7 @@ def test_a_wrong_zero_changes_no_coefficient_and_is_told(
 
 
 def test_a_right_zero_is_not_spoken_of(right: DampingFit) -> None:
-    assert right.inputs[0]["zeros_off"] == [False, False]
+    assert right.inputs[0].zeros_off == (False, False)
     assert not any("zero was off" in note for note in right.notes)
     assert not any("zero of its angles" in w for w in told.warnings(right))
 
@@ -80,7 +80,7 @@ def test_the_energy_fit_and_a_prediction_have_their_own_zero_too(right: DampingF
     few, wrong = (fit_damping(a, MODEL, "energy", LAWS) for a in (swung(), moved(30.0)))
     for name, found in wrong.coefficients.items():
         assert abs(found.value - few.coefficients[name].value) < 0.1 * found.sigma, name
-    assert wrong.inputs[0]["zeros_off"] == [True, True]
+    assert wrong.inputs[0].zeros_off == (True, True)
     predicted = StoredFit.of(right).predict(moved(30.0), (0.5,))
     assert np.degrees(predicted.zeros_rad) == pytest.approx([30.0, 30.0], abs=0.1)
     assert predicted.in_window["0.5"].rms_deg == pytest.approx([0.05, 0.05], rel=0.1)
@@ -110,10 +110,10 @@ def test_a_zero_by_the_pictures_vertical_gives_the_right_damping() -> None:
     for name, estimate in fit.coefficients.items():
         assert abs(estimate.value - getattr(TRUTH, name)) < 4 * estimate.sigma, name
     given = fit.inputs[0]
-    np.testing.assert_allclose(given["zeros_stated_sigma_deg"], np.degrees(found.meta["zero"]["sigma_rad"]))
+    np.testing.assert_allclose(given.zeros_stated_sigma_deg, np.degrees(found.meta["zero"]["sigma_rad"]))
     # Three degrees of roll and 0.9 of the upper link's line of joints, less than five of the stated degree.
-    assert given["zeros_deg"][0] == pytest.approx(3.9, abs=0.2)
-    assert given["zeros_off"] == [False, False]
+    assert given.zeros_deg[0] == pytest.approx(3.9, abs=0.2)
+    assert given.zeros_off == (False, False)
 
 
 @pytest.mark.parametrize(
@@ -128,7 +128,7 @@ def test_a_hold_is_no_part_of_the_free_decay(deg: tuple[float, ...], off_deg: fl
     model = MODEL if len(deg) == 2 else BAR
     fit = fit_damping(LinkAngles(t, phi, np.full(phi.shape, NOISE_RAD), name="held"), model, laws=laws)
     assert fit.status == "converged"
-    assert fit.inputs[0]["start_s"] > 1.1
+    assert fit.inputs[0].start_s > 1.1
     assert abs(fit.chi2 - 1) < 0.08
     for name in laws:
         found = fit.coefficients[name]

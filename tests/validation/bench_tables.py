@@ -20,7 +20,7 @@ from typing import Any
 
 import pyarrow.parquet as pq
 import pydpend as dp
-from pydpend.tracking import _Bar
+from pydpend.progress import Bar
 
 from tests.support.drawn_nodes import some_nodes
 from tests.support.long_recordings import TRACKER, lengthened, resident
@@ -71,7 +71,7 @@ def door(folder: Path) -> None:
         f"dp.track over the binary, 2000 frames of H.264: {median(python) / median(other):.3f} of medians, "
     )
     print(f"  {min(python) / min(other):.3f} of the best; {median(python):.2f} s", flush=True)
-    bar, spent = _Bar(), 0.0
+    bar, spent = Bar(), 0.0
 
     def timed(stage: str, done: int, total: int | None) -> None:
         nonlocal spent

@@ -64,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
         if r.index >= len(fit.inputs):
             advice = f"It has {len(fit.inputs)} recordings, {r.name} is the {r.index + 1}th"
             raise FitError(fault(str(run.path), "the fit is of other recordings", advice))
-        start = float(fit.inputs[r.index]["start_s"])
+        start = fit.inputs[r.index].start_s
     if not angles.t_s[0] <= start < angles.t_s[-1]:
         raise ArgumentError(
             fault(

@@ -176,15 +176,14 @@ def describe(fit: DampingFit) -> list[str]:
     swings = ", ".join(f"{f:.4f}" for f in fit.modes_hz)
     lines.append(f"small oscillations of the fitted pendulum: {swings} Hz")
     for recording in fit.inputs:
-        if recording.get("tail_modes_hz"):
-            seen = ", ".join(f"{f:.4f}" for f in recording["tail_modes_hz"])
-            lines.append(f"measured in the last seconds of {recording['name']}: {seen} Hz")
+        if recording.tail_modes_hz:
+            seen = ", ".join(f"{f:.4f}" for f in recording.tail_modes_hz)
+            lines.append(f"measured in the last seconds of {recording.name}: {seen} Hz")
     for group in ("law", "joint"):
         parts = ", ".join(
             f"{k} {100 * e.value:.1f} +- {100 * e.sigma:.1f} %" for k, e in fit.shares[group].items()
         )
         lines.append(f"energy by {group}: {parts}")
     for window, p in fit.prediction.items():
-        errors = slashed([p[key] for key in ("phi1_deg", "phi2_deg") if key in p])
-        lines.append(f"prediction, {window} s windows: {errors} deg RMS")
+        lines.append(f"prediction, {window} s windows: {slashed(p.rms_deg)} deg RMS")
     return [*lines, *(t.sentence for t in fit.terms), *fit.identifiability.sentences, *fit.notes]

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from pydpend.damping.compare import compare_terms
 from pydpend.damping.fit import fit_damping
+from pydpend.damping.fitted_recording import AngleMaps, FittedRecording, Window
 from pydpend.damping.maps import Maps
-from pydpend.damping.prediction import Prediction, Window, predict
+from pydpend.damping.prediction import Prediction, predict
 from pydpend.damping.result import DampingFit
 from pydpend.damping.result_parts import (
     EnergyCurve,
@@ -17,9 +18,11 @@ from pydpend.damping.result_parts import (
 )
 
 __all__ = [
+    "AngleMaps",
     "DampingFit",
     "EnergyCurve",
     "Estimate",
+    "FittedRecording",
     "Identifiability",
     "Interval",
     "Maps",

@@ -173,7 +173,7 @@ def _energy(
         names=tuple(names),
         covariance=fit.covariance,
         inputs=tuple(
-            r.described(zero) | {"e0_j": float(e0)}
+            replace(r.described(zero), e0_j=float(e0))
             for r, e0, zero in zip(recordings, fit.e0_j, found, strict=True)
         ),
         energy=curves,

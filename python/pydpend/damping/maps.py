@@ -8,18 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pydpend.damping import shooting
+from pydpend.damping.fitted_recording import KNOTS, AngleMaps
 from pydpend.damping.shooting import Solution, Track
 
 Floats = NDArray[np.float64]
 
-KNOTS = 90
-"""Knots per turn: one every 4 deg."""
 PRIOR_RAD = np.radians(0.1)
 """Prior standard deviation of a knot's bias; steps between markers are of this size."""
 
@@ -39,17 +37,14 @@ class Maps:
                 out[:, j] += knots[low] * (1 - part) + knots[high] * part
         return out
 
-    def to_dict(self) -> dict[str, Any]:
-        """Knots in degrees with what they are functions of."""
-        return {
-            "arguments": ["phi1", "phi2", "phi2-phi1"],
-            "knots_deg": np.degrees(self.knots_rad).tolist(),
-        }
+    def result(self) -> AngleMaps:
+        """The maps as a fit's result has them, in degrees."""
+        return AngleMaps(np.degrees(self.knots_rad))
 
     @classmethod
-    def from_dict(cls, given: dict[str, Any]) -> Maps:
-        """The inverse of `to_dict`."""
-        return cls(np.radians(np.asarray(given["knots_deg"], dtype=np.float64)))
+    def of(cls, maps: AngleMaps) -> Maps:
+        """The inverse of `result`."""
+        return cls(np.radians(maps.knots_deg))
 
 
 def _places(phi: Floats) -> list[tuple[NDArray[np.int64], NDArray[np.int64], Floats]]:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pydpend.damping import shooting
+from pydpend.damping.fitted_recording import Window
 from pydpend.damping.maps import Maps, corrected
 from pydpend.damping.recording import Recording
 from pydpend.damping.result import DampingFit
@@ -42,38 +43,6 @@ HELD_OUT = 0.3
 def slashed(values: Sequence[float]) -> str:
     """One number per link: ``0.105/0.139``."""
     return "/".join(f"{v:.3f}" for v in values)
-
-
-@dataclass(frozen=True)
-class Window:
-    """Prediction errors over all windows of one length.
-
-    Attributes
-    ----------
-    rms_deg : tuple of float
-        Root mean square over all samples, per link, deg.
-    median_deg : tuple of float
-        Median of the windows' root mean squares, per link, deg.
-    n : int
-        Number of windows.
-    """
-
-    rms_deg: tuple[float, ...]
-    median_deg: tuple[float, ...]
-    n: int
-
-    def to_dict(self) -> dict[str, Any]:
-        """As in ``predict.json``."""
-        out: dict[str, Any] = plain(
-            {"rms_deg": list(self.rms_deg), "median_deg": list(self.median_deg), "n": self.n}
-        )
-        return out
-
-    @classmethod
-    def of_table(cls, table: Table) -> Window:
-        """The inverse of `to_dict`."""
-        rms, median = (tuple(table.array(key, -1).tolist()) for key in ("rms_deg", "median_deg"))
-        return cls(rms, median, table.whole("n"))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -430,10 +399,10 @@ def split(recordings: Sequence[Recording]) -> tuple[list[Recording], Recording]:
 
 def held_out(
     recordings: Sequence[Recording], run: Callable[[Sequence[Recording]], DampingFit]
-) -> tuple[dict[str, dict[str, Any]], str]:
+) -> tuple[dict[str, Window], str]:
     """Prediction of what a fit has not seen: each recording from the others, or the last part of the only one.
 
-    Returns RMS by window for ``fit.json`` and a sentence. Too short a recording gives none, and the
+    Returns the errors by length of window and a sentence. Too short a recording gives none, and the
     sentence why.
     """
     if len(recordings) > 1:
@@ -450,18 +419,18 @@ def held_out(
     for known, unknown in parts:
         try:
             fit = run(known)
-            maps = None if fit.maps is None else Maps.from_dict(fit.maps)
+            maps = None if fit.maps is None else Maps.of(fit.maps)
             result = predict(unknown, fit.parameters, maps=maps, forecasts=False)
         except FitError as problem:
             return {}, f"no prediction of unseen data: {problem}"
         for key, window in result.in_window.items():
             collected.setdefault(key, []).append(window)
-    out: dict[str, dict[str, Any]] = {}
-    for key, windows in collected.items():
-        n = np.array([w.n for w in windows], dtype=np.float64)
-        rms = np.sqrt(np.average([np.square(w.rms_deg) for w in windows], axis=0, weights=n))
-        middle = np.average([w.median_deg for w in windows], axis=0, weights=n)
-        out[key] = {"n": int(n.sum())}
-        for j, (value, typical) in enumerate(zip(rms, middle, strict=True), 1):
-            out[key] |= {f"phi{j}_deg": float(value), f"phi{j}_median_deg": float(typical)}
-    return out, words
+    return {key: _together(windows) for key, windows in collected.items()}, words
+
+
+def _together(windows: Sequence[Window]) -> Window:
+    """The errors of windows of one length over several recordings."""
+    n = np.array([w.n for w in windows], dtype=np.float64)
+    rms = np.sqrt(np.average([np.square(w.rms_deg) for w in windows], axis=0, weights=n))
+    middle = np.average([w.median_deg for w in windows], axis=0, weights=n)
+    return Window(tuple(rms.tolist()), tuple(middle.tolist()), int(n.sum()))

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from pydpend.damping.fitted_recording import FittedRecording
 from pydpend.damping.noise import Noise, noise
 from pydpend.damping.shooting import Track
 from pydpend.decay import Decay, find_decay
@@ -45,15 +45,6 @@ class FittedZero:
         """Where the given zero is wrong beyond what is stated of it."""
         allowed = OFF_SIGMAS * np.hypot(np.nan_to_num(self.sigma_rad), np.nan_to_num(self.stated_rad))
         return np.asarray(np.abs(self.zero_rad) > np.maximum(allowed, OFF_RAD))
-
-    def to_dict(self) -> dict[str, Any]:
-        """As in ``inputs``: degrees, null where not known."""
-        return {
-            "zeros_deg": np.degrees(self.zero_rad).tolist(),
-            "zeros_sigma_deg": np.degrees(self.sigma_rad).tolist(),
-            "zeros_stated_sigma_deg": np.degrees(self.stated_rad).tolist(),
-            "zeros_off": self.off.tolist(),
-        }
 
     def notes(self, name: str) -> tuple[str, ...]:
         """In words that the given zero was wrong; empty if it was not."""
@@ -97,18 +88,25 @@ class Recording:
             stated if stated.shape == (links,) else np.full(links, np.nan),
         )
 
-    def described(self, zero: FittedZero) -> dict[str, Any]:
-        """Its part of a fit's ``inputs``, with the angle zeros found."""
-        return {
-            "name": self.angles.name,
-            "source": self.angles.meta.get("source"),
-            "start_s": self.decay.start_s,
-            "stop_s": self.decay.stop_s,
-            "samples": int(self.angles.t_s.size),
-            "noise_deg": [float(v) for v in np.degrees(self.noise.measured_rad)],
-            "noise_source": list(self.noise.source),
-            **zero.to_dict(),
-        }
+    def described(self, zero: FittedZero) -> FittedRecording:
+        """What a fit says of the recording, with the angle zeros found."""
+
+        def degrees(values: ArrayLike) -> tuple[float, ...]:
+            return tuple(np.degrees(values).tolist())
+
+        return FittedRecording(
+            name=self.angles.name,
+            source=self.angles.meta.get("source"),
+            start_s=self.decay.start_s,
+            stop_s=self.decay.stop_s,
+            samples=int(self.angles.t_s.size),
+            noise_deg=degrees(self.noise.measured_rad),
+            noise_source=tuple(self.noise.source),
+            zeros_deg=degrees(zero.zero_rad),
+            zeros_sigma_deg=degrees(zero.sigma_rad),
+            zeros_stated_sigma_deg=degrees(zero.stated_rad),
+            zeros_off=tuple(zero.off.tolist()),
+        )
 
     def notes(self) -> list[str]:
         """How its free decay was found, and links whose stated uncertainty was not believed."""

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pydpend import _native
 from pydpend.coefficients import FULL, RATIOS, unit
+from pydpend.damping.fitted_recording import AngleMaps, FittedRecording, Window
 from pydpend.damping.result_parts import (
     SHORT_S,
     EnergyCurve,
@@ -62,7 +63,7 @@ class DampingFit(JsonResult, TableResult):
         Names of the P rows of `covariance`: coefficients and ratios.
     covariance : ndarray of float, shape (P, P)
         Their covariance, SI.
-    inputs : tuple of dict
+    inputs : tuple of pydpend.damping.FittedRecording
         Each recording: name, the span used, samples, noise, angle zeros.
     energy : tuple of pydpend.damping.EnergyCurve
         Energies of each recording; ``energy.csv`` in the fit's folder.
@@ -71,8 +72,8 @@ class DampingFit(JsonResult, TableResult):
     within_noise : bool or None
         Whether the model describes the angles to within their noise; where it does not, the standard errors carry its
         errors. None where the fit does not tell (energy).
-    prediction : dict of str to dict
-        Window in s: root mean square per link, deg, of data the fit did not see.
+    prediction : dict of str to pydpend.damping.Window
+        By length of window in s: errors of the prediction of data the fit did not see.
     terms : tuple of pydpend.damping.Term
         What the data say of each term, if the terms were compared.
     intervals : dict of str to pydpend.damping.Interval
@@ -86,7 +87,7 @@ class DampingFit(JsonResult, TableResult):
     modes_hz : tuple of float
         Small oscillations of the fitted pendulum about hanging, Hz; those measured at the end of each recording are in
         `inputs`.
-    maps : dict or None
+    maps : pydpend.damping.AngleMaps or None
         Angle-bias maps, if asked for.
     ten : pydpend.damping.result.TenCoefficients or None
         The paper's ten coefficients, if asked for.
@@ -110,18 +111,18 @@ class DampingFit(JsonResult, TableResult):
     parameters: dict[str, float]
     names: tuple[str, ...]
     covariance: Floats
-    inputs: tuple[dict[str, Any], ...]
+    inputs: tuple[FittedRecording, ...]
     energy: tuple[EnergyCurve, ...] = field(default=(), repr=False)
     residuals: tuple[Residuals, ...] = field(default=(), repr=False)
     within_noise: bool | None = None
-    prediction: dict[str, dict[str, Any]] = field(default_factory=dict)
+    prediction: dict[str, Window] = field(default_factory=dict)
     terms: tuple[Term, ...] = ()
     intervals: dict[str, Interval] = field(default_factory=dict)
     chi2_slack: float = math.nan
     slack: dict[str, float] = field(default_factory=dict)
     iterations: int = 0
     modes_hz: tuple[float, ...] = ()
-    maps: dict[str, Any] | None = None
+    maps: AngleMaps | None = None
     ten: TenCoefficients | None = None
     notes: tuple[str, ...] = ()
 
@@ -173,7 +174,7 @@ class DampingFit(JsonResult, TableResult):
                 group: {k: {"value": v.value, "sigma": v.sigma} for k, v in shares.items()}
                 for group, shares in self.shares.items()
             },
-            "prediction": self.prediction,
+            "prediction": {window: errors.by_link() for window, errors in self.prediction.items()},
             "identifiability": {
                 "condition": self.identifiability.condition,
                 "correlations": self.identifiability.correlations,
@@ -183,7 +184,7 @@ class DampingFit(JsonResult, TableResult):
             },
             "terms": {t.name: t.to_dict() for t in self.terms},
             "intervals": {name: i.to_dict() for name, i in self.intervals.items()},
-            "inputs": list(self.inputs),
+            "inputs": [each.to_dict() for each in self.inputs],
             "version": _native.VERSION,
             "chi2_slack": self.chi2_slack,
             "slack": self.slack,
@@ -191,7 +192,7 @@ class DampingFit(JsonResult, TableResult):
             "modes_hz": list(self.modes_hz),
             "parameters": self.parameters,
             "covariance": {"names": list(self.names), "matrix": self.covariance.tolist()},
-            "maps": self.maps,
+            "maps": None if self.maps is None else self.maps.to_dict(),
             "ten_coefficients": None if self.ten is None else self.ten.to_dict(),
             "notes": list(self.notes),
         }
@@ -258,16 +259,16 @@ class DampingFit(JsonResult, TableResult):
             parameters={n: parameters.number(n) for n in parameters},
             names=names,
             covariance=table.table("covariance").array("matrix", len(names), len(names)),
-            inputs=tuple(_input_of(each) for each in table.tables("inputs")),
+            inputs=tuple(FittedRecording.of_table(each) for each in table.tables("inputs")),
             within_noise=table.flag("within_noise") if "within_noise" in table else None,
-            prediction={w: _window_of(prediction.table(w)) for w in prediction},
+            prediction={w: Window.of_links(prediction.table(w)) for w in prediction},
             terms=tuple(Term.of_table(n, terms.table(n)) for n in terms),
             intervals={n: Interval.of_table(intervals.table(n)) for n in intervals},
             chi2_slack=table.number_or_nan("chi2_slack"),
             slack={n: numbers.number_or_nan(n) for n in numbers},
             iterations=table.whole("iterations"),
             modes_hz=tuple(table.array("modes_hz", -1).tolist()),
-            maps=table.table("maps").values if "maps" in table else None,
+            maps=AngleMaps.of_table(table.table("maps")) if "maps" in table else None,
             ten=TenCoefficients.of_table(table.table("ten_coefficients"))
             if "ten_coefficients" in table
             else None,
@@ -275,22 +276,6 @@ class DampingFit(JsonResult, TableResult):
         )
 
 
-def _input_of(table: Table) -> dict[str, Any]:
-    """What a fit says of one recording, checked as far as it is used."""
-    table.text("name")
-    for key in ("start_s", "stop_s"):
-        table.number(key)
-    for key, kind in (("zeros_deg", float), ("zeros_sigma_deg", float), ("zeros_off", bool)):
-        if key in table and not all(isinstance(v, kind) or v is None for v in table.items(key)):
-            table.refuse(key, "a list of numbers or truth values is expected")
-    return table.values
-
-
 def _share_of(table: Table) -> Estimate:
     """A share of the energy; NaN where nothing was lost."""
     return Estimate(table.number_or_nan("value"), table.number_or_nan("sigma"), "1")
-
-
-def _window_of(table: Table) -> dict[str, Any]:
-    """The prediction's errors in windows of one length, checked."""
-    return {key: table.whole(key) if key == "n" else table.number(key) for key in table}

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pydpend.damping.maps import KNOTS, Maps, corrected
+from pydpend.damping.fitted_recording import AngleMaps
+from pydpend.damping.maps import Maps, corrected
 from pydpend.damping.prediction import WINDOWS_S, Prediction, initial_state, predict
 from pydpend.damping.recording import prepare
 from pydpend.damping.result import DampingFit
@@ -29,7 +30,7 @@ class StoredFit:
     @classmethod
     def of(cls, fit: DampingFit) -> StoredFit:
         """A fit just made, as if it had been written and read."""
-        return cls(dict(fit.parameters), None if fit.maps is None else Maps.from_dict(fit.maps))
+        return cls(dict(fit.parameters), None if fit.maps is None else Maps.of(fit.maps))
 
     @classmethod
     def of_table(cls, content: Table) -> StoredFit:
@@ -44,7 +45,7 @@ class StoredFit:
                 table.refuse(name, f"{value:g} is no number of a pendulum")
         maps = None
         if "maps" in content:
-            maps = Maps(np.radians(content.table("maps").array("knots_deg", 2, 3, KNOTS)))
+            maps = Maps.of(AngleMaps.of_table(content.table("maps")))
         stored = cls(parameters, maps)
         try:
             stored.model()

@@ -235,7 +235,7 @@ def _judge(
         names=kept,
         covariance=cov,
         inputs=tuple(
-            r.described(zero) | {"tail_modes_hz": list(plausible.tail_modes_hz(r.track, r.span, fitted))}
+            replace(r.described(zero), tail_modes_hz=tuple(plausible.tail_modes_hz(r.track, r.span, fitted)))
             for r, zero in zip(recordings, zeros, strict=True)
         ),
         energy=tuple(energy_curve(tracks, path, names, values, fitted, k) for k in range(len(recordings))),
@@ -253,7 +253,7 @@ def _judge(
         },
         iterations=solution.iterations,
         modes_hz=plausible.modes_hz(fitted)[:links],
-        maps=None if bias is None else bias.to_dict(),
+        maps=None if bias is None else bias.result(),
         notes=(
             *_notes(recordings, solution),
             *(note for r, zero in zip(recordings, zeros, strict=True) for note in zero.notes(r.angles.name)),

@@ -147,6 +147,6 @@ def save_figures(fit: DampingFit, trials: Trials | None, folder: FitFolder) -> N
         save(energy_figure(curve), folder.file_of(FileOfEach.ENERGY_FIGURE, k, len(fit.inputs)))
     save(shares_figure(fit.shares), folder.file(FitFile.SHARES_FIGURE))
     if fit.maps is not None:
-        save(maps_figure(Maps.from_dict(fit.maps)), folder.file(FitFile.MAPS_FIGURE))
+        save(maps_figure(Maps.of(fit.maps)), folder.file(FitFile.MAPS_FIGURE))
     if trials is not None:
         save(coefficients_figure(trials.spreads), folder.file(FitFile.TRIALS_FIGURE))

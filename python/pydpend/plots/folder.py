@@ -87,7 +87,7 @@ def _maps(run: StoredRun, r: StoredRecording) -> Figure:
     maps = run.fit_folder.fit().maps
     if maps is None:
         raise FigureError(fault("maps", f"the fit of {run.path} was made without angle maps", AGAIN))
-    return maps_figure(Maps.from_dict(maps))
+    return maps_figure(Maps.of(maps))
 
 
 @dataclass(frozen=True)

@@ -78,14 +78,12 @@ def warnings(fit: DampingFit) -> list[str]:
     for given in fit.inputs:
         off = [
             f"{digits(abs(z))} deg{f' (phi{j})' if links_of(fit) > 1 else ''}"
-            for j, (z, wrong) in enumerate(
-                zip(given.get("zeros_deg", ()), given.get("zeros_off", ()), strict=False), 1
-            )
+            for j, (z, wrong) in enumerate(zip(given.zeros_deg, given.zeros_off, strict=False), 1)
             if wrong
         ]
         if off:
             out.append(
-                f"{given['name']}: the zero of its angles was off by {listed(off)}, as the fit found with a zero "
+                f"{given.name}: the zero of its angles was off by {listed(off)}, as the fit found with a zero "
                 "of its own. The damping is free of that; the angles above are not."
             )
     # The sentence on the whole recording; those on single coefficients stand with them.
@@ -162,8 +160,7 @@ def _trust(fit: DampingFit, predictions: Mapping[str, Prediction]) -> list[str]:
             out.append(f"{name} predicted from the others, {_errors(window.rms_deg)}.")
     told = fit.prediction.get(TOLD_WINDOW_S)
     if told is not None and len(fit.inputs) == 1:
-        rms = [told[f"phi{j}_deg"] for j in range(1, links_of(fit) + 1)]
-        out.append(f"The last part predicted from a fit to the rest, {_errors(rms)}.")
+        out.append(f"The last part predicted from a fit to the rest, {_errors(told.rms_deg)}.")
     return out
 
 
@@ -265,7 +262,7 @@ def sections(run: StoredRun, fit: DampingFit, predictions: Mapping[str, Predicti
     blocks.append(
         Figure(inline_svg(shares_figure(fit.shares)), "Where the energy goes, with standard uncertainties.")
     )
-    names = [i.get("name", f"recording {k + 1}") for k, i in enumerate(fit.inputs)]
+    names = [given.name for given in fit.inputs]
     for k, (name, recording) in enumerate(zip(names, run.recordings, strict=False)):
         energy, left = recording.energy(), recording.residuals()
         title = f" of {name}" if len(names) > 1 else ""
@@ -291,10 +288,8 @@ def _constants(fit: DampingFit) -> list[Block]:
         for n, e in fit.ratios.items()
     ]
     for given in fit.inputs:
-        for j, (zero, sigma) in enumerate(
-            zip(given.get("zeros_deg", ()), given.get("zeros_sigma_deg", ()), strict=False), 1
-        ):
-            of = f" of {given['name']}" if len(fit.inputs) > 1 else ""
+        for j, (zero, sigma) in enumerate(zip(given.zeros_deg, given.zeros_sigma_deg, strict=False), 1):
+            of = f" of {given.name}" if len(fit.inputs) > 1 else ""
             rows.append(
                 (f"zero of phi{j}{of} by the fit, from the given one", "", quantity(zero, sigma, "deg"))
             )
