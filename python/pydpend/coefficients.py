@@ -1,4 +1,4 @@
-"""Which damping laws a fit has: names, units, groups, and the model as the compiled part wants it."""
+"""The damping laws of a fit: names, units, groups, and the model as the compiled part wants it."""
 
 from __future__ import annotations
 

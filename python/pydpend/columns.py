@@ -49,13 +49,13 @@ class Columns:
     has_instants: bool = False
 
     def place(self, row: int, column: str = "") -> str:
-        """Where a row is, for a message: ``line 12, column voltage_v`` or ``row 11, column voltage_v``."""
+        """The place of a row, for a message: ``line 12, column voltage_v`` or ``row 11, column voltage_v``."""
         where = f"row {row}" if self.lines is None else f"line {int(self.lines[row])}"
         return f"{where}, column {column}" if column else where
 
     @property
     def rows(self) -> int:
-        """How many rows there are."""
+        """The number of rows."""
         return next((v.size for v in self.values.values()), 0)
 
 

@@ -1,4 +1,4 @@
-"""Where in a recording the free decay is: after the release, before the rest."""
+"""The free decay of a recording: after the release, before the rest."""
 
 from __future__ import annotations
 

@@ -232,7 +232,7 @@ class Fields:
 
 
 def no_column(name: str, missing: Sequence[str], header: Sequence[str], naming: Setting | None) -> Message:
-    """What is said of columns that a table has not. ``naming``: the caller's setting that names columns."""
+    """The message for columns that a table has not. ``naming``: the caller's setting that names columns."""
     advice = Message.of(f"The columns are {', '.join(header) or '(none)'}; name the right one")
     return fault(
         name,

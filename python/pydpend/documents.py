@@ -54,7 +54,7 @@ class Table:
         return iter(self.values)
 
     def place(self, key: str | int) -> str:
-        """Where a value stands: ``holds[2].std_v``."""
+        """The place of a value: ``holds[2].std_v``."""
         if isinstance(key, int):
             return f"{self.where}[{key}]"
         name = key if key.isprintable() else repr(key)

@@ -106,13 +106,13 @@ FILM_TRUTH = Step("tracker film --truth", "dp.film(truth=...)")
 
 
 class FrontEnd(Protocol):
-    """How settings and steps are written for whoever reads them."""
+    """The form in which settings and steps are written for whoever reads them."""
 
     def setting(self, setting: Setting) -> str:
         """``--method energy``, ``method='energy'``."""
 
     def step(self, step: Step) -> str:
-        """What to type, or what to call."""
+        """The command to type, or the call."""
 
 
 class _Python:
@@ -240,7 +240,7 @@ class FitOptionError(FitError, OptionError):
 
 
 def fault(subject: Text, problem: Text, advice: Text = "", *, place: str = "") -> Message:
-    """What an error says: ``subject, place: problem. Advice``."""
+    """The message of an error: ``subject, place: problem. Advice``."""
     if isinstance(subject, Setting):
         subject = replace(subject, subject=True)
     said = Message.of(subject) + (f", {place}: " if place else ": ") + problem
@@ -248,5 +248,5 @@ def fault(subject: Text, problem: Text, advice: Text = "", *, place: str = "") -
 
 
 def one_of(setting: str, value: object, known: Iterable[str]) -> Message:
-    """What an error says of a setting whose value is none of those known."""
+    """The message for a setting whose value is none of those known."""
     return fault(Setting(setting), f"{value!r} is not known", f"Give {listed(known)}")

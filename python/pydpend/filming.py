@@ -41,7 +41,7 @@ PRESETS = (
 
 @dataclass(frozen=True, eq=False)
 class Truth(TableResult):
-    """What is true of a film of T frames, N markers and L links.
+    """The truth of a film of T frames, N markers and L links.
 
     Attributes
     ----------
@@ -185,7 +185,7 @@ class Film:
         return self._film.expected(frame)
 
     def truth(self) -> Truth:
-        """What is true of every frame.
+        """The truth of every frame.
 
         Returns
         -------

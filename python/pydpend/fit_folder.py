@@ -63,7 +63,7 @@ _OF_EACH = re.compile(r"(\w+)(?:-\d+)?(\.\w+)")
 
 
 def about_fit(name: str) -> str:
-    """What a file of a fit's folder is; empty for one that is none."""
+    """The description of a file of a fit's folder; empty for one that is none."""
     if name in list(FitFile):
         return FitFile(name).words
     found = _OF_EACH.fullmatch(name)

@@ -1,4 +1,4 @@
-"""What a damping fit can be told, in one class that is checked before any fit begins.
+"""The options of a damping fit, in one class that is checked before any fit begins.
 
 `fit_damping`, ``pydpend fit``, ``pydpend analyse`` and the keys of a run's stages all have it from here.
 """
@@ -52,7 +52,7 @@ class FitKeywords(TypedDict, total=False):
 
 @dataclass(frozen=True, kw_only=True)
 class FitOptions:
-    """How the damping is fitted.
+    """The options of a damping fit.
 
     Every parameter is a flag of the same name in ``pydpend fit`` and ``pydpend analyse``, described by the same words.
 
@@ -214,7 +214,7 @@ class FitOptions:
         return self._of_one_link(names) if single else names
 
     def bare(self) -> Self:
-        """The same fit without what is found beside its coefficients: intervals, comparison, prediction, the ten.
+        """The options without what is found beside the coefficients: intervals, comparison, prediction, the ten.
 
         Returns
         -------
@@ -240,7 +240,7 @@ class FitOptions:
         )
 
     def key(self) -> dict[str, Any]:
-        """All that the result of a fit depends on besides its recordings and its model.
+        """The key of a fit: all that its result depends on besides its recordings and its model.
 
         Returns
         -------

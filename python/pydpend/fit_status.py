@@ -1,4 +1,4 @@
-"""How a damping fit ended and what the data say of a term: decisions as data, with their words."""
+"""The status of a damping fit and the verdict on a term: decisions as data, with their words."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from pydpend.worded import Words
 
 
 class FitStatus(Words):
-    """How a fit ended."""
+    """The states in which a fit can end."""
 
     CONVERGED = "converged", "converged"
     """Its numbers are the solution."""
@@ -17,7 +17,7 @@ class FitStatus(Words):
 
 
 class Verdict(Words):
-    """What the data say of one term."""
+    """The verdicts of the data on one term."""
 
     ASKED_FOR = "asked_for", "asked for"
     """Without it the fitted data are worse described, and others no better predicted."""

@@ -58,7 +58,7 @@ def check_errors(names: list[str], covariance: Floats) -> None:
 
 
 def undetermined(why: str) -> Message:
-    """What is said of angles that do not determine what is fitted."""
+    """The message for angles that do not determine what is fitted."""
     return fault(
         "fit",
         f"these angles do not determine the coefficients: {why}",

@@ -1,4 +1,4 @@
-"""What a file or folder is, by what is in it; `tracker::kind` of the compiled half decides, for both programs."""
+"""The kind of a file or folder by what is in it; `tracker::kind` of the compiled half decides, for both programs."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ Kind: TypeAlias = Literal[
 
 
 def kind_of(path: str | os.PathLike[str]) -> Kind:
-    """What a file or folder is; ``unknown`` where nobody can tell, or there is none."""
+    """The kind of a file or folder; ``unknown`` where nobody can tell, or there is none."""
     kind: Kind = _native.kind_of(os.fspath(path))
     return kind
 

@@ -29,7 +29,7 @@ chance."""
 
 
 class Angles(Protocol):
-    """What is needed of `pydpend.kinematics.LinkAngles`."""
+    """The part of `pydpend.kinematics.LinkAngles` that is needed here."""
 
     @property
     def t_s(self) -> Array:

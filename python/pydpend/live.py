@@ -216,5 +216,5 @@ class Tracker:
 
     @property
     def detections(self) -> NDArray[np.void]:
-        """What was detected in the last image, of dtype `DETECTION`."""
+        """The detections of the last image, of dtype `DETECTION`."""
         return _detections(self._live.detections())

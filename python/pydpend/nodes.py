@@ -317,7 +317,7 @@ class Nodes:
         return f"<Nodes {name}: {len(self)} frames x {len(self.rig.nodes)} nodes, {seen:.1f} % seen>"
 
     def _repr_html_(self) -> str:
-        """How well each node was seen, for a notebook."""
+        """The sight of each node, for a notebook."""
         rows = []
         for i, node in enumerate(self.rig.nodes):
             seen = self.seen[:, i]
@@ -327,7 +327,7 @@ class Nodes:
 
     @property
     def seen(self) -> NDArray[np.bool_]:
-        """Where a place is known, (T, N)."""
+        """Whether a place is known, (T, N)."""
         seen: NDArray[np.bool_] = (self.status == SEEN) | (self.status == REACQUIRED)
         return seen
 
@@ -339,7 +339,7 @@ class Nodes:
 
     @property
     def damage(self) -> str | None:
-        """What of the recording is lost, in a sentence; None if nothing is.
+        """The frames lost to damage, in a sentence; None if none are.
 
         Raises
         ------

@@ -34,7 +34,7 @@ def method_of(field: Field[Any]) -> str:
 
 
 def kind_of_value(field: Field[Any]) -> Kind:
-    """What a command line or a file gives for the option."""
+    """The type of the value that a command line or a file gives for the option."""
     declared = str(field.type)
     kinds: tuple[tuple[str, Kind], ...] = (
         ("tuple", "texts"),
@@ -56,7 +56,7 @@ _ENTRY = re.compile(r"^(\w+) : .*\n((?:    .*(?:\n|$))+)", re.MULTILINE)
 
 @cache
 def meanings(options: type) -> dict[str, str]:
-    """What the docstring of a class says of each of its parameters, those of the classes that it extends too."""
+    """The description of each parameter in a class's docstring, those of the classes that it extends too."""
     out: dict[str, str] = {}
     for part in reversed(options.__mro__):
         if not dataclasses.is_dataclass(part):

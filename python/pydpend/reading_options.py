@@ -1,4 +1,4 @@
-"""How a film is read and what in it is a marker, in one class: what every command that reads a film can be told."""
+"""The options of reading a film and of detecting markers in it, in one class for every command that reads a film."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ WORDS = _native.setting_words()
 
 @dataclass(frozen=True, kw_only=True)
 class OpenOptions:
-    """How a film is opened.
+    """The options of opening a film.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ class OpenOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class DetectOptions:
-    """What in a film is a marker, and in which frames it is followed.
+    """The options of detecting markers, and the frames in which they are followed.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ class ReadingOptions(DetectOptions, OpenOptions):
         return {field.name: getattr(self, field.name) for field in fields(ReadingOptions)}
 
     def reading_key(self) -> dict[str, Any]:
-        """All that the nodes of a film depend on besides the film and its rig."""
+        """The key of the nodes of a film: all that they depend on besides the film and its rig."""
         return {name: value for name, value in self.reading().items() if name != "threads"}
 
 
@@ -130,7 +130,7 @@ def given(options: type[T], arguments: Mapping[str, Any]) -> T:
 
 
 def aspect_text(aspect: PixelAspect | None) -> str | None:
-    """As the compiled half takes it; it knows what makes sense."""
+    """The setting as the compiled half takes it, which knows what makes sense."""
     if aspect is None or isinstance(aspect, str):
         return aspect
     try:
@@ -143,7 +143,7 @@ def aspect_text(aspect: PixelAspect | None) -> str | None:
 
 
 def region_text(region: Region | None) -> str | None:
-    """As the compiled half takes it; it knows what makes sense."""
+    """The setting as the compiled half takes it, which knows what makes sense."""
     if region is None or isinstance(region, str):
         return region
     try:

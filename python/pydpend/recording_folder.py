@@ -155,7 +155,7 @@ class RecordingFolder:
         return read_angles(self.file(RunFile.ANGLES), name=name)
 
     def angles_about(self) -> dict[str, Any]:
-        """How the angles were had: `LinkAngles.meta`."""
+        """The origin of the angles: `LinkAngles.meta`."""
         return read_document(self.file(RunFile.ANGLES_ABOUT)).values
 
     def calibration(self) -> Calibration | None:

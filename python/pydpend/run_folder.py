@@ -47,7 +47,7 @@ def write_predictions(run: Path, found: Mapping[str, Prediction]) -> None:
 
 @dataclass(frozen=True)
 class StageRecord:
-    """What a stage said and how long it took."""
+    """The record of a stage: its words and its duration."""
 
     message: str
     seconds: float
@@ -111,7 +111,7 @@ class StoredRun:
     recordings: tuple[StoredRecording, ...]
 
     def title(self, stage: str) -> str:
-        """What a stage is called for people."""
+        """The name of a stage for people."""
         return self.titles.get(stage, stage)
 
     @property

@@ -1,4 +1,4 @@
-"""How good a node table is, measured against the truth of a film."""
+"""The score of a node table, measured against the truth of a film."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a terminal is given to show: text out of files and of their names never as it is."""
+"""Text for a terminal: what comes out of files and of their names is never shown as it is."""
 
 from __future__ import annotations
 

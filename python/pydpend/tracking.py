@@ -415,7 +415,7 @@ def info(
     allow_protocol: bool = False,
     pixel_aspect: PixelAspect | None = None,
 ) -> dict[str, Any]:
-    """What is known of a recording before it is read through.
+    """The facts of a recording before it is read through.
 
     Parameters
     ----------

@@ -53,7 +53,7 @@ class Spread:
     unit: str
 
     def to_dict(self) -> dict[str, Any]:
-        """As in ``trials.json``."""
+        """The spread as in ``trials.json``."""
         out: dict[str, Any] = plain(asdict(self))
         return out
 

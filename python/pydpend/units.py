@@ -68,7 +68,7 @@ def is_of_time(column: str, stated: str = "") -> bool:
 
 
 def unit_at_end(name: str) -> tuple[str, UnitOf | None]:
-    """How a column's name spells its unit, "" if it names none, and that unit, ``None`` if it is not known.
+    """The spelling of the unit in a column's name, "" if it names none, and that unit, ``None`` if it is not known.
 
     A unit stands in brackets (``time (ms)``, ``U [mV]``) or behind a separator (``time_ms``, ``t/ms``), or is the whole
     name. What stands in brackets and begins with a letter is a unit, known or not.

@@ -1,4 +1,4 @@
-"""What a user says of what to follow, as the compiled half takes it."""
+"""The markers that a user wants followed, as the compiled half takes them."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def wanted_arguments(
     also: Numbers,
     same: Pairs,
 ) -> WantedArguments:
-    """The same as the compiled half takes it, which knows what makes sense.
+    """The markers that are wanted, as the compiled half takes them, which knows what makes sense.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Which files lie in a run folder, by which stage, and what each is."""
+"""The files of a run folder: what each is, and the stage that wrote it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pydpend.run_folder import PREDICTION
 
 
 def about(name: str) -> str:
-    """What a file of a run folder is."""
+    """The description of a file of a run folder."""
     last = name.rsplit("/", 1)[-1]
     if last == PREDICTION:
         return "each recording predicted from the others"

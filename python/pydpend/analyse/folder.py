@@ -68,7 +68,7 @@ class Digests:
         return str(known[2])
 
     def option(self, name: str | None) -> str | None:
-        """What stands for an option that may be a file: its digest if it is one, else its words."""
+        """The key of an option that may be a file: its digest if it is one, else its words."""
         if name is None:
             return None
         path = Path(name)
@@ -81,7 +81,7 @@ def _sha256(path: Path) -> str:
 
 
 def _stages(table: Table) -> dict[str, dict[str, Any]]:
-    """What ``run.json`` says of each stage, checked: its files are later taken away by these names."""
+    """The records of each stage in ``run.json``, checked: files are later taken away by these names."""
     out = {}
     for stage in table:
         done = table.table(stage)

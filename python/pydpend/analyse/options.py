@@ -143,7 +143,7 @@ class Options(FitOptions, ReadingOptions):
                 )
 
     def of_markers(self) -> dict[str, Any]:
-        """What was said of the markers of films, as `pydpend.track` takes it.
+        """The options of markers in films, as `pydpend.track` takes them.
 
         Returns
         -------

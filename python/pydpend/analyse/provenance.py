@@ -1,4 +1,4 @@
-"""What a run folder says of itself: from what, with what and by which command it was made."""
+"""The provenance of a run folder: its inputs, the versions and the command that made it."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def command(options: Options, folder: Path) -> str:
 
 
 def readme(run: RunFolder) -> str:
-    """What lies in the folder, for a person who opens it in ten years."""
+    """The description of the folder, for a person who opens it in ten years."""
     facts: dict[str, Any] = run.facts
     lines = [
         f"A run of pydpend {facts['version']}.",

@@ -1,4 +1,4 @@
-"""What the inputs of a run are: films, node tables or angles."""
+"""The inputs of a run: films, node tables or angles."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Recording:
     encoder: str | None = None
 
     def facts(self) -> dict[str, Any]:
-        """As plain values, for ``run.json``."""
+        """The recording as plain values, for ``run.json``."""
         return asdict(self)
 
 

@@ -49,7 +49,7 @@ class Stage:
 
 @dataclass(frozen=True)
 class Outcome(JsonResult):
-    """What a run came to."""
+    """The outcome of a run."""
 
     _error: ClassVar = RunFolderError
     _source: ClassVar = "the outcome of a run"
@@ -65,7 +65,7 @@ class Outcome(JsonResult):
     """How long each stage took when it was done, the report included."""
 
     def to_dict(self) -> dict[str, Any]:
-        """As plain values."""
+        """The outcome as plain values."""
         return {
             "folder": str(self.folder),
             "status": str(self.status),
@@ -156,7 +156,7 @@ def plan(options: Options, folder: Path, digests: Digests | None = None) -> list
 
 
 def _plan_page(r: Recording, options: Options, here: Path, add: Callable[..., None]) -> None:
-    """What only the page needs, and no number waits for."""
+    """The stages that only the page needs, and no number waits for."""
     needs = (f"{r.name}/track",) if r.kind == "film" else ()
     if r.kind != "angles":
         add(

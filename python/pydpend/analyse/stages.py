@@ -1,4 +1,4 @@
-"""What each stage of a run does: calls the public functions and writes what they give into a folder.
+"""The stages of a run: each calls public functions and writes their results into a folder.
 
 Nothing is computed here. ``here`` is the recording's folder with what earlier stages made, ``into`` the folder to
 write to. Every function returns one sentence for ``run.json``.
@@ -75,7 +75,7 @@ def track(r: Recording, options: Options, into: Path, tell: Tell, resume: bool) 
 
 
 def markers(r: Recording, here: Path, into: Path) -> str:
-    """How well each node was seen and how well it fits its body: ``residuals.parquet``, ``markers.json``."""
+    """The sight of each node and its fit to its body: ``residuals.parquet``, ``markers.json``."""
     import numpy as np
 
     from pydpend.kinematics import misfits

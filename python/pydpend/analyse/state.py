@@ -1,4 +1,4 @@
-"""What becomes of a stage of a run, and what is told of it while it is done."""
+"""The states of a run and of its stages, and the progress that is told of them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pydpend.worded import Words
 
 
 class StageState(Words):
-    """What became of a stage."""
+    """The states in which a stage can end."""
 
     DONE = "done", "done"
     KEPT = "kept", "kept"
@@ -27,7 +27,7 @@ class StageState(Words):
 
 
 class RunState(Words):
-    """What became of a run."""
+    """The states in which a run can end."""
 
     DONE = "done", "done"
     PARTLY = "partly", "partly done"
@@ -36,7 +36,7 @@ class RunState(Words):
 
 @dataclass(frozen=True)
 class StageResult:
-    """What became of a stage, and why where it gave nothing."""
+    """The state of a stage, and the reason where it gave nothing."""
 
     state: StageState
     why: str = ""
@@ -53,7 +53,7 @@ class Started:
 
 @dataclass(frozen=True)
 class Going:
-    """How far a stage is: what it does, and its part from 0 to 1 where that is known."""
+    """The progress of a stage: what it does, and its part from 0 to 1 where that is known."""
 
     what: str
     share: float | None = None

@@ -34,7 +34,7 @@ def add_arguments(p: argparse.ArgumentParser) -> None:
 
 
 def add_signal_arguments(p: argparse.ArgumentParser) -> None:
-    """How to read an encoder's file; shared by ``calibrate`` and ``compare``."""
+    """Options of reading an encoder's file; shared by ``calibrate`` and ``compare``."""
     p.add_argument(
         "--column", metavar="NAME", help="column or TDMS channel of the encoder (default voltage_v)"
     )

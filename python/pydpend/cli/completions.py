@@ -35,7 +35,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _name_files(p: argparse.ArgumentParser) -> None:
-    """Whatever takes words that are not of a list completes to file names. argparse shows its arguments only here."""
+    """Arguments that take words of no list complete to file names. argparse shows its arguments only here."""
     import shtab
 
     for action in p._actions:

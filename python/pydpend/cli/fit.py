@@ -55,7 +55,7 @@ def add_angles_arguments(p: argparse.ArgumentParser, *, many: bool) -> None:
 
 
 def add_table_arguments(p: argparse.ArgumentParser) -> None:
-    """How an angles table is to be understood; of every command that reads one."""
+    """Options of reading an angles table; of every command that reads one."""
     p.add_argument(
         "--columns",
         default="",
@@ -79,7 +79,7 @@ def add_table_arguments(p: argparse.ArgumentParser) -> None:
 
 
 def add_output_arguments(p: argparse.ArgumentParser) -> None:
-    """Where results go and how much is said."""
+    """Options of the results' folder and of how much is said."""
     p.add_argument("-o", "--output", required=True, metavar="DIR", type=Path, help="folder for the results")
     add_force(p)
     p.add_argument("--json", action="store_true", help="the result as JSON on stdout")

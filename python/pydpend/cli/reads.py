@@ -1,4 +1,4 @@
-"""Which files a command reads, so that none of them is replaced by what it writes."""
+"""The files that a command reads, so that none of them is replaced by what it writes."""
 
 from __future__ import annotations
 

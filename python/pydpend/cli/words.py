@@ -1,4 +1,4 @@
-"""What the library says, in the words of the command line: settings are flags, steps are commands to type.
+"""Messages of the library in the words of the command line: settings are flags, steps are commands to type.
 
 Also what is said of words on the command line that are not known: the nearest that are, and new names of old options.
 """
@@ -44,7 +44,7 @@ class CommandLine:
         return said if owner == f"pydpend {self._command}" else f"{said} (of `{owner}`)"
 
     def step(self, step: Step) -> str:
-        """What to type."""
+        """The command to type."""
         return f"`{step.command}`"
 
     def _owner(self, keyword: str) -> tuple[str, str]:
@@ -92,7 +92,7 @@ ELSEWHERE = {
 
 
 def unknown_command(word: str, known: Iterable[str]) -> str:
-    """What to say of a command that is none."""
+    """The message for a command that is none."""
     if word in ELSEWHERE:
         return f"{word!r} is a command of the program tracker. Type `{ELSEWHERE[word]}`"
     near = difflib.get_close_matches(word.lower(), list(known), 1, 0.6)
@@ -101,7 +101,7 @@ def unknown_command(word: str, known: Iterable[str]) -> str:
 
 
 def unknown_option(word: str, command: str, commands: Mapping[str, argparse.ArgumentParser]) -> str:
-    """What to say of an option that a command has not."""
+    """The message for an option that a command has not."""
     flag = word.partition("=")[0]
     flags = options_of(commands[command])
     near = difflib.get_close_matches(flag.lower(), flags, 1, 0.7) or [

@@ -54,7 +54,7 @@ class Rigid:
 
 @dataclass(frozen=True)
 class Races:
-    """What a bearing's races turn with: 0 the stand, 1 the upper link, 2 the lower link; and where it is."""
+    """The links that a bearing's races turn with (0 the stand, 1 the upper link, 2 the lower link), and its place."""
 
     inner: int
     outer: int

@@ -1,4 +1,4 @@
-"""Which terms the data ask for, which they reject, and which they cannot tell apart.
+"""Comparison of terms: those that the data ask for, those they reject, and those they cannot tell apart.
 
 Every law is fitted at once to a part of the data; then each is left out in turn, with the same slack. The gain
 in likelihood says what the fitted data think of a term, the prediction of the rest what it is worth.
@@ -34,7 +34,7 @@ WORSE = 2.0
 
 
 def verdict(gain: float, prediction_z: float, correlation: float) -> Verdict:
-    """What the data say of a term, from its three numbers."""
+    """The verdict of the data on a term, from its three numbers."""
     if gain > ASKED and prediction_z > -WORSE:
         return Verdict.ASKED_FOR
     if abs(correlation) > 0.9:

@@ -1,4 +1,4 @@
-"""What a damping fit's result says of its recordings: spans, zeros and noise, angle maps, errors of predictions."""
+"""Parts of a damping fit's result on its recordings: spans, zeros and noise, angle maps, errors of predictions."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class AngleMaps:
     knots_deg: Floats
 
     def to_dict(self) -> dict[str, Any]:
-        """As in ``fit.json``: the knots with what they are functions of."""
+        """The knots as in ``fit.json``, with what they are functions of."""
         return {"arguments": ["phi1", "phi2", "phi2-phi1"], "knots_deg": self.knots_deg.tolist()}
 
     @classmethod
@@ -41,7 +41,7 @@ class AngleMaps:
 
 @dataclass(frozen=True)
 class FittedRecording:
-    """What a fit says of one of its recordings of L links.
+    """A recording of L links as it was fitted.
 
     Attributes
     ----------
@@ -84,7 +84,7 @@ class FittedRecording:
     e0_j: float | None = None
 
     def to_dict(self) -> dict[str, Any]:
-        """As in ``fit.json``."""
+        """The recording as in ``fit.json``."""
         own = {"tail_modes_hz", "e0_j"}
         return {name: v for name, v in asdict(self).items() if name not in own or v is not None}
 
@@ -130,7 +130,7 @@ class Window:
     n: int
 
     def to_dict(self) -> dict[str, Any]:
-        """As in ``predict.json``."""
+        """The errors as in ``predict.json``."""
         out: dict[str, Any] = plain(
             {"rms_deg": list(self.rms_deg), "median_deg": list(self.median_deg), "n": self.n}
         )
@@ -143,7 +143,7 @@ class Window:
         return cls(rms, median, table.whole("n"))
 
     def by_link(self) -> dict[str, Any]:
-        """As in ``fit.json``: each link's errors under a name of their own."""
+        """The errors as in ``fit.json``: each link's under a name of their own."""
         out: dict[str, Any] = {"n": self.n}
         for j, (rms, median) in enumerate(zip(self.rms_deg, self.median_deg, strict=True), 1):
             out |= {f"phi{j}_deg": rms, f"phi{j}_median_deg": median}

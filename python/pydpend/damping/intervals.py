@@ -47,7 +47,7 @@ the variance by quite another factor (7000 and 14000 in two of trial1's with Tab
 
 
 def refusal(solution: Solution) -> str:
-    """Why there are no intervals by profile likelihood; empty where there can be."""
+    """The reason for which there are no intervals by profile likelihood; empty where there can be."""
     if solution.chi2 <= LARGEST:
         return ""
     return (
@@ -212,7 +212,7 @@ def _solved(
 
 
 def _next(tried: Sequence[tuple[float, float]], inside: float, outside: float) -> float:
-    """Where the rise should be `LEVEL`; always between ``inside`` and ``outside``.
+    """The value at which the rise should be `LEVEL`; always between ``inside`` and ``outside``.
 
     On the parabola through the estimate and the last two distances tried (it has a slope at a bound), or if only one
     is known on that without slope.

@@ -1,4 +1,4 @@
-"""How large the noise of measured angles is, from the angles themselves."""
+"""The noise of measured angles, estimated from the angles themselves."""
 
 from __future__ import annotations
 

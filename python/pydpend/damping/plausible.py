@@ -41,7 +41,7 @@ def modes_hz(model: Model) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Wobble:
-    """How much the energy of a measured motion goes up and down, relative to its largest value."""
+    """The rise and fall of a measured motion's energy, relative to its largest value."""
 
     rms: float
     """RMS distance from the nearest curve that only falls."""

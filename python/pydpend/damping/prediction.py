@@ -47,7 +47,7 @@ def slashed(values: Sequence[float]) -> str:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Prediction(JsonResult, TableResult):
-    """How well a fit predicts one recording that it has not seen.
+    """The errors with which a fit predicts one recording that it has not seen.
 
     In a window only the initial state is fitted; a forecast fits the state to the past half second alone and looks
     ahead.
@@ -372,7 +372,7 @@ def _forecast(
 
 
 def _tumbling_stops(recording: Recording) -> float:
-    """When the lower link has passed the top for the last time, s."""
+    """The time at which the lower link has passed the top for the last time, s."""
     t, phi = recording.angles.t_s, recording.angles.phi_rad[:, -1]
     here = (t >= recording.span[0]) & (t <= recording.span[1]) & np.isfinite(phi)
     turns = np.floor((phi[here] + np.pi) / (2 * np.pi))
@@ -381,7 +381,7 @@ def _tumbling_stops(recording: Recording) -> float:
 
 
 def split(recordings: Sequence[Recording]) -> tuple[list[Recording], Recording]:
-    """What to fit and what to leave out for prediction: the last recording, or the last part of the only one.
+    """Splits recordings into a part to fit and one to predict: the last recording, or the last part of the only one.
 
     Raises FitError when it is too short for that.
     """

@@ -32,7 +32,7 @@ OFF_RAD = np.radians(0.5)
 
 @dataclass(frozen=True, eq=False)
 class FittedZero:
-    """What a fit says of the zero of the angles it was given: measured is true plus zero. All (links,), rad."""
+    """The zero of the given angles as a fit found it: measured is true plus zero. All (links,), rad."""
 
     zero_rad: Floats
     sigma_rad: Floats
@@ -42,7 +42,7 @@ class FittedZero:
 
     @property
     def off(self) -> NDArray[np.bool_]:
-        """Where the given zero is wrong beyond what is stated of it."""
+        """Links whose given zero is wrong beyond what is stated of it."""
         allowed = OFF_SIGMAS * np.hypot(np.nan_to_num(self.sigma_rad), np.nan_to_num(self.stated_rad))
         return np.asarray(np.abs(self.zero_rad) > np.maximum(allowed, OFF_RAD))
 
@@ -89,7 +89,7 @@ class Recording:
         )
 
     def described(self, zero: FittedZero) -> FittedRecording:
-        """What a fit says of the recording, with the angle zeros found."""
+        """The recording's part of a fit's result, with the angle zeros found."""
 
         def degrees(values: ArrayLike) -> tuple[float, ...]:
             return tuple(np.degrees(values).tolist())
@@ -109,7 +109,7 @@ class Recording:
         )
 
     def notes(self) -> list[str]:
-        """How its free decay was found, and links whose stated uncertainty was not believed."""
+        """Notes on how the free decay was found, and on links whose stated uncertainty was not believed."""
         out = [f"{self.angles.name}: {self.decay.message}"]
         for j, source in enumerate(self.noise.source[: self.angles.links]):
             if source == "measured":

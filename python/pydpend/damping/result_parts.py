@@ -1,4 +1,4 @@
-"""What a damping fit's result is made of: estimates, energies, residuals, and what is said of the terms."""
+"""Parts of a damping fit's result: estimates, energies, residuals, identifiability, terms and intervals."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ class EnergyCurve(TableResult):
 
 @dataclass(frozen=True, eq=False)
 class Residuals(TableResult):
-    """What is left of one recording's angles when the fitted motion, its zeros and angle maps are taken off.
+    """The rest of one recording's angles when the fitted motion, its zeros and angle maps are taken off.
 
     Attributes
     ----------
@@ -146,7 +146,7 @@ SHORT_S = 20.0
 
 @dataclass(frozen=True)
 class Identifiability:
-    """What the data determine and what they do not.
+    """The coefficients that the data determine, and those they do not.
 
     Attributes
     ----------
@@ -172,7 +172,7 @@ class Identifiability:
 
     @property
     def warning(self) -> str:
-        """What a motion that is `too_short` means, in words; empty for a longer one."""
+        """The meaning of a motion that is `too_short`, in words; empty for a longer one."""
         if not self.too_short:
             return ""
         return (
@@ -188,7 +188,7 @@ class Identifiability:
 
 @dataclass(frozen=True)
 class Term:
-    """What the data say of one term.
+    """The evidence of the data on one term.
 
     Attributes
     ----------
@@ -217,7 +217,7 @@ class Term:
     verdict: Verdict
 
     def to_dict(self) -> dict[str, Any]:
-        """As in ``fit.json``."""
+        """The term as in ``fit.json``."""
         return {**asdict(self), "verdict": str(self.verdict), "sentence": self.sentence}
 
     @classmethod
@@ -275,7 +275,7 @@ class Interval:
     note: str
 
     def to_dict(self) -> dict[str, Any]:
-        """As in ``fit.json``; null for an end that was not found."""
+        """The interval as in ``fit.json``; null for an end that was not found."""
         return asdict(self)
 
     @classmethod
@@ -318,7 +318,7 @@ class TenCoefficients:
     condition: float
 
     def to_dict(self) -> dict[str, Any]:
-        """As in ``fit.json``."""
+        """The ten as in ``fit.json``."""
         return {
             "values": {k: v.to_dict() for k, v in self.values.items()},
             "rmu": {k: v.to_dict() for k, v in self.rmu.items()},
@@ -342,7 +342,7 @@ class TenCoefficients:
 
     @property
     def warning(self) -> str:
-        """What may not be believed, in words."""
+        """The warning of numbers that may not be believed, in words."""
         sums = "; ".join(
             f"{name} = {' '.join(f'{w:+.3g} mu_c{i}_{name[-1]}' for i, w in enumerate(self.weights[name], 1))} "
             f"= {e.value:.3g} +- {e.sigma:.1g} m"

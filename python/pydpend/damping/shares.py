@@ -1,4 +1,4 @@
-"""How much of the energy each law and each joint takes."""
+"""The share of the energy that each law and each joint takes."""
 
 from __future__ import annotations
 

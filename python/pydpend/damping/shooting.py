@@ -92,7 +92,7 @@ class Segments:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """What the compiled fit gives; see ``dynamics::shooting::Fit``."""
+    """The solution of the compiled fit; see ``dynamics::shooting::Fit``."""
 
     parameters: dict[str, float]
     zeros_rad: Floats
@@ -318,7 +318,7 @@ def residuals(tracks: Sequence[Track], path: Trace, zeros_rad: Floats) -> Floats
 
 
 def residuals_of(tracks: Sequence[Track], path: Trace, zeros_rad: Floats) -> tuple[Residuals, ...]:
-    """The same by recording, with the times and the standard deviations they were weighted by."""
+    """Residuals by recording, with their times and the standard deviations they were weighted by."""
     left = residuals(tracks, path, zeros_rad)
     out = []
     for r, (t, _, sigma) in enumerate(tracks):

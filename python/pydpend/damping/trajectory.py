@@ -169,7 +169,7 @@ def tightened(
     bounded: Sequence[str],
     progress: Progress | None,
 ) -> Solution:
-    """The same fit with no slack beyond the noise's own: what the model must be able to do if it is right."""
+    """The fit with no slack beyond the noise's own: what the model must be able to do if it is right."""
     return shooting.solve(
         tracks,
         solution.segments,

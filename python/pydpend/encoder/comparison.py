@@ -406,7 +406,7 @@ def _blocks(t: Floats, residual: Floats, sigma: float) -> tuple[float, float]:
 
 
 def _delay(course: Course, t: Floats, encoder_rad: Floats, offset: float, gain: float) -> tuple[float, float]:
-    """How much later the encoder's readings are than their stamps say, s, with clocks given as one."""
+    """The delay of the encoder's readings behind their stamps, s, with clocks given as one."""
     angle, rate = course.at(t), course.rate_at(t)
     residual = offset + gain * encoder_rad - angle
     rate = rate - rate.mean()

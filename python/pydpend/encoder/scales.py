@@ -77,7 +77,7 @@ def in_base(
 
 
 def _spelled(source: str, column: str, stated: str) -> tuple[str, UnitOf | None]:
-    """How a column's unit is spelled and which it is. Refuses a stated unit that contradicts the column's name."""
+    """The spelling of a column's unit, and the unit. Refuses a stated unit that contradicts the column's name."""
     named, of_name = unit_at_end(column)
     if not stated:
         return named, of_name

@@ -1,4 +1,4 @@
-"""What an encoder recorded: :class:`EncoderSignal`, and reading it from CSV, Parquet, NI TDMS or NumPy."""
+"""Recordings of an encoder: :class:`EncoderSignal`, and reading it from CSV, Parquet, NI TDMS or NumPy."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ KNOWN_COLUMNS = ("voltage_v", "phi1_rad", "phi1_deg")
 
 @dataclass(frozen=True, eq=False, repr=False)
 class EncoderSignal(TableResult):
-    """What an encoder recorded: T readings over time.
+    """A recording of an encoder: T readings over time.
 
     Parameters
     ----------

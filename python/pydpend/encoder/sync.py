@@ -260,7 +260,7 @@ def synchronise(
     *,
     clocks: str = "estimate",
 ) -> Synchronisation:
-    """How the encoder's clock stands to the video's, with gain and zero, by maximum likelihood.
+    """The encoder's clock against the video's, with gain and zero, by maximum likelihood.
 
     Parameters
     ----------

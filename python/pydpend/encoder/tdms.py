@@ -39,7 +39,7 @@ def read_tdms(
 
 @contextmanager
 def _heard(path: Path) -> Iterator[list[str]]:
-    """What npTDMS says of a file meanwhile, which it would print, as notes."""
+    """The words of npTDMS on a file meanwhile, which it would print, as notes."""
     said: list[str] = []
 
     class Ear(logging.Handler):

@@ -1,4 +1,4 @@
-"""What zero follows from what the caller says: a rest that hangs, the picture, another recording, or given angles."""
+"""The zero by what the caller says: a rest that hangs, the picture, another recording, or given angles."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Raw:
 
 
 def parse_zero(text: str) -> str | list[float] | None:
-    """What a text says of the zero; ``None`` if it can only be a file.
+    """The zero that a text states; ``None`` if it can only be a file.
 
     A word that `angles` knows, or angles in degrees (``12.5,-3``) as rad.
 
@@ -93,7 +93,7 @@ def zero_for(
     mirrored: bool,
     label: str,
 ) -> tuple[Floats, dict[str, Any], list[str]]:
-    """What to take off the turns ``phi`` (T, L) to have angles, (L,), where that comes from, and what is doubtful."""
+    """The zero to take off the turns ``phi`` (T, L) to have angles, (L,), its origin, and what is doubtful."""
     links = phi.shape[1]
     given = _given(zero, links)
     if (
@@ -194,7 +194,7 @@ def _noise(phi: Floats, sigma: Floats) -> float:
 
 
 def _told(swing: Swing | None, zero: Floats) -> dict[str, Any]:
-    """What the swing says of a zero, for the meta."""
+    """The swing's evidence on a zero, for the meta."""
     if swing is None:
         return {"swing": None}
     return {"swing": {"off_rad": swing.off(zero).tolist(), "sigma_rad": swing.sigma_rad.tolist()}}

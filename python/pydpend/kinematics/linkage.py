@@ -31,7 +31,7 @@ _CHUNK = 4096
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """What stays the same in all frames, turned as in the rig's reference picture.
+    """The geometry that stays the same in all frames, turned as in the rig's reference picture.
 
     Attributes
     ----------
@@ -189,7 +189,7 @@ class Frames:
 
 
 def predicted(shape: Shape, theta: Floats) -> tuple[Floats, Floats]:
-    """Where the markers are at angles ``theta`` (T, L), (T, N, 2), and the derivatives by them, (T, N, 2, L)."""
+    """The markers' places at angles ``theta`` (T, L), (T, N, 2), and the derivatives by them, (T, N, 2, L)."""
     upper = rotate(theta[:, :1], shape.upper_px[None])
     places = shape.pivot_px + upper
     slopes = np.zeros((theta.shape[0], upper.shape[1], 2, theta.shape[1]))
@@ -352,7 +352,7 @@ def _moved(shape: Shape, step: Floats, k1: int, k2: int) -> Shape:
 
 
 def regular(v: Floats) -> Floats:
-    """The same matrices with 1 on the diagonal where an angle has no marker at all."""
+    """The matrices with 1 on the diagonal where an angle has no marker at all."""
     diagonal = np.einsum("taa->ta", v)
     out = v.copy()
     np.einsum("taa->ta", out)[...] = np.where(diagonal > 0, diagonal, 1.0)

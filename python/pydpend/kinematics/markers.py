@@ -44,7 +44,7 @@ class BodyMarkers:
         return self.weight > 0
 
     def without(self, drop: NDArray[np.bool_]) -> BodyMarkers:
-        """The same with the marked (T, K) centres left out."""
+        """The markers with the marked (T, K) centres left out."""
         return BodyMarkers(
             self.name, self.nodes, self.xy_px, np.where(drop, 0.0, self.weight), self.reference_px
         )

@@ -1,4 +1,4 @@
-"""How far each marker is from where its rigid body says it should be."""
+"""The distance of each marker from its place on its rigid body."""
 
 from __future__ import annotations
 

@@ -324,7 +324,7 @@ def _reject(
 def _one_of_three(
     markers: BodyMarkers, template: Floats, used: NDArray[np.bool_], frames: NDArray[np.int64], scale2: float
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Which of three markers to leave out (its index), and where that stays an open question.
+    """The index of the marker to leave out of three, and the frames in which that stays an open question.
 
     With three markers two different ones can explain the same disagreement. So all answers are tried: if two
     fit and their angles differ by more than five standard errors, nothing tells which is right.

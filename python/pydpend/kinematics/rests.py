@@ -1,4 +1,4 @@
-"""Which rest hangs: a stretch at rest is the zero only if nothing in the recording contradicts it."""
+"""The rest that hangs: a stretch at rest is the zero only if nothing in the recording contradicts it."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ than this many times as far."""
 
 
 class Verdict(Enum):
-    """What the recording says of a rest."""
+    """The recording's verdict on a rest."""
 
     CONFIRMED = auto()
     """The swing goes about it."""
@@ -76,7 +76,7 @@ class Judged:
         return self.verdict in (Verdict.CONFIRMED, Verdict.UNREFUTED)
 
     def to_dict(self) -> dict[str, Any]:
-        """As in the angles' ``meta``."""
+        """The verdict as in the angles' ``meta``."""
         return {
             "start_s": self.rest.start_s,
             "stop_s": self.rest.stop_s,
@@ -89,7 +89,7 @@ class Judged:
 def judge(
     rests: list[Rest], phi: Floats, swing: Swing | None, down: Down, upright_rad: float | None = None
 ) -> list[Judged]:
-    """What turns ``phi`` (T, L) and the picture say of each rest.
+    """The verdict of turns ``phi`` (T, L) and the picture on each rest.
 
     The swing decides where it is known. Else the motion must not look like one that was let go there, and the links
     must point down within ``upright_rad``, or else within three standard deviations (`UPRIGHT_SIGMA_RAD`).
@@ -112,7 +112,7 @@ def judge(
 
 
 def _moves(rest: Rest, phi: Floats) -> Floats:
-    """How far a link (L,) must be from the rest to have left it."""
+    """The least distance of a link (L,) from the rest to have left it."""
     scatter = np.nanstd(phi[rest.first : rest.last + 1], axis=0)
     return np.asarray(np.maximum(MOVES_RAD, MOVES_NOISE * scatter))
 
@@ -154,7 +154,7 @@ def hanging_rests(judged: list[Judged], swing: Swing | None, label: str) -> tupl
 
 
 def _notes(kept: list[Judged], others: list[Judged], swing: Swing | None) -> list[str]:
-    """What a reader must know of the rests that are the zero, and of those that could be taken for it."""
+    """Notes on the rests that are the zero, and on those that could be taken for it."""
     notes = []
     zero = kept[0].rest
     near = [
@@ -178,7 +178,7 @@ def _notes(kept: list[Judged], others: list[Judged], swing: Swing | None) -> lis
 
 
 def unconfirmed(judged: list[Judged]) -> list[str]:
-    """What a reader must know where a zero rests on no swing: it moves too little, or by hand only."""
+    """The note on a zero that rests on no swing: the recording moves too little, or by hand only."""
     kept = [j for j in judged if j.hangs]
     if any(j.verdict is Verdict.CONFIRMED for j in kept):
         return []
@@ -221,7 +221,7 @@ def _disagree(apart_rad: Floats, sigma_rad: Floats, swing: Swing) -> NDArray[np.
 
 
 def off_the_swing(kept: list[Rest], zero_rad: Floats, sigma_rad: Floats, swing: Swing) -> list[str]:
-    """What a reader must know where a zero and the swing that confirms it differ by more than three of their sigmas."""
+    """The note where a zero and the swing that confirms it differ by more than three of their sigmas."""
     apart = np.abs(swing.off(zero_rad))
     if not _disagree(apart, sigma_rad, swing).any():
         return []

@@ -1,4 +1,4 @@
-"""How far the residuals say the stated sigmas of the centres are off, as the angles feel it.
+"""The scale of the centres' stated sigmas by their residuals, as the angles feel it.
 
 Each residual counts as much as its marker does in the angle: ``sum g w r^2 / sum g (1 - h)``, with ``g`` the
 marker's share of the frame's information on the angle, times the number of markers, and ``1 - h`` what the fit
@@ -70,7 +70,7 @@ def reject_limit(hidden: NDArray[np.bool_]) -> Floats:
 
 
 def hidden_factor(scatter: Floats, freedom: Floats, hidden: NDArray[np.bool_], scale2: float) -> float:
-    """How much more the angle errs where the body is partly hidden, 1 or more.
+    """The factor by which the angle errs more where the body is partly hidden, 1 or more.
 
     What hides one marker covers the edge of its neighbour: that centre is off by more than its sigma says, and with
     the others missing nothing in the frame shows it. Over a recording the residuals do.

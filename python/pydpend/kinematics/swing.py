@@ -1,4 +1,4 @@
-"""Where the links would hang, by their own motion: the equations of motion with every constant unknown.
+"""The direction in which the links would hang, by their own motion: equations of motion with every constant unknown.
 
 With the link's turns ``a``, ``b`` from any direction, and ``d = b - a``, the free double pendulum obeys
 
@@ -72,7 +72,7 @@ SIGMAS = 6.0
 
 @dataclass(frozen=True, eq=False)
 class Swing:
-    """Where the links would hang by their motion.
+    """The direction in which the links would hang, by their motion.
 
     ``zero_rad`` (L,): turns within (-pi, pi]; ``sigma_rad`` (L,): standard uncertainties; ``width_rad`` (L,): half of
     the range over which each link moves; ``share``: part of the instants in motion that obeys the equations;
@@ -88,7 +88,7 @@ class Swing:
     start_s: float
 
     def off(self, turn_rad: Floats) -> Floats:
-        """How far turns (L,) are from the swing's zero, rad, within (-pi, pi]."""
+        """The distance of turns (L,) from the swing's zero, rad, within (-pi, pi]."""
         return within_half_turn(turn_rad - self.zero_rad)
 
     def refutes(self, turn_rad: Floats, sigma_rad: Floats | float = 0.0) -> bool:
@@ -172,7 +172,7 @@ def _swing(
 
 
 def _reversals(w: Floats) -> int:
-    """How often the link that turns round most often does, among instants in the order of time."""
+    """The number of reversals of the link that turns round most often, among instants in the order of time."""
     most = 0
     for rate in w.T:
         sign = np.sign(rate[np.abs(rate) > STILL * np.abs(w).max(initial=0.0)])
@@ -271,7 +271,7 @@ def _equations(x: _Local) -> tuple[Floats, Floats, Floats]:
 
 
 def _with_dry_friction(x: _Local, equations: tuple[Floats, Floats, Floats]) -> tuple[Floats, Floats, Floats]:
-    """The same equations with dry friction, which has the sign of a joint's rate."""
+    """The equations with dry friction, which has the sign of a joint's rate."""
     rows, wanted, noise = equations
     w1 = np.sign(x.w[:, 0])
     if x.phi.shape[1] == 1:
@@ -282,7 +282,7 @@ def _with_dry_friction(x: _Local, equations: tuple[Floats, Floats, Floats]) -> t
 
 
 def _creeping(x: _Local) -> tuple[Floats, Floats, Floats]:
-    """The same of one link over its friction instead of its inertia.
+    """The equation of one link over its friction instead of its inertia.
 
     For a link that creeps to where it hangs, whose acceleration is lost in the noise.
     """

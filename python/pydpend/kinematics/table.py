@@ -88,7 +88,7 @@ class LinkAngles(TableResult):
 
     @property
     def seen(self) -> NDArray[np.bool_]:
-        """Where each link has an angle, (T, L)."""
+        """Whether each link has an angle, (T, L)."""
         return np.isfinite(self.phi_rad)
 
     @property
@@ -98,7 +98,7 @@ class LinkAngles(TableResult):
 
     @property
     def left_out(self) -> int:
-        """How many angles or readings were left out on the way here; ``meta["notes"]`` says which and why."""
+        """The number of angles or readings left out on the way here; ``meta["notes"]`` says which and why."""
         return int(self.meta.get("left_out", 0))
 
     def between(self, start_s: float | None = None, stop_s: float | None = None) -> LinkAngles:
@@ -166,7 +166,7 @@ class LinkAngles(TableResult):
         return f"<LinkAngles {self.name}: {self.t_s.size} times x {links}, {span}, {seen} seen>"
 
     def _repr_html_(self) -> str:
-        """What is known of each link, for a notebook."""
+        """The angles' summary of each link, for a notebook."""
         rows = []
         for k in range(self.links):
             seen = self.seen[:, k]
@@ -195,7 +195,7 @@ def check_table(
             raise AnglesError(fault(name, say(row), advice, place=place(row, column)))
 
     def falls(values: NDArray[Any]) -> NDArray[np.bool_]:
-        """Which rows do not come after the one before."""
+        """The rows that do not come after the one before."""
         return np.concatenate([[False], np.diff(values) <= 0])
 
     refuse_first(
@@ -221,7 +221,7 @@ def check_table(
     )
 
     def check_link(k: int, angle: Floats, error: Floats) -> None:
-        """The same of link ``k``, from 1, at the T times."""
+        """Checks the angles and sigmas of link ``k``, from 1, at the T times."""
         refuse_first(
             np.isinf(angle),
             f"phi{k}_rad",

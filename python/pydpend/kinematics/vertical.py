@@ -1,4 +1,4 @@
-"""Which way the links point in the picture: where they would hang if the camera stood upright."""
+"""The direction of the links in the picture: where they would hang if the camera stood upright."""
 
 from __future__ import annotations
 
@@ -37,12 +37,12 @@ class Down:
     sigma_rad: Floats
 
     def off(self, turn_rad: Floats) -> Floats:
-        """How far turns (L,) are from the picture's vertical, rad, within (-pi, pi]; NaN where that is not known."""
+        """The distance of turns (L,) from the picture's vertical, rad, within (-pi, pi]; NaN where it is not known."""
         return within_half_turn(turn_rad - self.turn_rad)
 
 
 def picture_down(shape: Shape | None, nodes: Nodes, markers: list[BodyMarkers], mirrored: bool) -> Down:
-    """Where the links point down, by the joints found from the motion, or else by those of the rig."""
+    """The turns at which the links point down, by the joints found from the motion, or else by those of the rig."""
     found = [_direction(v) for v in _vectors(shape, nodes, markers, mirrored)]
     return Down(np.array([turn for turn, _ in found]), np.array([sigma for _, sigma in found]))
 

@@ -1,4 +1,4 @@
-"""Where zero is: rest segments found in a recording.
+"""Rests of a recording: segments in which no link moves.
 
 A link hangs at rest at zero. The rest may be before the release, at the end, or in a recording of its own.
 """

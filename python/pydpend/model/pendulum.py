@@ -203,7 +203,7 @@ class Model:
         return dict(zip(CONSTANTS, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
 
     def problems(self) -> list[str]:
-        """What is wrong with these constants as one rigid pendulum: broken parallel-axis bounds.
+        """The faults of these constants as one rigid pendulum: broken parallel-axis bounds.
 
         A link of mass m with its centre at distance d from its joint has at least the inertia m d^2. The bound needs
         the masses; with a mass of 0 (not known) nothing can be said of that link.

@@ -1,4 +1,4 @@
-"""What a run folder holds, as a page. Reads files, computes nothing that a stage has not."""
+"""The contents of a run folder, as a page. Reads files, computes nothing that a stage has not."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def report_page(folder: str | Path) -> Page:
 
 
 def beside_each_other(parts: list[recording.Part]) -> Table:
-    """What was found of each recording, a column each."""
+    """The results of each recording, a column each."""
     columns = [dict(part.answer) for part in parts]
     properties = dict.fromkeys(name for column in columns for name in column)
     rows = tuple((name, *(column.get(name, "–") for column in columns)) for name in properties)

@@ -54,13 +54,13 @@ def links_of(fit: DampingFit) -> int:
 
 
 def meaning(name: str, links: int) -> str:
-    """What a coefficient or ratio is, in words."""
+    """The meaning of a coefficient or ratio, in words."""
     words = WORDS.get(name, "")
     return words if links > 1 else words.replace("upper ", "")
 
 
 def warnings(fit: DampingFit) -> list[str]:
-    """What a reader must know before the numbers."""
+    """The warnings that a reader must know before the numbers."""
     out = []
     if fit.status is not FitStatus.CONVERGED:
         out.append(f"The damping fit did not converge, its numbers are where it stopped: {fit.message}")
@@ -93,7 +93,7 @@ def warnings(fit: DampingFit) -> list[str]:
 
 
 def _left(fit: DampingFit) -> str:
-    """How much larger than their noise the residuals are, from the mean squares with and without slack."""
+    """The size of the residuals over their noise, from the mean squares with and without slack."""
     strict, slack = math.sqrt(fit.chi2), math.sqrt(fit.chi2_slack)
     return (
         f"the residuals of the angles are {digits(slack)} times their noise where the motion may jump a little from "
@@ -102,7 +102,7 @@ def _left(fit: DampingFit) -> str:
 
 
 def answer(fit: DampingFit, predictions: Mapping[str, Prediction], scale: StoredScale | None) -> list[Block]:
-    """Where the energy goes, how well the model does, and the coefficients with their uncertainties."""
+    """The answer of the fit: the energy's ways, the model's errors, and the coefficients with their uncertainties."""
     intervals = fit.intervals
     links = links_of(fit)
     header = ["coefficient", "symbol", "value"]
@@ -147,7 +147,7 @@ def _energy_sentence(fit: DampingFit) -> str:
 
 
 def _trust(fit: DampingFit, predictions: Mapping[str, Prediction]) -> list[str]:
-    """How well the model describes the angles, and how well it predicts angles that it has not seen."""
+    """The errors with which the model describes the angles, and those with which it predicts unseen ones."""
     out = []
     if fit.within_noise:
         out.append(
@@ -170,7 +170,7 @@ def _errors(rms_deg: Sequence[float]) -> str:
 
 
 def _scale(scale: StoredScale | None, links: int) -> str:
-    """What stands behind all coefficients together."""
+    """The scale behind all coefficients together."""
     where = "upper joint" if links > 1 else "pivot"
     said = (
         f"All coefficients are in proportion to psi, half the moment of inertia about the {where}, which free motion "
@@ -188,7 +188,7 @@ def _scale(scale: StoredScale | None, links: int) -> str:
 
 
 def _residuals(left: Residuals, group: str, title: str) -> list[Block]:
-    """What the fitted motion leaves of each angle, with the standard deviation it was weighted by."""
+    """The residuals of each angle, with the standard deviation it was weighted by."""
     out: list[Block] = []
     both = zip(np.degrees(left.residual_rad.T), np.degrees(left.sigma_rad.T), strict=True)
     for j, (off, sigma) in enumerate(both, 1):
@@ -319,7 +319,7 @@ def _ten(fit: DampingFit) -> list[Block]:
 
 
 def _told(fit: DampingFit) -> list[Block]:
-    """Which terms the data ask for, which they do not tell apart, and where the intervals are open."""
+    """The terms that the data ask for, those they do not tell apart, and the intervals that are open."""
     told = fit.identifiability
     blocks: list[Block] = []
     if fit.terms:

@@ -1,4 +1,4 @@
-"""What a report page is made of, and how it becomes HTML.
+"""The blocks of a report page, and how they become HTML.
 
 Everything that comes from a user's file (names, metadata) is text here and is escaped by the template; only the
 SVG that pydpend draws itself and the assets beside this file go in as they are.
@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 class _Block:
     @property
     def kind(self) -> str:
-        """How the template knows it."""
+        """The name by which the template knows the block."""
         return type(self).__name__
 
 
@@ -77,7 +77,7 @@ class Figure(_Block):
 
 @dataclass(frozen=True)
 class Reset(_Block):
-    """How to move in the charts of a group, and the way back."""
+    """The way to move in the charts of a group, and the way back."""
 
     group: str
     film: bool = False
@@ -140,7 +140,7 @@ class Chart(_Block):
 
 @dataclass(frozen=True, eq=False)
 class StatusMap(_Block):
-    """What was known of each node over time. ``runs[n]``: (status code, from s, to s).
+    """The status of each node over time. ``runs[n]``: (status code, from s, to s).
 
     ``residual_px[n]``: distance of the node from its place in the body's shape at ``t_s``; drawn in the node's row,
     which is ``full_px`` high.

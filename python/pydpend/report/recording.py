@@ -37,7 +37,7 @@ MOST_PLACES = 6
 
 @dataclass(eq=False)
 class Part:
-    """What one recording adds to the page."""
+    """The part of the page on one recording."""
 
     label: str
     nodes: Nodes | None = None
@@ -110,7 +110,7 @@ class Part:
         return blocks
 
     def _place_blocks(self, id_: str) -> list[Block]:
-        """Where there are no angles: the markers' places in the picture."""
+        """The markers' places in the picture, where there are no angles."""
         assert self.nodes is not None
         n = self.nodes
         few = list(enumerate(n.rig.nodes))[:MOST_PLACES]
@@ -329,7 +329,7 @@ def read(r: StoredRecording) -> Part:
 
 
 def _zero_in_words(zero: dict[str, Any]) -> str:
-    """Where the angles' zero is from, with its standard uncertainty."""
+    """The origin of the angles' zero, with its standard uncertainty."""
     sigmas = zero.get("sigma_rad")
     if not sigmas:
         return f"{zero['from']}, uncertainty not stated"
@@ -349,7 +349,7 @@ def _times(t_s: NDArray[np.float64], time: Any = None) -> list[tuple[str, str]]:
 
 
 def _pixels(nodes: Nodes) -> list[tuple[str, str]]:
-    """How wide a pixel is, where it is not square."""
+    """The width of a pixel, where it is not square."""
     width, height = nodes.rig.pixel_aspect
     if width == height:
         return []
