@@ -1,14 +1,20 @@
-"""The commands of the tutorial and of the how-to are run as they stand on the page."""
+"""The commands of README, tutorial and how-to are run as they stand on the page.
+
+Those on files of the reader's own are run on the project's under these names, a whole analysis with ``--dry-run``.
+"""
 
 from __future__ import annotations
 
 import csv
 import json
+import math
 import os
 import re
 import subprocess
+import textwrap
 from pathlib import Path
 
+import pydpend as dp
 import pytest
 
 ROOT = Path(__file__).parent.parent.parent
@@ -19,12 +25,24 @@ def commands(page: str) -> str:
     return "\n".join(re.findall(r"^```sh\n(.*?)^```$", (ROOT / page).read_text("utf-8"), re.M | re.S))
 
 
+def indented(page: str, beginning: str) -> list[str]:
+    """The indented blocks of a page that begin with a pattern, in order."""
+    blocks = re.findall(r"^\n((?:    .*\n|\n(?=    ))+)", (ROOT / page).read_text("utf-8"), re.M)
+    return [textwrap.dedent(block) for block in blocks if re.match(beginning, block.strip())]
+
+
 def followed(page: str, folder: Path) -> subprocess.CompletedProcess[str]:
     """Follows a page in a folder that has the project's fixtures and programs."""
+    return shell(commands(page), folder)
+
+
+def shell(script: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    """Runs commands in a folder that has the project's fixtures and programs."""
     for name in ("fixtures", "target", ".venv"):
-        (folder / name).symlink_to(ROOT / name)
+        if not (folder / name).exists():
+            (folder / name).symlink_to(ROOT / name)
     return subprocess.run(
-        ["bash", "-euo", "pipefail", "-c", commands(page)],
+        ["bash", "-euo", "pipefail", "-c", script],
         cwd=folder,
         env=os.environ,
         capture_output=True,
@@ -75,6 +93,13 @@ def test_angles_and_encoder(tmp_path: Path) -> None:
         (same,) = [p for p in printed if re.sub(r"[-+]?\d[\d.]*", "#", p) == words and p[:4] == line[:4]]
         for said, found in zip(re.findall(r"\d[\d.]*", line), re.findall(r"\d[\d.]*", same), strict=True):
             assert float(found) == pytest.approx(float(said), rel=0.15, abs=0.01)
+    python = "".join(indented(page, r"import pydpend|line = dp"))
+    done = shell(f".venv/bin/python - <<'END'\n{python}\nEND", tmp_path)
+    assert done.returncode == 0, done.stderr
+    gain, offset_s, rms_rad = map(float, done.stdout.split()[-3:])
+    assert gain == pytest.approx(1, abs=1e-3)
+    assert offset_s == pytest.approx(-0.0137, abs=5e-4)
+    assert math.degrees(rms_rad) == pytest.approx(1.375, rel=0.05)
     for name in (
         "angles.png",
         "methods.png",
@@ -83,3 +108,70 @@ def test_angles_and_encoder(tmp_path: Path) -> None:
         "comparison/compare.json",
     ):
         assert (tmp_path / "out/angles" / name).stat().st_size > 1000
+
+
+OWN_FILES = """
+cp fixtures/demo/drop.mp4 fixtures/demo/hanging.mp4 .
+cp fixtures/demo/encoder.csv drop.csv
+cp -r fixtures/demo/calibration holds
+target/release/tracker setup drop.mp4 -o rig.toml
+.venv/bin/python - <<'END'
+import numpy as np, pyarrow.parquet as pq, pydpend as dp
+t_s = np.arange(1500) / 250
+for k in (1, 2):
+    damping = dp.Damping(mu_v1=1e-4, mu_v2=3e-5, tau_c1=1e-3)
+    phi = dp.simulate(dp.derived("A"), damping, [2.0 + 0.1 * k, 2.1, 0, 0], t_s).phi_rad
+    phi = phi + 8e-4 * np.random.default_rng(k).standard_normal(phi.shape)
+    pq.write_table(dp.LinkAngles(t_s, phi, np.full(phi.shape, 8e-4)).to_arrow(), f"trial{k}.parquet")
+table = np.column_stack((t_s, np.degrees(phi) + 180))
+np.savetxt("encoders.csv", table, delimiter=",", header="t,theta1,theta2", comments="")
+END
+"""
+"""Files of the reader's own, from the project's."""
+
+
+def test_the_readme(tmp_path: Path) -> None:
+    (use,) = indented("README.md", "target/release/tracker track")
+    (python,) = indented("README.md", "import pydpend as dp\n\n    nodes")
+    tried = re.sub(r"^(.*pydpend analyse .*)$", r"\1 --dry-run", use, flags=re.M)
+    done = shell(f"{OWN_FILES}\n{tried}\n.venv/bin/python - <<'END'\n{python}\nprint(fit)\nEND", tmp_path)
+    assert done.returncode == 0, done.stderr
+    stages = re.findall(r"^(?:to do|done) +(.*)$", done.stdout, re.M)
+    assert {"Tracking drop.mp4", "Encoder beside drop.mp4", "Damping fit"} <= set(stages)
+    assert "<DampingFit trajectory: converged" in done.stdout
+    assert {"fit.json", "trials.json"} <= {p.name for p in (tmp_path / "both").iterdir()}
+
+
+def test_what_is_said_of_files_of_ones_own(tmp_path: Path) -> None:
+    how_to = "docs/how-to/your-pendulum.md"
+    (pendulum,) = re.findall(r"^(cat > out/own/pendulum.toml .*?^END\n)", commands(how_to), re.M | re.S)
+    lines = [f"{line.strip()} --dry-run" for line in indented(how_to, "pydpend analyse")]
+    linking = (ROOT / "docs/explanation/linking.md").read_text("utf-8")
+    (film,) = re.findall(r"`(tracker film --preset clean --tilt [^`]*)`", linking)
+    done = shell(
+        "\n".join(
+            [
+                'export PATH="$PWD/target/release:$PWD/.venv/bin:$PATH"',
+                OWN_FILES,
+                "mkdir -p out/own",
+                pendulum,
+                "cp out/own/pendulum.toml .",
+                *lines,
+                f"{film} --frame-count 5",
+            ]
+        ),
+        tmp_path,
+    )
+    assert done.returncode == 0, done.stderr
+    assert len(lines) == 2
+    assert done.stdout.count("Damping fit") == 2
+    for name in ("film.mkv", "truth.csv"):
+        assert (tmp_path / name).stat().st_size > 1000
+
+
+@pytest.mark.parametrize("place", ["## Parts", "## One link"])
+def test_a_model_on_the_page_of_models_is_read(place: str, tmp_path: Path) -> None:
+    text = (ROOT / "docs/reference/model.md").read_text("utf-8").split(place)[1]
+    (block,) = re.findall(r"^\n((?:    .*\n)+)", text.split("\n## ")[0], re.M)
+    (tmp_path / "model.toml").write_text(textwrap.dedent(block), "utf-8")
+    assert dp.read_model(tmp_path / "model.toml").links == (2 if place == "## Parts" else 1)
