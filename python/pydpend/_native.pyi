@@ -18,12 +18,14 @@ from pydpend.crossing import (
     HeldColumns,
     Row,
     SegmentArrays,
+    StartNumbers,
     WantedArguments,
 )
 from pydpend.errors import Message
 from pydpend.kinds import Kind
 
 __all__ = [
+    "CAMERA_BY_EYE",
     "VERSION",
     "DetectSettings",
     "EncodeSettings",
@@ -53,6 +55,7 @@ __all__ = [
     "misplaced",
     "overlay_film",
     "plane_places",
+    "plane_slopes",
     "poincare_section",
     "ratios",
     "read_meta",
@@ -78,6 +81,7 @@ __all__ = [
 ]
 
 VERSION: str
+CAMERA_BY_EYE: list[float]
 
 def setting_words() -> dict[str, list[str]]:
     """The words of each setting that has words, the default first."""
@@ -247,6 +251,9 @@ def rig_toml(rig: str) -> str:
 
 def plane_places(rig: str, recorded_px: NDArray[np.float64]) -> NDArray[np.float64]:
     """Recorded places (n, 2) in the plane of the bodies, px, and the most that lengths are stretched there, (n, 3)."""
+
+def plane_slopes(rig: str, recorded_px: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What places (n, 2) in the plane of the bodies change by with a, b, v1, v2 and k1 of the camera, px, (n, 2, 5)."""
 
 def recorded_places(rig: str, plane_px: NDArray[np.float64]) -> NDArray[np.float64]:
     """Places (n, 2) of the plane in recorded pixels."""
@@ -494,6 +501,10 @@ class ShootingFit:
         """The motion's seconds to a second of the recording."""
 
     @property
+    def camera_numbers(self) -> _Floats:
+        """Numbers of each of C cameras, in units of their prior standard deviations, (C, 5)."""
+
+    @property
     def zeros_rad(self) -> _Floats:
         """Zeros of the angles, (R, 2)."""
 
@@ -581,13 +592,17 @@ def shooting_fit(
     recordings: Sequence[_Angles],
     segments: SegmentArrays,
     model: dict[str, float],
-    zeros: Sequence[tuple[float, float]],
+    start: StartNumbers,
     settings: ShootingSettings,
     *,
-    clock_scale: float,
+    cameras: Sequence[tuple[_Floats, int] | None],
     progress: Callable[[int, int, float], object] | None,
 ) -> ShootingFit:
-    """The multiple-shooting fit, from `model`, `zeros` in rad and the segments' states."""
+    """The multiple-shooting fit, from `model`, `start` and the segments' states.
+
+    `cameras`: of each recording what its camera does to the angles, (T, L, 5), rad, and which camera it is, from 0;
+    or None.
+    """
 
 def shooting_trace(
     recordings: Sequence[_Angles], segments: SegmentArrays, model: dict[str, float], clock_scale: float

@@ -5,7 +5,7 @@ T frames, N nodes, D detections. What is not seen is NaN.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Protocol, TypeAlias
 
 import numpy as np
@@ -52,3 +52,19 @@ class SegmentArrays(Protocol):
     @property
     def states(self) -> NDArray[np.float64]:
         """Angles in rad and rates in rad/s at the start, (K, 4)."""
+
+
+class StartNumbers(Protocol):
+    """What the compiled fit reads of `pydpend.damping.shooting.Start`, R recordings and C cameras."""
+
+    @property
+    def zeros_rad(self) -> Sequence[tuple[float, float]]:
+        """Angle zeros of each recording, rad, (R, 2)."""
+
+    @property
+    def camera_numbers(self) -> Sequence[Sequence[float]]:
+        """Numbers of each camera in units of their prior standard deviations, (C, 5)."""
+
+    @property
+    def clock_scale(self) -> float:
+        """The motion's seconds to a second of the recording."""

@@ -91,6 +91,8 @@ Text: TypeAlias = "str | Message | Setting | Step"
 
 CHECK = Step("tracker check", "nodes.status")
 """Sums up what became of each node."""
+SETUP = Step("tracker setup", "dp.setup")
+"""Finds markers, bodies, joints and camera."""
 CALIBRATE = Step("pydpend calibrate", "dp.calibrate")
 """Makes the encoder's calibration."""
 ANALYSE = Step("pydpend analyse", "pydpend.analyse.analyse")

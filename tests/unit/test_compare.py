@@ -4,6 +4,7 @@ trials.
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -231,3 +232,27 @@ def test_the_authors_trials_with_a_made_encoder(trial: str) -> None:
     )
     # The high-pass noise of these angles is 0.09 deg, half of their stated pair scatter.
     assert np.degrees(found.video_noise_rad) == pytest.approx(0.09, abs=0.02)
+
+
+def test_the_films_camera_is_in_gain_zero_and_the_residual() -> None:
+    """The angles of a film that a camera bends: what the camera may make of gain and zero is added, its trace told."""
+    video, encoder, _ = made(54)
+    columns = np.zeros((*video.phi_rad.shape, 5))
+    columns[..., 0] = 0.003 * video.phi_rad
+    columns[..., 1] = 0.002
+    columns[..., 2] = np.radians(3.0) * np.sin(2 * video.phi_rad)
+    bent = dataclasses.replace(video, phi_rad=video.phi_rad + columns[..., 2], camera_rad=columns)
+    plain = compare(dataclasses.replace(bent, camera_rad=None), encoder)
+    found = compare(bent, encoder)
+    assert np.isnan(plain.share_camera)
+    assert found.gain == plain.gain
+    onto = np.hypot(
+        0.003, np.polyfit(found.encoder_rad, np.interp(found.t_s, video.t_s, columns[:, 0, 2]), 1)[0]
+    )
+    assert found.gain_sigma == pytest.approx(np.hypot(plain.gain_sigma, onto), rel=0.02)
+    assert found.offset_sigma_rad > plain.offset_sigma_rad
+    # What no noise explained is now explained by the camera.
+    assert plain.share_unexplained > 0.3
+    assert found.share_camera == pytest.approx(plain.share_unexplained, abs=0.1)
+    assert abs(found.share_unexplained) < 0.1
+    assert found.to_dict()["shares"]["camera"] == pytest.approx(found.share_camera)

@@ -27,7 +27,7 @@ mod _native {
     #[pymodule_export]
     use super::live::{LiveTracker, detect};
     #[pymodule_export]
-    use super::rig::{plane_places, read_rig, recorded_places, rig_toml, write_rig};
+    use super::rig::{plane_places, plane_slopes, read_rig, recorded_places, rig_toml, write_rig};
     #[pymodule_export]
     use super::settings::{OutputSettings, OverlaySettings, PyDetectSettings, PyOpenOptions, setting_words};
     #[pymodule_export]
@@ -55,4 +55,6 @@ mod _native {
 
     #[pymodule_export]
     const VERSION: &str = env!("CARGO_PKG_VERSION");
+    #[pymodule_export]
+    const CAMERA_BY_EYE: [f64; tracker::camera::NUMBERS] = tracker::camera::BY_EYE;
 }

@@ -4,8 +4,10 @@
 
 use std::path::PathBuf;
 
-use numpy::{PyArray2, PyReadonlyArray2, ToPyArray, ndarray::Array2};
+use numpy::ndarray::{Array2, Array3};
+use numpy::{PyArray2, PyArray3, PyReadonlyArray2, ToPyArray};
 use pyo3::prelude::*;
+use tracker::camera::NUMBERS;
 use tracker::error::{Error, Fault};
 use tracker::rig::Rig;
 
@@ -56,6 +58,24 @@ pub fn plane_places<'py>(
     for (to, from) in out.rows_mut().into_iter().zip(given.rows()) {
         let (place, stretch) = plane.flatten([from[0], from[1]]);
         to.into_iter().zip([place[0], place[1], stretch]).for_each(|(to, v)| *to = v);
+    }
+    Ok(out.to_pyarray(py))
+}
+
+/// What the places (n, 2) in the plane of a rig's bodies change by with the camera's five numbers, px, (n, 2, 5).
+#[pyfunction]
+pub fn plane_slopes<'py>(
+    py: Python<'py>,
+    rig: &str,
+    recorded_px: PyReadonlyArray2<'py, f64>,
+) -> PyResult<Bound<'py, PyArray3<f64>>> {
+    let rig = rig_of_json(rig).map_err(|e| raise(py, e))?;
+    let (camera, aspect) = (rig.view(), rig.pixel_aspect);
+    let given = recorded_px.as_array();
+    let mut out = Array3::zeros((given.nrows(), 2, NUMBERS));
+    for (mut to, from) in out.outer_iter_mut().zip(given.rows()) {
+        let slopes = camera.slopes(aspect.to_square([from[0], from[1]].into())).by_numbers;
+        to.indexed_iter_mut().for_each(|(at, v)| *v = slopes[at]);
     }
     Ok(out.to_pyarray(py))
 }

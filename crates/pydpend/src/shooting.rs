@@ -4,9 +4,13 @@ use std::collections::HashMap;
 
 use dynamics::Field;
 use dynamics::shooting::{
-    self, Fit, Point, Progress, Recording, Segment, Settings, ShootingError, Slack, Status, local_state,
+    self, CAMERA_NUMBERS, CameraPart, Fit, Point, Progress, Recording, Segment, Settings, ShootingError,
+    Slack, Status, local_state,
 };
-use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
+use numpy::{
+    PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
+    ToPyArray,
+};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -18,7 +22,11 @@ struct Angles {
     phi: [Vec<f64>; 2],
     sigma: [Vec<f64>; 2],
     links: usize,
+    camera: Option<(Vec<[[f64; CAMERA_NUMBERS]; 2]>, usize)>,
 }
+
+/// What a camera does to the angles, (T, L, 5), and which camera it is.
+type CameraIn<'py> = (PyReadonlyArray3<'py, f64>, usize);
 
 type AnglesIn<'py> = (PyReadonlyArray1<'py, f64>, PyReadonlyArray2<'py, f64>, PyReadonlyArray2<'py, f64>);
 
@@ -38,7 +46,34 @@ fn angles(given: &AnglesIn<'_>) -> PyResult<Angles> {
         t_s: t.to_vec(),
         phi: [column(&phi, 0), column(&phi, 1)],
         sigma: [column(&sigma, 0), column(&sigma, 1)],
+        camera: None,
     })
+}
+
+/// Adds what the cameras do to each recording's angles.
+fn with_cameras(owned: &mut [Angles], given: &[Option<CameraIn<'_>>], count: usize) -> PyResult<()> {
+    if given.len() != owned.len() {
+        return Err(PyValueError::new_err("cameras are not those of the recordings"));
+    }
+    for (angles, camera) in owned.iter_mut().zip(given) {
+        let Some((slopes, which)) = camera else { continue };
+        let slopes = slopes.as_array();
+        if slopes.shape() != [angles.t_s.len(), angles.links, CAMERA_NUMBERS] || *which >= count {
+            return Err(PyValueError::new_err(
+                "a camera's slopes must have the shape (T, links, 5) of its angles",
+            ));
+        }
+        // Where an angle was not seen nothing is known of its slopes either, and nothing needed.
+        let number = |i: usize, j: usize, c: usize| {
+            let value = if j < angles.links { slopes[[i, j, c]] } else { 0.0 };
+            if value.is_finite() { value } else { 0.0 }
+        };
+        let rows = (0..angles.t_s.len())
+            .map(|i| std::array::from_fn(|j| std::array::from_fn(|c| number(i, j, c))))
+            .collect();
+        angles.camera = Some((rows, *which));
+    }
+    Ok(())
 }
 
 impl Angles {
@@ -48,6 +83,10 @@ impl Angles {
             phi_rad: [&self.phi[0], &self.phi[1]],
             sigma_rad: [&self.sigma[0], &self.sigma[1]],
             links: self.links,
+            camera: self
+                .camera
+                .as_ref()
+                .map(|(rows, camera)| CameraPart { slopes_rad: rows, camera: *camera }),
         }
     }
 }
@@ -164,6 +203,7 @@ pub struct ShootingFit {
     parameters: HashMap<&'static str, f64>,
     clock_scale: f64,
     zeros_rad: Py<PyArray2<f64>>,
+    camera_numbers: Py<PyArray2<f64>>,
     states: Py<PyArray2<f64>>,
     information: Py<PyArray2<f64>>,
     angle_information: Py<PyArray2<f64>>,
@@ -203,6 +243,7 @@ impl ShootingFit {
             parameters: Field::ALL.iter().map(|f| (f.name(), fit.point.parameters.get(*f))).collect(),
             clock_scale: fit.point.clock_scale,
             zeros_rad: rows(py, &fit.point.zeros_rad)?.unbind(),
+            camera_numbers: rows(py, &fit.point.cameras)?.unbind(),
             states: rows(py, &fit.point.states)?.unbind(),
             information: square(fit.information.as_slice())?,
             angle_information: square(fit.angle_information.as_slice())?,
@@ -232,27 +273,41 @@ impl ShootingFit {
     }
 }
 
-/// The multiple-shooting fit, from `model`, `zeros` and the segments' states. `progress` is called with the step, the
-/// most there will be, and chi-square.
+/// Where a fit starts besides the model and the segments: the attributes of `pydpend.damping.shooting.Start`.
+#[derive(FromPyObject)]
+pub struct Start {
+    zeros_rad: Vec<[f64; 2]>,
+    camera_numbers: Vec<[f64; CAMERA_NUMBERS]>,
+    clock_scale: f64,
+}
+
+/// The multiple-shooting fit, from `model`, `start` and the segments' states. `cameras` has a recording's camera or `None`.
+/// `progress` is called with the step, the most there will be, and chi-square.
 #[pyfunction]
-#[pyo3(signature = (recordings, segments, model, zeros, settings, *, clock_scale, progress))]
+#[pyo3(signature = (recordings, segments, model, start, settings, *, cameras, progress))]
 pub fn shooting_fit<'py>(
     py: Python<'py>,
     recordings: Vec<AnglesIn<'py>>,
     segments: Segments<'py>,
     model: HashMap<String, f64>,
-    zeros: Vec<[f64; 2]>,
+    start: Start,
     settings: &ShootingSettings,
-    clock_scale: f64,
+    cameras: Vec<Option<CameraIn<'py>>>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<ShootingFit> {
-    let owned = recordings.iter().map(angles).collect::<PyResult<Vec<_>>>()?;
+    let mut owned = recordings.iter().map(angles).collect::<PyResult<Vec<_>>>()?;
     let list = segments.of(&owned)?;
-    if zeros.len() != owned.len() {
+    if start.zeros_rad.len() != owned.len() {
         return Err(PyValueError::new_err("zeros are not those of the recordings"));
     }
-    let start =
-        Point { parameters: parameters(&model)?, clock_scale, zeros_rad: zeros, states: segments.states() };
+    with_cameras(&mut owned, &cameras, start.camera_numbers.len())?;
+    let start = Point {
+        parameters: parameters(&model)?,
+        clock_scale: start.clock_scale,
+        zeros_rad: start.zeros_rad,
+        cameras: start.camera_numbers,
+        states: segments.states(),
+    };
     let mut raised = None;
     let outcome = py.detach(|| {
         let views: Vec<Recording<'_>> = owned.iter().map(Angles::view).collect();
@@ -289,6 +344,7 @@ pub fn shooting_trace<'py>(
         parameters: parameters(&model)?,
         clock_scale,
         zeros_rad: Vec::new(),
+        cameras: Vec::new(),
         states: segments.states(),
     };
     let trace = py.detach(|| {

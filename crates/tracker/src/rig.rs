@@ -262,12 +262,15 @@ impl Rig {
 
     /// The plane in which bodies are rigid.
     pub fn plane(&self) -> Plane {
+        let camera = self.camera.as_ref().map(|_| self.view());
+        Plane { pixel_aspect: self.pixel_aspect, camera }
+    }
+
+    /// The camera; one that faces the plane squarely where the rig has none.
+    pub fn view(&self) -> Camera {
         let [w, h] = self.image_px.map(f64::from);
-        let size_px = [w * self.pixel_aspect.ratio(), h];
-        Plane {
-            pixel_aspect: self.pixel_aspect,
-            camera: self.camera.as_ref().map(|c| Camera::new(c.numbers(), size_px)),
-        }
+        let numbers = self.camera.as_ref().map_or([0.0; NUMBERS], RigCamera::numbers);
+        Camera::new(numbers, [w * self.pixel_aspect.ratio(), h])
     }
 
     /// Index of a body by its name.

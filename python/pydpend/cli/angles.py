@@ -62,6 +62,7 @@ def run(args: argparse.Namespace) -> int:
     import numpy as np
 
     from pydpend.kinematics import angles, write_angles, written_files
+    from pydpend.kinematics.camera import rms_of
     from pydpend.nodes import read_nodes
 
     check_files(args, *written_files(args.output), args.figure, args.methods_figure)
@@ -90,6 +91,7 @@ def run(args: argparse.Namespace) -> int:
         save(body_methods_figure(first), args.methods_figure)
     seen = found.seen.sum(axis=0)
     sigma = [float(np.nanmedian(s)) if np.isfinite(s).any() else None for s in found.sigma_rad.T]
+    camera = None if found.camera_rad is None else rms_of(found.camera_rad)
     if args.json:
         summary: dict[str, Any] = {
             **found.meta,
@@ -97,13 +99,15 @@ def run(args: argparse.Namespace) -> int:
             "frames": int(found.t_s.size),
             "frames_with_angle": seen.tolist(),
             "median_sigma_rad": sigma,
+            "rms_sigma_camera_rad": None if camera is None else camera.tolist(),
         }
         print(json.dumps(summary, indent=2))
     else:
         for k in range(found.links):
             value = sigma[k]
-            error = "not known" if value is None else f"{np.degrees(value):.4f} deg"
-            print(f"phi{k + 1}: {seen[k]} of {found.t_s.size} frames, median standard uncertainty {error}")
+            noise = "not known" if value is None else f"{np.degrees(value):.4f} deg noise"
+            part = "" if camera is None else f" and {np.degrees(camera[k]):.4f} deg camera"
+            print(f"phi{k + 1}: {seen[k]} of {found.t_s.size} frames, standard uncertainty {noise}{part}")
         zero = found.meta["zero"]
         sure = zero.get("sigma_rad")
         known = f" (+- {' and '.join(f'{v:.2g}' for v in np.degrees(sure))} deg)" if sure else ""

@@ -115,7 +115,7 @@ def run(args: argparse.Namespace) -> int:
         print(
             f"residual RMS {np.degrees(found.rms_rad):.4f} deg, largest {np.degrees(found.largest_rad):.4f} deg; "
             f"explained by the encoder's noise {part(found.share_encoder, 1)}, "
-            f"by the video's {part(found.share_video, 2)}"
+            f"by the video's {part(found.share_video, 2)}, by the camera {part(found.share_camera, 1)}"
         )
     for note in found.notes:
         print(f"note: {note}", file=sys.stderr)

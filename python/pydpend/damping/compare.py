@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from pydpend.coefficients import FULL, parameters, ratios_of
 from pydpend.damping import shooting
+from pydpend.damping.camera import cameras_of
 from pydpend.damping.prediction import predict, split
 from pydpend.damping.recording import Recording
 from pydpend.damping.result_parts import Term
@@ -84,6 +85,7 @@ def compare_terms(
         bounded=names,
         slack=FLOOR,
         huber=huber,
+        cameras=cameras_of(known),
     )
     cov = covariance(full, model_error=True)
     rows = [full.names.index(name) for name in wanted]
@@ -114,6 +116,7 @@ def compare_terms(
                 learned=False,
                 bounded=[n for n in names if n != name],
                 huber=huber,
+                cameras=full.cameras,
             )
             gain = 2 * (without.cost - full.cost) / max(1.0, full.chi2)
             change = squares(without.parameters) - with_all

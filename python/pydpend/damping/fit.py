@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pydpend.coefficients import RATIOS, parameters, ratios_of
-from pydpend.damping import shooting
+from pydpend.damping import camera, shooting
 from pydpend.damping.compare import compare_terms
 from pydpend.damping.plausible import check_followed, modes_hz
 from pydpend.damping.prediction import held_out
@@ -134,10 +134,14 @@ def _energy(
     for r in recordings:
         plausible_or_raise(r, model)
     tracks = [r.track for r in recordings]
-    fit, few, profiles, smoothed = fit_energy(tracks, [r.span for r in recordings], model, names, progress)
+    done = fit_energy(
+        tracks, [r.span for r in recordings], model, names, camera.cameras_of(recordings), progress
+    )
+    fit, few, profiles, smoothed = done.fit, done.few, done.whole, done.smoothed
     check_followed([r.angles.name for r in recordings], smoothed.chi2)
     values = dict(zip(names, fit.values.tolist(), strict=True))
     sigma = dict(zip(names, np.sqrt(np.diag(fit.covariance)).tolist(), strict=True))
+    of_camera = {n: s for n, s in zip(names, done.camera_sigma.tolist(), strict=True) if s > 0}
     constants = parameters(model) | values
     works = np.sum([p.unit_works[-1] for p in profiles], axis=0)
     path = shooting.trace(tracks, smoothed.segments, constants)
@@ -179,8 +183,11 @@ def _energy(
         energy=curves,
         residuals=shooting.residuals_of(tracks, path, smoothed.zeros_rad),
         ten=freed,
+        camera_sigma=of_camera,
         notes=(
             *(note for r in recordings for note in r.notes()),
+            *camera.without(recordings),
+            *camera.words(sigma, of_camera),
             *(note for r, zero in zip(recordings, found, strict=True) for note in zero.notes(r.angles.name)),
             f"acceleration noise raises |N| by {100 * excess[0]:.1g} and {100 * excess[1]:.1g} % on average; "
             "taken off",

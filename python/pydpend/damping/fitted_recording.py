@@ -67,6 +67,9 @@ class FittedRecording:
         Small oscillations in the last seconds, Hz (trajectory fit).
     e0_j : float or None
         Energy at the start, J (energy fit).
+    camera_numbers, camera_numbers_sigma : tuple of float or None
+        Its camera's five numbers as the trajectory fit found them, and their standard errors, in units of what the
+        angles state; None where they state nothing.
     """
 
     name: str
@@ -82,10 +85,12 @@ class FittedRecording:
     zeros_off: tuple[bool, ...]
     tail_modes_hz: tuple[float, ...] | None = None
     e0_j: float | None = None
+    camera_numbers: tuple[float, ...] | None = None
+    camera_numbers_sigma: tuple[float, ...] | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """The recording as in ``fit.json``."""
-        own = {"tail_modes_hz", "e0_j"}
+        own = {"tail_modes_hz", "e0_j", "camera_numbers", "camera_numbers_sigma"}
         return {name: v for name, v in asdict(self).items() if name not in own or v is not None}
 
     @classmethod
@@ -108,6 +113,8 @@ class FittedRecording:
             table.flags("zeros_off"),
             table.numbers_or_nan("tail_modes_hz") if "tail_modes_hz" in table else None,
             table.number("e0_j") if "e0_j" in table else None,
+            table.numbers_or_nan("camera_numbers") if "camera_numbers" in table else None,
+            table.numbers_or_nan("camera_numbers_sigma") if "camera_numbers_sigma" in table else None,
         )
 
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from pydpend.coefficients import FULL, unit
 from pydpend.damping import shooting
 from pydpend.damping.result_parts import Estimate, Interval
-from pydpend.damping.shooting import Progress, Solution, Track
+from pydpend.damping.shooting import CAMERA, Progress, Solution, Track
 from pydpend.errors import FitError
 from pydpend.fit_status import FitStatus
 from pydpend.information import invert
@@ -188,7 +188,7 @@ def profile_intervals(
 
 def _common(solution: Solution) -> list[str]:
     """The free parameters of the equations of motion."""
-    return [n for n in solution.names if n != "clock" and not n.startswith("zero")]
+    return [n for n in solution.names if n != "clock" and not n.startswith(("zero", CAMERA))]
 
 
 def _solved(
@@ -208,6 +208,7 @@ def _solved(
         max_iterations=STEPS,
         clock="clock" in near.names,
         clock_scale=near.clock_scale,
+        cameras=near.cameras,
     )
 
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from pydpend.coefficients import TERMS, parameters
 from pydpend.damping import shooting
 from pydpend.damping.shares import cumulative
-from pydpend.damping.shooting import Progress, Segments, Track
+from pydpend.damping.shooting import Cameras, Progress, Segments, Track
 from pydpend.energy import EnergyFit, EnergyProfile, fit_profiles
 from pydpend.errors import FitError, fault
 from pydpend.fit_status import FitStatus
@@ -49,6 +49,20 @@ class Smoothed:
     """Of the angles."""
     doubled: Segments
     """The pieces two by two, for the next round."""
+
+
+@dataclass(frozen=True, eq=False)
+class FittedEnergy:
+    """An energy fit and what it was made from."""
+
+    fit: EnergyFit
+    few: list[EnergyProfile]
+    """The profiles that were fitted, at the middle of the pieces."""
+    whole: list[EnergyProfile]
+    """The same at every sample."""
+    smoothed: Smoothed
+    camera_sigma: Floats
+    """What of each coefficient's standard error is the cameras', SI."""
 
 
 def smooth(
@@ -117,13 +131,12 @@ def fit_energy(
     spans: Sequence[tuple[float, float]],
     model: Model,
     names: Sequence[str],
+    cameras: Cameras | None = None,
     progress: Progress | None = None,
-) -> tuple[EnergyFit, list[EnergyProfile], list[EnergyProfile], Smoothed]:
+) -> FittedEnergy:
     """Coefficients common to all recordings, from their energy profiles.
 
-    Also the profiles they were fitted to, those at every sample, and the smoothed motion.
-
-    Also the profiles they were fitted to, those at every sample, and the smoothed motion.
+    What the ``cameras`` do to them is added to their covariance.
     """
     constants = parameters(model)
     segments = shooting.cut(tracks, spans, shooting.PIECE_S)
@@ -131,13 +144,13 @@ def fit_energy(
     values = np.zeros(len(names))
 
     def along(
-        given: Floats, *, corrected: bool = False
+        given: Floats, *, corrected: bool = False, angles: Sequence[Track] = tracks
     ) -> tuple[list[EnergyProfile], list[EnergyProfile], Smoothed]:
         """Profiles at the middle of the pieces and at every sample when the pieces lose by ``given``."""
         now = constants | dict(zip(names, given.tolist(), strict=True))
-        smoothed = smooth(tracks, segments, zeros, now)
+        smoothed = smooth(angles, segments, zeros, now)
         both = [
-            profile(tracks, smoothed, now, model, names, r, corrected=corrected) for r in range(len(tracks))
+            profile(angles, smoothed, now, model, names, r, corrected=corrected) for r in range(len(angles))
         ]
         return [few for few, _ in both], [whole for _, whole in both], smoothed
 
@@ -178,10 +191,24 @@ def fit_energy(
             progress(DOUBLINGS + 2 + round_, DOUBLINGS + 1 + ROUNDS, fit.chi2)
         if change < CLOSE:
             break
+    # What another camera would have made of them: one standard deviation of each number at a time.
+    moved_by = np.zeros((0, len(names)))
+    if cameras is not None:
+        here = fit_profiles(linear(few)).values
+        moved_by = np.array(
+            [
+                fit_profiles(linear(along(values, angles=a)[0])).values - here
+                for a in cameras.one_by_one(tracks)
+            ]
+        )
     few, whole, smoothed = along(values, corrected=True)
     few = linear(few)
     fit = fit_profiles(few)
-    return fit if change < CLOSE else replace(fit, status=FitStatus.ITERATION_LIMIT), few, whole, smoothed
+    of_cameras = moved_by.T @ moved_by
+    fit = replace(fit, covariance=fit.covariance + of_cameras)
+    if change >= CLOSE:
+        fit = replace(fit, status=FitStatus.ITERATION_LIMIT)
+    return FittedEnergy(fit, few, whole, smoothed, np.sqrt(np.diag(of_cameras)))
 
 
 def _start(profile: EnergyProfile, values: Floats) -> Floats:

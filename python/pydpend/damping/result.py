@@ -91,6 +91,9 @@ class DampingFit(JsonResult, TableResult):
         Angle-bias maps, if asked for.
     ten : pydpend.damping.result.TenCoefficients or None
         The paper's ten coefficients, if asked for.
+    camera_sigma : dict of str to float
+        What of each coefficient's standard error is the cameras', SI: its square is a part of the whole's. Empty where
+        no angles state the camera's part.
     notes : tuple of str
         What was left out or should be known.
     """
@@ -124,6 +127,7 @@ class DampingFit(JsonResult, TableResult):
     modes_hz: tuple[float, ...] = ()
     maps: AngleMaps | None = None
     ten: TenCoefficients | None = None
+    camera_sigma: dict[str, float] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
@@ -194,6 +198,7 @@ class DampingFit(JsonResult, TableResult):
             "covariance": {"names": list(self.names), "matrix": self.covariance.tolist()},
             "maps": None if self.maps is None else self.maps.to_dict(),
             "ten_coefficients": None if self.ten is None else self.ten.to_dict(),
+            "camera_sigmas": self.camera_sigma,
             "notes": list(self.notes),
         }
         values: dict[str, Any] = plain(out)
@@ -272,8 +277,17 @@ class DampingFit(JsonResult, TableResult):
             ten=TenCoefficients.of_table(table.table("ten_coefficients"))
             if "ten_coefficients" in table
             else None,
+            camera_sigma=_numbers_of(table, "camera_sigmas"),
             notes=table.texts("notes"),
         )
+
+
+def _numbers_of(table: Table, key: str) -> dict[str, float]:
+    """A table of numbers; empty in a file written before there was one."""
+    if key not in table:
+        return {}
+    numbers = table.table(key)
+    return {name: numbers.number(name) for name in numbers}
 
 
 def _share_of(table: Table) -> Estimate:

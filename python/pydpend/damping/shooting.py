@@ -13,6 +13,7 @@ from pydpend import _native
 from pydpend.damping.result_parts import Residuals
 from pydpend.errors import FitError, fault
 from pydpend.fit_status import FitStatus
+from pydpend.kinematics.table import CAMERA_NUMBERS
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -91,15 +92,49 @@ class Segments:
 
 
 @dataclass(frozen=True, eq=False)
+class Cameras:
+    """What the cameras of R recordings do to their angles: measured = true + part @ numbers."""
+
+    parts: Sequence[tuple[Floats, int] | None]
+    """Of each recording the angles' changes (T, L, 5) for one standard deviation of each number, rad, and which of the
+    cameras it is, from 0; None where nothing is stated."""
+    numbers: Floats
+    """Numbers (C, 5) of each camera, in units of their prior standard deviations: a guess or a solution."""
+
+    def corrected(self, tracks: Sequence[Track]) -> list[Track]:
+        """The recordings with the cameras' part taken off the angles."""
+        out = []
+        for (t, phi, sigma), part in zip(tracks, self.parts, strict=True):
+            off = 0.0 if part is None else np.nan_to_num(part[0]) @ self.numbers[part[1]]
+            out.append((t, phi - off, sigma))
+        return out
+
+    def one_by_one(self, tracks: Sequence[Track]) -> list[list[Track]]:
+        """The recordings with each number of each camera in turn taken to be one standard deviation off."""
+        steps = np.eye(self.numbers.size).reshape(-1, *self.numbers.shape)
+        return [replace(self, numbers=step).corrected(tracks) for step in steps]
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """Where a fit starts, besides the model and the segments."""
+
+    zeros_rad: list[tuple[float, float]]
+    camera_numbers: list[list[float]]
+    clock_scale: float
+
+
+@dataclass(frozen=True, eq=False)
 class Solution:
     """The solution of the compiled fit; see ``dynamics::shooting::Fit``."""
 
     parameters: dict[str, float]
     zeros_rad: Floats
     """(R, 2)"""
+    cameras: Cameras | None
     segments: Segments
     names: tuple[str, ...]
-    """Rows of `information`: free parameters, then two zeros per recording."""
+    """Rows of `information`: free parameters, then two zeros per recording, then five numbers per camera."""
     information: Floats
     angle_information: Floats
     """What of it the angles give: the part whose errors are their noise."""
@@ -133,11 +168,18 @@ class Solution:
         freedom = float(self.counts.sum()) - self.state_freedom - len(self.names)
         return float(self.squares.sum()) / max(freedom, 1.0)
 
+    def square(self, tracks: Sequence[Track]) -> list[Track]:
+        """The recordings as their cameras would show them if they were as they were taken to be."""
+        return list(tracks) if self.cameras is None else self.cameras.corrected(tracks)
+
     def merged(self, size: int) -> Segments:
         """Its segments, ``size`` to one where the motion allows it."""
         own = self.own_sigma
         return self.segments.merged(size, self.transfer * own[None, None, :] / own[None, :, None])
 
+
+CAMERA = "camera"
+"""How the names of the cameras' numbers among a fit's unknowns begin."""
 
 FASTEST_RAD_S = 300.0
 """A first guess that turns faster is one from a handful of samples beside a gap; its segment is left out."""
@@ -196,6 +238,7 @@ def solve(
     max_iterations: int = 60,
     clock: bool = False,
     clock_scale: float = 1.0,
+    cameras: Cameras | None = None,
     progress: Progress | None = None,
 ) -> Solution:
     """Runs the fit. Raises FitError when there is nothing to fit or the motion is not determined."""
@@ -210,9 +253,15 @@ def solve(
             huber=huber,
             max_iterations=max_iterations,
         )
-        starts = [(float(a), float(b)) for a, b in np.asarray(zeros_rad, dtype=np.float64)]
+        numbers = np.zeros((0, CAMERA_NUMBERS)) if cameras is None else cameras.numbers
+        start = Start(
+            [(float(a), float(b)) for a, b in np.asarray(zeros_rad, dtype=np.float64)],
+            numbers.tolist(),
+            clock_scale,
+        )
+        parts = [None] * len(tracks) if cameras is None else list(cameras.parts)
         out = _native.shooting_fit(
-            tracks, segments, parameters, starts, settings, clock_scale=clock_scale, progress=progress
+            tracks, segments, parameters, start, settings, cameras=parts, progress=progress
         )
     except ValueError as problem:
         advice = "Give angles with fewer gaps, and check that the model is this pendulum's"
@@ -220,11 +269,13 @@ def solve(
     names = (*free, *(("clock",) if clock else ()))
     if zeros:
         names += tuple(f"zero{j}[{r}]" for r in range(len(tracks)) for j in (1, 2))
+    names += tuple(f"{CAMERA}{n + 1}[{c}]" for c in range(len(numbers)) for n in range(CAMERA_NUMBERS))
     # One link's recordings have one zero each; the other's column says nothing.
     known = np.array([not (n.startswith("zero2") and tracks[0][1].shape[1] == 1) for n in names], dtype=bool)
     return Solution(
         {**parameters, **{k: v for k, v in sorted(out.parameters.items()) if k in parameters or v != 0.0}},
         out.zeros_rad,
+        None if cameras is None else replace(cameras, numbers=out.camera_numbers),
         replace(segments, states=out.states),
         tuple(n for n, k in zip(names, known, strict=True) if k),
         out.information[np.ix_(known, known)],

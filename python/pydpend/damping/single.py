@@ -64,7 +64,11 @@ def one_body(angles: LinkAngles, elbow_rad: float = 0.0) -> tuple[LinkAngles, fl
     )
     with np.errstate(divide="ignore"):
         error = np.where(np.isfinite(sigma).any(axis=1) & (total > 0), total**-0.5, np.nan)
-    return replace(angles, phi_rad=mean[:, None], sigma_rad=error[:, None]), elbow
+    camera = angles.camera_rad
+    if camera is not None:
+        part = np.where(weight > 0, weight, 0.0) / np.where(total > 0, total, 1.0)[:, None]
+        camera = (part[..., None] * np.nan_to_num(camera)).sum(axis=1)[:, None]
+    return replace(angles, phi_rad=mean[:, None], sigma_rad=error[:, None], camera_rad=camera), elbow
 
 
 def pinned(model: Model, elbow_rad: float) -> tuple[Model, float]:

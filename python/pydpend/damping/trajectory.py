@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pydpend.coefficients import FULL, RATIOS, parameters, ratios_of
-from pydpend.damping import maps, plausible, shooting
+from pydpend.damping import camera, maps, plausible, shooting
 from pydpend.damping.intervals import profile_intervals, refusal
 from pydpend.damping.recording import FittedZero, Recording
 from pydpend.damping.result import DampingFit
@@ -84,6 +84,7 @@ def fit_trajectory(
         )
     # Where the angles' errors are not the noise between neighbours, all residuals would be outliers.
     huber = HUBER * max(1.0, settled.chi2) ** 0.5
+    cameras = camera.cameras_of(recordings)
     for pass_ in range(3 if angle_maps else 1):
         solution = shooting.solve(
             tracks if bias is None else maps.corrected(tracks, bias),
@@ -96,11 +97,13 @@ def fit_trajectory(
             clock=options.clock,
             huber=huber,
             max_iterations=max_iterations,
+            cameras=cameras,
             progress=progress,
         )
         if angle_maps:
-            bias = maps.learn(tracks, solution)
+            bias = maps.learn(solution.square(tracks), solution)
             segments, start, zeros = solution.segments, solution.parameters, solution.zeros_rad
+            cameras = solution.cameras
             if pass_ == 2:
                 break
     if solution.status is not FitStatus.CONVERGED and length > 1.01 * shooting.PIECE_S:
@@ -169,7 +172,10 @@ def tightened(
     bounded: Sequence[str],
     progress: Progress | None,
 ) -> Solution:
-    """The fit with no slack beyond the noise's own: what the model must be able to do if it is right."""
+    """The fit with no slack beyond the noise's own: what the model must be able to do if it is right.
+
+    ``tracks``: the angles with the cameras' part taken off.
+    """
     return shooting.solve(
         tracks,
         solution.segments,
@@ -199,9 +205,12 @@ def _judge(
     relative = solution.slack / solution.own_sigma
     model_error = bool(relative.max() > 0.2)
     bounded = [n for n in wanted if n in FULL]
+    tracks = solution.square(tracks)
     strict = tightened(tracks, solution, wanted, bounded, progress) if model_error else solution
     cov = covariance(solution, model_error=model_error)
     zeros = [_zero(r, k, solution, cov) for k, r in enumerate(recordings)]
+    seen = [camera.found_numbers(solution, cov, k) for k in range(len(recordings))]
+    of_camera = camera.of_camera(solution, cov, model_error=model_error)
     rows = [i for i, n in enumerate(solution.names) if n in names or n in RATIOS]
     kept = tuple(solution.names[i] for i in rows)
     cov = cov[np.ix_(rows, rows)]
@@ -235,8 +244,13 @@ def _judge(
         names=kept,
         covariance=cov,
         inputs=tuple(
-            replace(r.described(zero), tail_modes_hz=tuple(plausible.tail_modes_hz(r.track, r.span, fitted)))
-            for r, zero in zip(recordings, zeros, strict=True)
+            replace(
+                r.described(zero),
+                tail_modes_hz=tuple(plausible.tail_modes_hz(r.track, r.span, fitted)),
+                camera_numbers=numbers,
+                camera_numbers_sigma=numbers_sigma,
+            )
+            for r, zero, (numbers, numbers_sigma) in zip(recordings, zeros, seen, strict=True)
         ),
         energy=tuple(energy_curve(tracks, path, names, values, fitted, k) for k in range(len(recordings))),
         residuals=shooting.residuals_of(tracks, path, solution.zeros_rad),
@@ -254,8 +268,10 @@ def _judge(
         iterations=solution.iterations,
         modes_hz=plausible.modes_hz(fitted)[:links],
         maps=None if bias is None else bias.result(),
+        camera_sigma={n: of_camera[n] for n in names if n in of_camera},
         notes=(
             *_notes(recordings, solution),
+            *camera.words({n: sigma[n] for n in names}, of_camera),
             *(note for r, zero in zip(recordings, zeros, strict=True) for note in zero.notes(r.angles.name)),
         ),
     )
@@ -304,7 +320,7 @@ def _message(solution: Solution, strict: Solution, relative: Floats) -> str:
 
 
 def _notes(recordings: Sequence[Recording], solution: Solution) -> tuple[str, ...]:
-    out = [note for r in recordings for note in r.notes()]
+    out = [*(note for r in recordings for note in r.notes()), *camera.without(recordings)]
     if solution.stuck:
         out.append(
             f"a joint stuck in {solution.stuck} of {len(solution.segments)} segments; followed by events"

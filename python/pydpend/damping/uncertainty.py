@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pydpend.coefficients import FULL, RATIOS, unit
 from pydpend.damping.result_parts import Identifiability
-from pydpend.damping.shooting import Solution
+from pydpend.damping.shooting import CAMERA, Solution
 from pydpend.information import LEAST, invert, principal_axes
 
 Floats = NDArray[np.float64]
@@ -27,12 +27,12 @@ def covariance(solution: Solution, *, model_error: bool) -> Floats:
 
     Each source of error counts with the variance it has, not with the one the fit allowed it: the angles' noise with
     chi-square, the jumps with what they show of the slack (`Solution.jumps_shown`; derived in
-    docs/explanation/damping.md).
+    docs/explanation/damping.md), the cameras with their prior.
     With model error also the sandwich from the scores of blocks of about a second, and of each standard error the
     larger one is taken. Where the angles determine nothing, it is not finite (`information.check_errors`).
     """
     bread = invert(solution.information)
-    meat = solution.angle_information * max(1.0, solution.chi2) + solution.jump_information
+    meat = solution.angle_information * max(1.0, solution.chi2) + solution.jump_information + _prior(solution)
     # What is not determined has no errors to add up: it keeps its huge variance.
     values, axes = principal_axes(solution.information)
     lost = axes[:, values < LEAST]
@@ -47,10 +47,16 @@ def covariance(solution: Solution, *, model_error: bool) -> Floats:
         return plain
     sums = np.zeros((count, len(solution.names)))
     np.add.at(sums, label, solution.scores)
-    sandwich = bread @ (sums.T @ sums) @ bread * count / (count - len(solution.names))
+    scatter = sums.T @ sums * count / (count - len(solution.names))
+    sandwich = bread @ (scatter + _prior(solution)) @ bread
     growth = np.sqrt(np.maximum(1.0, np.diag(sandwich) / np.diag(plain)))
     out: Floats = plain * np.outer(growth, growth)
     return out
+
+
+def _prior(solution: Solution) -> Floats:
+    """What of the information is the cameras' prior, whose errors are of unit variance."""
+    return np.diag([1.0 if n.startswith(CAMERA) else 0.0 for n in solution.names])
 
 
 def identifiability(

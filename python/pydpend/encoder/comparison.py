@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pydpend.documents import Table
+from pydpend.encoder.camera import camera_in
 from pydpend.encoder.sync import Course, Synchronisation, synchronise
 from pydpend.errors import COMPARE, EncoderError, fault
 from pydpend.json_text import JsonResult, plain
@@ -75,9 +76,10 @@ class Comparison(JsonResult, TableResult):
         Number of readings that hang together.
     block_rms_rad, block_expected_rad : float
         Root mean square of the residual's means over 1 s, and what white noise would leave of itself, rad.
-    share_encoder, share_video, share_unexplained : float
-        Parts of the residual's variance that the stated noises explain, and the rest (below 0 if the stated noises
-        are too large).
+    share_encoder, share_video, share_camera, share_unexplained : float
+        Parts of the residual's variance that the stated noises explain, that which the film's camera explains with
+        numbers within what is stated of it (NaN where nothing is), and the rest (below 0 if the stated noises are too
+        large).
     video_noise_rad, encoder_noise_rad : float
         White noise of each series by its own scatter (residual of a local cubic), rad.
     notes : tuple of str
@@ -123,6 +125,7 @@ class Comparison(JsonResult, TableResult):
     notes: tuple[str, ...]
     left_out: int
     """How many of the video's angles and the encoder's readings were left out, by the regression too."""
+    share_camera: float = float("nan")
 
     def __repr__(self) -> str:
         """A line for people."""
@@ -132,9 +135,9 @@ class Comparison(JsonResult, TableResult):
 
     @property
     def shares(self) -> dict[str, float]:
-        """Parts of the residual's variance that are known: of ``encoder``, ``video`` and ``unexplained``."""
-        parts = (self.share_encoder, self.share_video, self.share_unexplained)
-        named = dict(zip(("encoder", "video", "unexplained"), parts, strict=True))
+        """Known parts of the residual's variance: of ``encoder``, ``video``, ``camera`` and ``unexplained``."""
+        parts = (self.share_encoder, self.share_video, self.share_camera, self.share_unexplained)
+        named = dict(zip(("encoder", "video", "camera", "unexplained"), parts, strict=True))
         return {name: share for name, share in named.items() if np.isfinite(share)}
 
     @property
@@ -178,6 +181,7 @@ class Comparison(JsonResult, TableResult):
                 "shares": {
                     "encoder": self.share_encoder,
                     "video": self.share_video,
+                    "camera": self.share_camera,
                     "unexplained": self.share_unexplained,
                 },
                 "stated_sigma_rad": {"encoder": self.encoder_sigma_rad, "video": self.video_sigma_rms_rad},
@@ -243,6 +247,7 @@ class Comparison(JsonResult, TableResult):
             encoder_noise_rad=own.number_or_nan("encoder"),
             notes=table.texts("notes"),
             left_out=table.whole("left_out"),
+            share_camera=shares.number_or_nan("camera") if "camera" in shares else float("nan"),
         )
 
     def to_columns(self) -> dict[str, Floats]:
@@ -346,9 +351,9 @@ def compare(
     )
     if not np.isfinite(part_video):
         notes.append("the video's angles state no uncertainty, so its share of the residual is not known")
-    blocks, expected = _blocks(
-        t, residual, float(np.sqrt((gain * encoder_sigma) ** 2 + np.nan_to_num(part_video) * variance))
-    )
+    noise = float(np.sqrt((gain * encoder_sigma) ** 2 + np.nan_to_num(part_video) * variance))
+    blocks, expected = _blocks(t, residual, noise)
+    camera = camera_in(video, link, t, (video_rad - offset) / gain, residual, noise)
     delay, delay_sigma = 0.0, sync.offset_sigma_s
     if sync.given:
         delay, delay_sigma = _delay(course, t, encoder_rad, offset, gain)
@@ -359,6 +364,18 @@ def compare(
             )
     c = sync.covariance
     slope = np.array([-1.0 / sync.gain, sync.zero_rad / sync.gain**2])
+    offset_sigma, gain_sigma = float(np.sqrt(slope @ c[:2, :2] @ slope)), sync.gain_sigma / sync.gain**2
+    part_camera = float("nan")
+    if camera is not None:
+        part_camera = camera.share
+        of_offset, of_gain = np.sqrt(np.diag(camera.covariance)).tolist()
+        offset_sigma = float(np.hypot(offset_sigma, of_offset))
+        gain_sigma = float(np.hypot(gain_sigma, of_gain))
+        if of_gain > 0.5 * gain_sigma:
+            notes.append(
+                f"the film's camera makes {of_gain:.2g} of the gain's standard uncertainty of {gain_sigma:.2g}, and "
+                f"{np.degrees(of_offset):.2g} deg of the zero's of {np.degrees(offset_sigma):.2g} deg"
+            )
     return Comparison(
         name=video.name,
         encoder_name=encoder.name,
@@ -373,9 +390,9 @@ def compare(
         encoder_sigma_rad=encoder_sigma,
         residual_rad=residual,
         gain=gain,
-        gain_sigma=sync.gain_sigma / sync.gain**2,
+        gain_sigma=gain_sigma,
         offset_rad=offset,
-        offset_sigma_rad=float(np.sqrt(slope @ c[:2, :2] @ slope)),
+        offset_sigma_rad=offset_sigma,
         delay_s=delay,
         delay_sigma_s=delay_sigma,
         rms_rad=float(np.sqrt(variance)),
@@ -387,7 +404,8 @@ def compare(
         block_expected_rad=expected,
         share_encoder=part_encoder,
         share_video=part_video,
-        share_unexplained=1.0 - part_encoder - (part_video if np.isfinite(part_video) else 0.0),
+        share_camera=part_camera,
+        share_unexplained=float(1.0 - part_encoder - np.nan_to_num(part_video) - np.nan_to_num(part_camera)),
         video_noise_rad=highpass_noise(video.phi_rad[:, link]),
         encoder_noise_rad=highpass_noise(encoder.phi_rad[:, 0]),
         notes=tuple(notes),

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
 from pydpend.errors import CHECK, AnglesError, Setting, fault, one_of
+from pydpend.kinematics.body_view import BodyView
+from pydpend.kinematics.camera import CameraPart, camera_part, known
+from pydpend.kinematics.camera_slopes import linkage_slopes, pairwise_slopes, rigid_slopes, zero_slopes
 from pydpend.kinematics.hanging import Raw, zero_for
 from pydpend.kinematics.linkage import Linkage, Shape, first_shape
 from pydpend.kinematics.linkage_frames import checked_sigma, fit_linkage
@@ -73,7 +77,8 @@ def angles(
     -------
     LinkAngles
         Angles in rad at the T times, unwrapped over turns, the first within (-pi, pi]. ``sigma_rad`` is each frame's
-        own standard error; that of the zero, common to all frames, is in ``meta["zero"]``. Where the table says that
+        own standard error, ``camera_rad`` what the camera may be off by in all of them; the uncertainty of the zero,
+        common to all frames, is in ``meta["zero"]``. Where the table says that
         its times are uncertain (a variable frame rate in coarse ticks), ``sigma_rad`` holds that too, times the
         link's speed; ``meta["time"]`` says what the times are.
 
@@ -90,7 +95,7 @@ def angles(
     markers = body_markers(nodes, bodies, mirrored)
     _check_length(estimator, len(markers), link_length_m, link_length_sigma_m)
     label = name if name is not None else _label(nodes)
-    raw = _estimate(markers, nodes.rig, estimator, mirrored, link_length_m, link_length_sigma_m)
+    raw, seen = _estimate(nodes, markers, estimator, mirrored, (link_length_m, link_length_sigma_m))
     notes: list[str] = list(raw.meta.pop("notes", ()))
     ending = nodes.meta.get("ending")
     if isinstance(ending, dict) and ending.get("kind") != "complete":
@@ -99,17 +104,20 @@ def angles(
     phi, left_out = _unwrapped(nodes, raw.theta, markers, label, gaps, notes)
     offset, zero_meta, doubts = zero_for(nodes, phi, raw, markers, zero, bodies, mirrored, label)
     notes += doubts
+    at_zero = zero_slopes(zero, zero_meta, offset, nodes.t_s, seen.slopes, seen.views, mirrored)
+    camera, white = seen.part(nodes.rig, at_zero, raw.sigma)
+    notes += camera.notes
     phi = phi - offset
     for k in range(phi.shape[1]):
         first = phi[np.flatnonzero(np.isfinite(phi[:, k]))[0], k]
         phi[:, k] -= 2 * np.pi * np.ceil((first - np.pi) / (2 * np.pi))
     meta = {"method": estimator, "mirrored": mirrored, **raw.meta, "zero": zero_meta, "notes": notes}
-    meta["left_out"] = left_out
+    meta |= {"left_out": left_out, "camera": camera.meta}
     for key in ("source", "time"):
         if nodes.meta.get(key) is not None:
             meta[key] = nodes.meta[key]
-    sigma = _with_time(nodes.t_s, phi, raw.sigma, _time_sigma_s(nodes))
-    return LinkAngles(nodes.t_s, phi, sigma, nodes.frame, meta, label)
+    sigma = _with_time(nodes.t_s, phi, white, _time_sigma_s(nodes))
+    return LinkAngles(nodes.t_s, phi, sigma, nodes.frame, meta, label, camera.columns_rad)
 
 
 def _time_sigma_s(nodes: Nodes) -> float:
@@ -185,17 +193,48 @@ def _label(nodes: Nodes) -> str:
     return str(source.get("name", "nodes")) if isinstance(source, dict) else "nodes"
 
 
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """The bodies through the camera: how their turns follow its numbers, (T, L, 5), and their poses."""
+
+    views: list[BodyView]
+    poses: list[Pose]
+    slopes: Floats
+
+    def part(self, rig: Rig, at_zero: Floats, sigma: Floats) -> tuple[CameraPart, Floats]:
+        """The camera's part in the angles, and their noise (T, L).
+
+        ``at_zero`` (L, 5): derivatives of their zero. ``sigma`` (T, L): their noise as the residuals say. Where these
+        are the camera's, that is not noise: what they are with the camera that they ask for is.
+        """
+        evidence = [v.evidence(p.centre_px) for v, p in zip(self.views, self.poses, strict=True)]
+        camera = known(rig, evidence)
+        white = sigma.copy()
+        if camera.significant:
+            for k, (view, pose) in enumerate(zip(self.views, self.poses, strict=True)):
+                square = fit_pose(view.moved(camera.asked))
+                both = np.isfinite(pose.sigma_rad) & np.isfinite(square.sigma_rad)
+                less = square.sigma_scale / pose.sigma_scale
+                white[:, k] *= np.where(both, square.sigma_rad / pose.sigma_rad, less)
+        return camera_part(rig, camera, self.slopes, at_zero, white), white
+
+
 def _estimate(
+    nodes: Nodes,
     markers: list[BodyMarkers],
-    rig: Rig,
     estimator: Method,
     mirrored: bool,
-    length_m: float | None,
-    length_sigma_m: float,
-) -> Raw:
+    length: tuple[float | None, float],
+) -> tuple[Raw, _Seen]:
+    """Turns by an estimator; ``length``: distance of pivot and elbow and its standard uncertainty, m."""
+    rig, (length_m, length_sigma_m) = nodes.rig, length
+    if estimator not in ESTIMATORS:
+        raise AnglesError(one_of("estimator", estimator, ESTIMATORS))
+    poses = [fit_pose(m) for m in markers]
+    views = [BodyView.of(nodes, pose, mirrored) for pose in poses]
     if estimator == "pairwise":
         pairs = [pair_angles(m) for m in markers]
-        scales = [fit_pose(m).sigma_scale for m in markers]
+        scales = [pose.sigma_scale for pose in poses]
         meta = {
             "bodies": [
                 {
@@ -213,10 +252,8 @@ def _estimate(
         }
         theta = np.stack([p.mean_rad for p in pairs], axis=1)
         sigma = np.stack([p.sigma_rad * s for p, s in zip(pairs, scales, strict=True)], axis=1)
-        return Raw(theta, sigma, [m.reference_px for m in markers], None, meta)
-    if estimator not in ("rigid", "linkage"):
-        raise AnglesError(one_of("estimator", estimator, ESTIMATORS))
-    poses = [fit_pose(m) for m in markers]
+        seen = _Seen(views, poses, pairwise_slopes(views))
+        return Raw(theta, sigma, [m.reference_px for m in markers], None, meta), seen
     meta = {"bodies": [_body_meta(p) for p in poses]}
     lower = poses[1] if len(poses) > 1 else None
     if estimator == "rigid":
@@ -229,13 +266,16 @@ def _estimate(
             meta["linkage"] = _linkage_meta(linked.linkage, rig, mirrored, length_m, length_sigma_m)
         else:
             shape = _shape_or_none(poses)
-        return Raw(theta, sigma, [p.template_px for p in poses], shape, meta)
+        seen = _Seen(views, poses, rigid_slopes(views))
+        return Raw(theta, sigma, [p.template_px for p in poses], shape, meta), seen
     linked = fit_linkage(poses[0], lower)
     meta["linkage"] = _linkage_meta(linked.linkage, rig, mirrored, length_m, length_sigma_m)
     sigma, meta["notes"] = checked_sigma(linked, poses)
     shape = linked.linkage.shape
     templates = [shape.upper_px] if lower is None else [shape.upper_px, shape.lower_px]
-    return Raw(linked.theta_rad, sigma, templates, shape, meta)
+    weight = np.concatenate([pose.markers.weight for pose in poses], axis=1)
+    seen = _Seen(views, poses, linkage_slopes(views, weight, linked))
+    return Raw(linked.theta_rad, sigma, templates, shape, meta), seen
 
 
 def _shape_or_none(poses: list[Pose]) -> Shape | None:

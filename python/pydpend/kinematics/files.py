@@ -22,7 +22,7 @@ from pydpend.documents import parse_json, read_text
 from pydpend.errors import AnglesError, Setting, fault
 from pydpend.instants import STAMP_ADVICE, since_1970, stamp_in
 from pydpend.kinds import expect
-from pydpend.kinematics.table import Floats, LinkAngles, check_table
+from pydpend.kinematics.table import CAMERA_NUMBERS, Floats, LinkAngles, camera_column, check_table
 from pydpend.output import AnyPath, path_of, whole, write_text
 from pydpend.units import is_of_time, unit_at_end, unit_called
 
@@ -45,7 +45,8 @@ def read_angles(
     ----------
     path : path-like
         Parquet or CSV with ``time_s``, ``phi1_rad`` (or ``phi1_deg``) and, if there is a second link, ``phi2_*``;
-        ``frame`` and ``sigma1_*``, ``sigma2_*`` are optional; empty where not seen. Or a folder with
+        ``frame``, ``sigma1_*``, ``sigma2_*`` and the camera's ``camera1_phi1_rad`` to ``camera5_phi2_rad`` are
+        optional; empty where not seen. Or a folder with
         ``DPmean_data_RB0.npy``, ... (rows: s, degrees) and, for the sigmas, ``DPstd_data_RB0.npy``, ....
     columns : dict of str to str, optional
         The file's columns where their names differ, ours first: ``{"time_s": "t_s", "phi1_rad": "theta1_rad"}``.
@@ -63,7 +64,7 @@ def read_angles(
     -------
     LinkAngles
         Angles, rad, counter-clockwise positive, zero hanging down. Times that are dates or s since 1970 are counted
-        from the first; ``meta["notes"]`` says so of the latter.
+        from the first; ``meta["notes"]`` says so of the latter, and of angles from a film that state no camera's part.
 
     Raises
     ------
@@ -81,14 +82,19 @@ def read_angles(
                 fault(Setting("columns"), f"{path} is a folder of arrays without names", "Leave it out")
             )
         t, phi, sigma = _read_published(path)
-        frame, meta, table = None, {"source": str(path), "form": "published npy"}, None
+        frame, meta, table, camera = None, {"source": str(path), "form": "published npy"}, None, None
     else:
         t, phi, sigma, frame, meta, table = _read_table(path, dict(columns or {}))
+        camera = _read_camera(path, table, phi.shape[1])
+        if camera is None and isinstance(meta.get("bodies"), list):
+            meta = meta | {"notes": [*meta.get("notes", ()), NO_CAMERA_PART]}
         t, notes = _from_first(t, table, dict(columns or {}).get("time_s", "time_s"))
         if notes:
             meta = meta | {"notes": [*meta.get("notes", ()), *notes]}
     hanging = np.broadcast_to(np.asarray(hanging_rad, dtype=np.float64), (phi.shape[1],))
     phi = (phi - hanging) * (-1.0 if clockwise else 1.0)
+    if camera is not None and clockwise:
+        camera = -camera
     if unwrap:
         for k in range(phi.shape[1]):
             seen = np.isfinite(phi[:, k])
@@ -110,7 +116,7 @@ def read_angles(
                 place=place(stamp[0], "time_s"),
             )
         )
-    return LinkAngles(t, phi, sigma, frame, meta, label)
+    return LinkAngles(t, phi, sigma, frame, meta, label, camera)
 
 
 def _from_first(t: Floats, table: Columns, column: str) -> tuple[Floats, list[str]]:
@@ -120,6 +126,34 @@ def _from_first(t: Floats, table: Columns, column: str) -> tuple[Floats, list[st
     if stamped is None:
         return t, []
     return stamped[0], [f"its times are s since 1970; they are counted in s from the first, {stamped[1]}"]
+
+
+NO_CAMERA_PART = (
+    "the table states the angles' noise only: what the camera's aim and lens do to them is not known (it was written "
+    "before that was stated; make it from the node table again)"
+)
+"""What is said of angles from a film without the camera's part."""
+
+
+def _read_camera(path: Path, table: Columns, links: int) -> Floats | None:
+    """The camera's columns (T, L, 5) of a table; None where it has none.
+
+    Raises :class:`AnglesError` where some are missing.
+    """
+    names = [camera_column(number, link) for link in range(links) for number in range(CAMERA_NUMBERS)]
+    there = [name for name in names if name in table.values]
+    if not there:
+        return None
+    missing = [name for name in names if name not in table.values]
+    if missing:
+        raise AnglesError(
+            fault(
+                str(path),
+                f"{there[0]} is there and {missing[0]} is not",
+                "Keep all columns of the camera's part, or none",
+            )
+        )
+    return np.stack([table.values[name] for name in names], axis=1).reshape(table.rows, links, CAMERA_NUMBERS)
 
 
 _TableParts = tuple[Floats, Floats, Floats, "NDArray[np.int64] | None", dict[str, Any], Columns]
@@ -160,7 +194,8 @@ def _read_table(path: Path, columns: dict[str, str]) -> _TableParts:
     table = read_columns(
         path,
         [theirs["time_s"], *(columns[c] for c in columns if c != "time_s")],
-        [theirs[c] for c in ours if c not in columns and c != "time_s"],
+        [theirs[c] for c in ours if c not in columns and c != "time_s"]
+        + [camera_column(number, link) for link in (0, 1) for number in range(CAMERA_NUMBERS)],
         error=AnglesError,
         time=theirs["time_s"],
         naming=Setting("columns"),

@@ -68,6 +68,12 @@ def fit_linkage(upper: Pose, lower: Pose | None) -> LinkageAngles:
     return _all_frames(linkage, frames, start)
 
 
+def angles_of(shape: Shape, frames: Frames, start: Floats) -> Floats:
+    """Angles (T, L) of frames by the linkage of a shape, from angles nearby; NaN where these are."""
+    known = np.isfinite(start)
+    return np.where(known, _solve(shape, frames, start).theta, np.nan)
+
+
 def checked_sigma(linked: LinkageAngles, poses: list[Pose]) -> tuple[Floats, list[str]]:
     """The linkage's standard errors held against the rigid poses, and a note where they had to grow.
 

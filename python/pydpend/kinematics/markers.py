@@ -62,14 +62,14 @@ def to_world(xy_px: Floats, rig: Rig, mirrored: bool = False) -> Floats:
     """
     if rig.camera is None:
         return np.asarray(xy_px * _scale(rig, mirrored))
-    return np.asarray(_flat(xy_px, rig)[..., :2] * _turn(mirrored))
+    return np.asarray(_flat(xy_px, rig)[..., :2] * world_turn(mirrored))
 
 
 def to_image(xy_px: Floats, rig: Rig, mirrored: bool = False) -> Floats:
     """The way back."""
     if rig.camera is None:
         return np.asarray(xy_px / _scale(rig, mirrored))
-    plane = np.asarray(xy_px, dtype=np.float64) * _turn(mirrored)
+    plane = np.asarray(xy_px, dtype=np.float64) * world_turn(mirrored)
     return recorded_places(rig.to_json(), plane.reshape(-1, 2)).reshape(plane.shape)
 
 
@@ -87,7 +87,8 @@ def _flat(xy_px: Floats, rig: Rig) -> Floats:
     return plane_places(rig.to_json(), recorded.reshape(-1, 2)).reshape((*recorded.shape[:-1], 3))
 
 
-def _turn(mirrored: bool) -> Floats:
+def world_turn(mirrored: bool) -> Floats:
+    """World directions for a step along the plane's x and y, (2,)."""
     return np.array([-1.0 if mirrored else 1.0, -1.0])
 
 

@@ -19,6 +19,9 @@ from pydpend.tabular import TableResult, html_table
 
 Floats = NDArray[np.float64]
 
+CAMERA_NUMBERS = 5
+"""Numbers of a camera that angles depend on."""
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LinkAngles(TableResult):
@@ -32,13 +35,18 @@ class LinkAngles(TableResult):
         Absolute angle of each link to the downward vertical, rad: **counter-clockwise positive, zero hanging down**,
         unwrapped over turns, NaN where the link was not seen.
     sigma_rad : ndarray of float, shape (T, L)
-        Standard uncertainty of each, rad, NaN where not seen or not known.
+        Standard uncertainty of each by its own noise, rad, NaN where not seen or not known: the white part, which
+        differs from frame to frame.
     frame : ndarray of int64, shape (T,), optional
         Index in the recording.
     meta : dict
         How the angles were had, as plain values.
     name : str
         Name of the recording, for messages and legends.
+    camera_rad : ndarray of float, shape (T, L, 5), optional
+        What the camera adds to the angles, rad, for one standard deviation of each of five independent numbers that are
+        the same in all frames: with noise e, ``phi = true + e + camera_rad @ n``, n of unit variance. NaN where not
+        seen. None where nothing is stated.
 
     Raises
     ------
@@ -52,6 +60,7 @@ class LinkAngles(TableResult):
     frame: NDArray[np.int64] | None = None
     meta: dict[str, Any] = field(default_factory=dict)
     name: str = "angles"
+    camera_rad: Floats | None = None
 
     def __post_init__(self) -> None:
         t = seconds_of_numpy(np.asarray(self.t_s))
@@ -79,7 +88,48 @@ class LinkAngles(TableResult):
         sigma = np.where(np.isnan(phi), np.nan, sigma)
         for key, value in (("t_s", t), ("phi_rad", phi), ("sigma_rad", sigma)):
             object.__setattr__(self, key, value)
+        if self.camera_rad is not None:
+            object.__setattr__(self, "camera_rad", self._checked_camera(self.camera_rad))
         check_table(self.name, t, phi, sigma, self.frame, lambda row, column: f"row {row}, column {column}")
+
+    def _checked_camera(self, columns: Floats) -> Floats:
+        """The camera's columns, NaN where there is no angle."""
+        camera = np.ascontiguousarray(columns, dtype=np.float64)
+        if camera.shape != (*self.phi_rad.shape, CAMERA_NUMBERS):
+            raise AnglesError(
+                fault(
+                    self.name,
+                    f"the camera's part has the shape {camera.shape} for angles of shape {self.phi_rad.shape}",
+                    f"It must be (T, L, {CAMERA_NUMBERS})",
+                )
+            )
+        bad = np.argwhere(~np.isfinite(camera) & self.seen[..., None])
+        if bad.size:
+            row, link, number = (int(v) for v in bad[0])
+            raise AnglesError(
+                fault(
+                    self.name,
+                    f"it is {camera[row, link, number]} where there is an angle",
+                    "Give the camera's part of every angle, or none at all",
+                    place=f"row {row}, column {camera_column(number, link)}",
+                )
+            )
+        return np.where(self.seen[..., None], camera, np.nan)
+
+    @property
+    def sigma_camera_rad(self) -> Floats:
+        """Standard uncertainty (T, L) of each angle by the camera, rad; NaN where not seen or not stated.
+
+        It is one error of all frames in which a link stands alike: no mean over frames makes it smaller.
+        """
+        if self.camera_rad is None:
+            return np.full_like(self.phi_rad, np.nan)
+        return np.asarray(np.sqrt((self.camera_rad**2).sum(axis=2)))
+
+    @property
+    def sigma_total_rad(self) -> Floats:
+        """Both parts (T, L), rad; the noise alone where nothing is stated of the camera."""
+        return np.asarray(np.hypot(self.sigma_rad, np.nan_to_num(self.sigma_camera_rad)))
 
     @property
     def links(self) -> int:
@@ -138,6 +188,7 @@ class LinkAngles(TableResult):
             phi_rad=self.phi_rad[keep],
             sigma_rad=self.sigma_rad[keep],
             frame=None if self.frame is None else self.frame[keep],
+            camera_rad=None if self.camera_rad is None else self.camera_rad[keep],
         )
 
     def to_columns(self) -> dict[str, NDArray[Any]]:
@@ -146,7 +197,8 @@ class LinkAngles(TableResult):
         Returns
         -------
         dict of str to ndarray, each of shape (T,)
-            ``frame`` if there is one, ``time_s``, and of each link ``phi1_rad`` and ``sigma1_rad``.
+            ``frame`` if there is one, ``time_s``, and of each link ``phi1_rad``, ``sigma1_rad`` (the noise) and, where
+            the camera's part is stated, ``sigma_camera1_rad`` and ``camera1_phi1_rad`` to ``camera5_phi1_rad``.
         """
         out: dict[str, NDArray[Any]] = {}
         if self.frame is not None:
@@ -156,6 +208,12 @@ class LinkAngles(TableResult):
             out[f"phi{k + 1}_rad"] = self.phi_rad[:, k]
         for k in range(self.links):
             out[f"sigma{k + 1}_rad"] = self.sigma_rad[:, k]
+        if self.camera_rad is not None:
+            for k in range(self.links):
+                out[f"sigma_camera{k + 1}_rad"] = self.sigma_camera_rad[:, k]
+            for k in range(self.links):
+                for number in range(CAMERA_NUMBERS):
+                    out[camera_column(number, k)] = self.camera_rad[:, k, number]
         return out
 
     def __repr__(self) -> str:
@@ -173,8 +231,19 @@ class LinkAngles(TableResult):
             turns = float(np.ptp(self.phi_rad[seen, k])) / (2 * math.pi) if seen.any() else math.nan
             sigma = self.sigma_rad[np.isfinite(self.sigma_rad[:, k]), k]
             error = f"{math.degrees(float(np.median(sigma))):.4f} deg" if sigma.size else "not stated"
-            rows.append((f"phi{k + 1}", f"{100 * seen.mean():.1f} %", f"{turns:.2f} turns", error))
-        return html_table(repr(self)[1:-1], ("angle", "seen", "range", "median standard uncertainty"), rows)
+            camera = self.sigma_camera_rad[seen, k]
+            of_camera = f"{math.degrees(float(np.sqrt(np.mean(camera**2)))):.4f} deg"
+            if not np.isfinite(camera).any():
+                of_camera = "not stated"
+            rows.append((f"phi{k + 1}", f"{100 * seen.mean():.1f} %", f"{turns:.2f} turns", error, of_camera))
+        return html_table(
+            repr(self)[1:-1], ("angle", "seen", "range", "median noise", "camera's part (RMS)"), rows
+        )
+
+
+def camera_column(number: int, link: int) -> str:
+    """Name of the column of one of the camera's numbers for a link, both from 0."""
+    return f"camera{number + 1}_phi{link + 1}_rad"
 
 
 def check_table(

@@ -63,7 +63,8 @@ def spread(t: Floats, y: Floats, most: int = MOST_STRETCHES) -> tuple[Floats, Fl
 def angles_figure(angles: LinkAngles, title: str | None = None) -> Figure:
     """Angles above, their one-sigma uncertainties below, in degrees (Fig. 16).
 
-    Of a long recording's sigmas the median of each stretch is drawn, and where 80 % of them lie.
+    Of a long recording's sigmas the median of each stretch is drawn, and where 80 % of them lie. The camera's part,
+    which is one error of all frames in which a link stands alike, is dotted.
     """
     with style():
         figure = new_figure(6.5, 4.2)
@@ -75,7 +76,11 @@ def angles_figure(angles: LinkAngles, title: str | None = None) -> Figure:
             if np.isfinite(sigma).any():
                 t, low, middle, high = spread(angles.t_s, sigma)
                 lower.fill_between(t, low, high, color=COLORS[k], alpha=0.25, lw=0)
-                lower.plot(t, middle, color=COLORS[k], label=f"$\\sigma_{{\\phi_{k + 1}}}$")
+                lower.plot(t, middle, color=COLORS[k], label=f"$\\sigma_{{\\phi_{k + 1}}}$ noise")
+            part = np.degrees(angles.sigma_camera_rad[:, k])
+            if np.isfinite(part).any():
+                t, _, middle, _ = spread(angles.t_s, part)
+                lower.plot(t, middle, color=COLORS[k], ls=":", label=f"$\\sigma_{{\\phi_{k + 1}}}$ camera")
         upper.set_ylabel("angle in deg")
         upper.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=2, borderaxespad=0)
         upper.set_title(plain(title if title is not None else angles.name), loc="left", fontsize=9)
@@ -83,7 +88,7 @@ def angles_figure(angles: LinkAngles, title: str | None = None) -> Figure:
         lower.set_xlabel("time in s")
         if lower.lines:
             lower.set_ylim(bottom=0)
-            lower.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=2, borderaxespad=0)
+            lower.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=4, borderaxespad=0)
         else:
             lower.text(
                 0.5, 0.5, "no uncertainties stated", transform=lower.transAxes, ha="center", va="center"

@@ -106,26 +106,40 @@ def answer(fit: DampingFit, predictions: Mapping[str, Prediction], scale: Stored
     intervals = fit.intervals
     links = links_of(fit)
     header = ["coefficient", "symbol", "value"]
+    if fit.camera_sigma:
+        header.append("of ±, the camera's")
     if intervals:
         header.append("95 % interval")
     rows = []
     for name, c in fit.coefficients.items():
         unit = with_squares(c.unit)
         row = [meaning(name, links), name, quantity(c.value, c.sigma, unit)]
+        if fit.camera_sigma:
+            row.append(_of_camera(fit.camera_sigma.get(name), c.sigma))
         if intervals:
             found = intervals.get(name)
             row.append(
                 "–" if found is None else f"{between(number(found.low), number(found.high))} {unit}".strip()
             )
         rows.append(tuple(row))
-    numbers = frozenset({2, 3}) if intervals else frozenset({2})
+    numbers = frozenset(range(2, len(header)))
     blocks: list[Block] = [Text(s) for s in (_energy_sentence(fit), *_trust(fit, predictions)) if s]
     blocks.append(Table(tuple(header), tuple(rows), numbers=numbers))
-    by = "± is one standard uncertainty of the fit." + (
-        " The 95 % intervals are by profile likelihood, everything else fitted again." if intervals else ""
-    )
+    by = "± is one standard uncertainty of the fit."
+    if fit.camera_sigma:
+        by += (
+            " The part of it that the camera's aim and lens make is given too (the squares of the parts add up to "
+            "100 %): it is one error of all frames, and a longer film does not make it smaller."
+        )
+    if intervals:
+        by += " The 95 % intervals are by profile likelihood, everything else fitted again."
     blocks.append(Text(f"{by} {_scale(scale, links)}", quiet=True))
     return blocks
+
+
+def _of_camera(camera: float | None, sigma: float) -> str:
+    """What part of a standard uncertainty is the camera's."""
+    return "–" if camera is None or not sigma > 0 else f"{digits(100 * camera / sigma)} %"
 
 
 def _energy_sentence(fit: DampingFit) -> str:

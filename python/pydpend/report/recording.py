@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pydpend.encoder import Comparison
 from pydpend.kinematics import LinkAngles
+from pydpend.kinematics.camera import rms_of
 from pydpend.nodes import Nodes
 from pydpend.plots.encoder import calibration_figure
 from pydpend.plots.style import inline_svg
@@ -94,7 +95,13 @@ class Part:
             Chart(f"{id_}-phi", "Angles", id_, a.t_s, angle, y_label="angle (deg)", height=280),
         ]
         if np.isfinite(sigmas).any():
-            sigma = tuple(Series(f"sigma of phi{k + 1} (deg)", sigmas[:, k], k) for k in range(a.links))
+            sigma = tuple(Series(f"noise of phi{k + 1} (deg)", sigmas[:, k], k) for k in range(a.links))
+            part = np.degrees(a.sigma_camera_rad)
+            if np.isfinite(part).any():
+                sigma += tuple(
+                    Series(f"camera's part of phi{k + 1} (deg)", part[:, k], k, dashed=True)
+                    for k in range(a.links)
+                )
             blocks.append(
                 Chart(
                     f"{id_}-sigma",
@@ -214,7 +221,12 @@ class Part:
                 ("clock offset (s)", with_sigma(c.sync.offset_s, c.sync.offset_sigma_s)),
                 ("clock drift (ppm)", with_sigma(1e6 * c.sync.drift, 1e6 * c.sync.drift_sigma)),
             ]
-        names = {"encoder": "encoder's noise", "video": "film's noise", "unexplained": "neither"}
+        names = {
+            "encoder": "encoder's noise",
+            "video": "film's noise",
+            "camera": "the film's camera",
+            "unexplained": "none of these",
+        }
         rows += [
             (f"share of the residual explained by {names[k]} (%)", f"{100 * v:.1f}")
             for k, v in c.shares.items()
@@ -304,9 +316,8 @@ def read(r: StoredRecording) -> Part:
         for k in range(part.angles.links):
             sigma = part.angles.sigma_rad[:, k]
             if np.isfinite(sigma).any():
-                rows.append(
-                    (f"median uncertainty of phi{k + 1}", f"{digits(math.degrees(np.nanmedian(sigma)))} deg")
-                )
+                noise = f"{digits(math.degrees(np.nanmedian(sigma)))} deg noise"
+                rows.append((f"uncertainty of phi{k + 1}", noise + _camera_in_words(part.angles, k)))
         turns = (np.nanmax(part.angles.phi_rad, axis=0) - np.nanmin(part.angles.phi_rad, axis=0)) / (
             2 * np.pi
         )
@@ -326,6 +337,14 @@ def read(r: StoredRecording) -> Part:
             rows.append(("film minus encoder, expected from their noise", expected))
     part.answer = rows
     return part
+
+
+def _camera_in_words(angles: LinkAngles, link: int) -> str:
+    """The camera's part of an angle's uncertainty, after its noise."""
+    if angles.camera_rad is None:
+        return ", camera's part not stated"
+    part = math.degrees(rms_of(angles.camera_rad)[link])
+    return f", {digits(part)} deg camera (one error of all frames, which no number of them averages out)"
 
 
 def _zero_in_words(zero: dict[str, Any]) -> str:

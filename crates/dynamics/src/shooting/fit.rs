@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
 use super::arrow::Spread;
 use super::error::{angle_information, jump_information, scores};
 use super::linearise::{Local, Point};
-use super::problem::{Progress, Recording, Segment, Settings, ShootingError, Slack, Status};
+use super::problem::{CAMERA_NUMBERS, Progress, Recording, Segment, Settings, ShootingError, Slack, Status};
 use super::slack::{SLACK_TOLERANCE, apart, jump_variance_ratio, learned, own_sigma};
 use super::system::{MAX_DIRECTIONS, Problem, pseudo_inverse};
 use crate::parameters::Field;
@@ -14,7 +14,7 @@ use crate::parameters::Field;
 pub struct Fit {
     /// The solution.
     pub point: Point,
-    /// Names of the shared parameters: free fields, then `clock`, then two zeros for each recording.
+    /// Names of the shared parameters: free fields, then `clock`, then two zeros for each recording, then each camera's numbers.
     pub free: Vec<Field>,
     /// Marginal second derivatives of half chi-square with respect to the shared parameters, (G, G).
     pub information: DMatrix<f64>,
@@ -95,8 +95,9 @@ pub fn fit(
     if 4 + common > MAX_DIRECTIONS {
         return Err(ShootingError::TooMany(common, MAX_DIRECTIONS - 4));
     }
-    let shared = common + 2 * recordings.len() * usize::from(settings.zeros);
-    let problem = Problem { recordings, segments, settings, common, shared };
+    let cameras_at = common + 2 * recordings.len() * usize::from(settings.zeros);
+    let shared = cameras_at + CAMERA_NUMBERS * start.cameras.len();
+    let problem = Problem { recordings, segments, settings, common, shared, cameras_at };
     let mut iteration = Iteration::start(problem, start)?;
     let status = iteration.run(progress);
     iteration.finish(status)

@@ -24,6 +24,9 @@ mod trace;
 pub use fit::{Fit, fit};
 pub use linearise::Point;
 pub use path::{End, Span, follow};
-pub use problem::{MIN_SAMPLES, Progress, Recording, Segment, Settings, ShootingError, Slack, Status, cut};
+pub use problem::{
+    CAMERA_NUMBERS, CameraPart, MIN_SAMPLES, Progress, Recording, Segment, Settings, ShootingError, Slack,
+    Status, cut,
+};
 pub use start::local_state;
 pub use trace::{Trace, trace, unit_powers};

@@ -2,6 +2,19 @@
 
 use crate::parameters::Field;
 
+/// Numbers of a camera that angles depend on.
+pub const CAMERA_NUMBERS: usize = 5;
+
+/// What a camera that is not known exactly does to a recording's angles.
+#[derive(Clone, Copy, Debug)]
+pub struct CameraPart<'a> {
+    /// What each sample's angles change by with the camera's numbers, each in units of its prior standard deviation, rad:
+    /// measured = true + slopes . numbers. Of the length of the recording.
+    pub slopes_rad: &'a [[[f64; CAMERA_NUMBERS]; 2]],
+    /// Which camera it is, from 0: recordings may share one.
+    pub camera: usize,
+}
+
 /// One recording's angles. All slices have the length of `t_s`.
 #[derive(Clone, Copy, Debug)]
 pub struct Recording<'a> {
@@ -14,6 +27,8 @@ pub struct Recording<'a> {
     /// How many links were measured. With one, the lower link is not there (its constants in the model must not
     /// couple to the upper one's) and rests at zero.
     pub links: usize,
+    /// The camera's part of the angles; `None` where there is none, or none is free.
+    pub camera: Option<CameraPart<'a>>,
 }
 
 impl Recording<'_> {
@@ -21,6 +36,12 @@ impl Recording<'_> {
     #[must_use]
     pub fn seen(&self, i: usize, j: usize) -> bool {
         self.phi_rad[j][i].is_finite() && self.sigma_rad[j][i] > 0.0
+    }
+
+    /// What the camera's numbers do to link `j` in sample `i`.
+    #[must_use]
+    pub fn camera_slopes(&self, i: usize, j: usize) -> [f64; CAMERA_NUMBERS] {
+        self.camera.map_or([0.0; CAMERA_NUMBERS], |c| c.slopes_rad[i][j])
     }
 }
 

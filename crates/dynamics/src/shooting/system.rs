@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::arrow::{Arrow, Block, Eliminated};
 use super::linearise::{Local, Point, linearise, trial};
-use super::problem::{Recording, Segment, Settings};
+use super::problem::{CAMERA_NUMBERS, Recording, Segment, Settings};
 
 /// Number of directions the largest dual number has.
 pub(super) const MAX_DIRECTIONS: usize = 24;
@@ -17,6 +17,8 @@ pub(super) struct Problem<'a> {
     pub(super) settings: &'a Settings,
     pub(super) common: usize,
     pub(super) shared: usize,
+    /// Where the cameras' numbers begin among the shared parameters: they are the last.
+    pub(super) cameras_at: usize,
 }
 
 /// Least relative information that counts, tried in turn.
@@ -60,7 +62,7 @@ impl Problem<'_> {
             trial(&self.recordings[s.recording], s, k, point, self.settings.huber)
         };
         let trials: Vec<_> = threads::install(|| self.segments.par_iter().enumerate().map(one).collect());
-        let mut cost: f64 = trials.iter().map(|t| t.cost).sum();
+        let mut cost: f64 = trials.iter().map(|t| t.cost).sum::<f64>() + point.camera_cost();
         if let Some(weight) = weight {
             for (k, t) in trials.iter().enumerate() {
                 if self.segments[k].chained {
@@ -73,7 +75,7 @@ impl Problem<'_> {
     }
 
     pub(super) fn local_cost(&self, point: &Point, locals: &[Local], weight: Option<Vector4<f64>>) -> f64 {
-        let mut cost: f64 = locals.iter().map(|l| l.cost).sum();
+        let mut cost: f64 = locals.iter().map(|l| l.cost).sum::<f64>() + point.camera_cost();
         if let Some(weight) = weight {
             for (k, d) in self.jumps(point, locals) {
                 debug_assert!(self.segments[k].chained);
@@ -95,8 +97,14 @@ impl Problem<'_> {
 
     /// Column in the shared parameters of each of a segment's local unknowns after its state.
     pub(super) fn columns(&self, segment: &Segment) -> impl Fn(usize) -> usize + use<> {
-        let (common, recording) = (self.common, segment.recording);
-        move |c| if c < common { c } else { common + 2 * recording + (c - common) }
+        let (common, recording, cameras_at) = (self.common, segment.recording, self.cameras_at);
+        let zeros = common + 2 * usize::from(self.settings.zeros);
+        let camera = self.recordings[recording].camera.map_or(0, |c| c.camera);
+        move |c| match c {
+            _ if c < common => c,
+            _ if c < zeros => common + 2 * recording + (c - common),
+            _ => cameras_at + CAMERA_NUMBERS * camera + (c - zeros),
+        }
     }
 
     pub(super) fn assemble(&self, point: &Point, locals: &[Local], weight: Option<Vector4<f64>>) -> Arrow {
@@ -131,6 +139,10 @@ impl Problem<'_> {
             });
         }
         arrow.damped = arrow.corner.diagonal();
+        for (c, number) in point.cameras.iter().flatten().enumerate() {
+            arrow.corner[(self.cameras_at + c, self.cameras_at + c)] += 1.0;
+            arrow.gradient[self.cameras_at + c] += number;
+        }
         if let Some(weight) = weight {
             let w = Matrix4::from_diagonal(&weight);
             for (k, d) in self.jumps(point, locals) {
@@ -245,6 +257,9 @@ impl Problem<'_> {
                 zeros[0] += shared[self.common + 2 * r];
                 zeros[1] += shared[self.common + 2 * r + 1];
             }
+        }
+        for (c, number) in next.cameras.iter_mut().flatten().enumerate() {
+            *number += shared[self.cameras_at + c];
         }
         for (x, dx) in next.states.iter_mut().zip(states) {
             for i in 0..4 {

@@ -9,14 +9,11 @@ use nalgebra::{DMatrix, DVector, Matrix2, Matrix2x3, Matrix3, Matrix5, Vector2, 
 use rayon::prelude::*;
 
 use super::pairs::MOST;
-use crate::camera::{Camera, NUMBERS};
+use crate::camera::{BY_EYE, Camera, NUMBERS};
 use crate::error::Result;
 use crate::rigid::pose::{Pair, fit_pose, place};
 use crate::stop::Stop;
 
-/// Standard deviations of the numbers of a camera aimed by eye: 3 deg off square at two picture widths, pixels square to 0.2 %, a
-/// lens that moves the corners by 3 %. They hold what the motion does not tell; a looser prior does harm there.
-const BY_EYE: [f64; NUMBERS] = [0.001, 0.001, 0.01, 0.01, 0.03];
 /// Residual at which half of the weight is lost, in standard uncertainties.
 const CAUCHY: f64 = 3.0;
 /// Steps at most.

@@ -6,5 +6,5 @@
 mod model;
 mod plane;
 
-pub use model::{Camera, NUMBERS, Slopes};
+pub use model::{BY_EYE, Camera, NUMBERS, Slopes};
 pub use plane::Plane;
