@@ -30,11 +30,13 @@ from pydpend.errors import (
     FitError,
     ModelError,
     PydpendError,
+    RecordingWarning,
     RigError,
     SimulationError,
     SourceError,
     TableError,
     TrackerError,
+    WrongTypeError,
 )
 from pydpend.exporting import export
 from pydpend.filming import Film, Truth, film
@@ -75,6 +77,7 @@ __all__ = [
     "OverlayFilm",
     "Prediction",
     "PydpendError",
+    "RecordingWarning",
     "Rig",
     "RigError",
     "Score",
@@ -87,6 +90,7 @@ __all__ = [
     "Tracker",
     "TrackerError",
     "Truth",
+    "WrongTypeError",
     "angles",
     "calibrate",
     "compare",

@@ -213,6 +213,14 @@ class ArgumentError(TrackerError, ValueError):
     kind = "setting"
 
 
+class WrongTypeError(PydpendError, TypeError):
+    """An argument of another type than the function takes, as a path in place of what is read from it."""
+
+
+class RecordingWarning(UserWarning):
+    """A recording that is damaged or ended early: what was made of it lacks what is lost."""
+
+
 class AnglesError(PydpendError):
     """Angles that cannot be had from these nodes, or an angles table that is not one."""
 

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from pydpend.argument_types import of_type
 from pydpend.errors import ArgumentError, Setting, TableError, fault
 from pydpend.nodes import STATUS_WORDS, Nodes
 from pydpend.output import whole
@@ -51,6 +52,7 @@ def export(nodes: Nodes, path: str | os.PathLike[str], *, px_per_m: float | None
         If the form cannot hold the table (C3D and TRC need one rate, and C3D ends at frame 65534 counted from 1), or
         the file cannot be written.
     """
+    of_type("nodes", nodes, Nodes)
     target = Path(os.fsdecode(path))
     writer = WRITERS.get(target.suffix.lower())
     if writer is None:

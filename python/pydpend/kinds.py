@@ -38,6 +38,15 @@ def kind_of(path: str | os.PathLike[str]) -> Kind:
     return kind
 
 
+def misplaced(path: str | os.PathLike[str], wanted: tuple[Kind, ...]) -> Message | None:
+    """What a file is and what is done with it, if it is of a known kind and of none that is wanted.
+
+    Where nothing is wanted, a command is.
+    """
+    said: Message | None = _native.misplaced(os.fspath(path), list(wanted))
+    return said
+
+
 def expect(
     path: str | os.PathLike[str],
     wanted: tuple[Kind, ...],
@@ -48,6 +57,6 @@ def expect(
 
     ``setting``: the option that names the file.
     """
-    said: Message | None = _native.misplaced(os.fspath(path), list(wanted))
+    said = misplaced(path, wanted)
     if said is not None:
         raise error(said if setting is None else Setting(setting, subject=True) + ": " + said)

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pydpend import _native
+from pydpend.argument_types import of_type
 from pydpend.errors import SimulationError, fault
 from pydpend.model import Damping, Model, parameters
 from pydpend.tabular import TableResult, by_link
@@ -52,6 +53,9 @@ def modes(model: Model, damping: Damping | None = None) -> Modes:
     pydpend.linear.Modes
         Frequencies (Hz), shapes and damping ratios.
     """
+    of_type("model", model, Model)
+    if damping is not None:
+        of_type("damping", damping, Damping)
     d = damping or Damping()
     mass = model.mass_matrix([0.0, 0.0])
     stiff = np.diag([model.sigma_j, model.kappa_j])
@@ -136,6 +140,8 @@ def poincare(
     SimulationError
         As `simulate`, and for a link, direction or duration that cannot be.
     """
+    of_type("model", model, Model)
+    of_type("damping", damping, Damping)
     if link not in (1, 2) or direction not in (-1, 0, 1):
         raise SimulationError(
             fault("poincare", f"link {link}, direction {direction}", "Links are 1 and 2, directions -1, 0, 1")
@@ -215,6 +221,8 @@ def lyapunov(
     SimulationError
         For dry friction, a bad state, or fewer than 40 intervals.
     """
+    of_type("model", model, Model)
+    of_type("damping", damping, Damping)
     counted = int(duration_s / interval_s)
     if counted < 40:
         raise SimulationError(

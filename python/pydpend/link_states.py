@@ -14,7 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from pydpend import _native
+from pydpend.argument_types import of_type
 from pydpend.errors import AnglesError, fault
+from pydpend.kinematics import LinkAngles
 from pydpend.tabular import TableResult, by_link, html_rows
 
 Array = npt.NDArray[np.float64]
@@ -26,6 +28,10 @@ change from tumbling to swinging, long against the 30 or so samples that the smo
 _LEAST_SHARE = 0.2
 """A sigma below this share of the median is raised to it: a scatter of marker pairs is near zero by
 chance."""
+
+
+_LIKE_ANGLES = ("t_s", "phi_rad", "sigma_rad")
+"""Attributes of `Angles`."""
 
 
 class Angles(Protocol):
@@ -145,6 +151,7 @@ def states(
     AnglesError
         For times that do not increase, a link with fewer than 50 angles, a sigma that is negative.
     """
+    of_type("angles", angles, LinkAngles, like=_LIKE_ANGLES)
     t, phi, sigma = _checked(angles)
     links = phi.shape[1]
     out = np.empty((len(t), links, 3))
@@ -198,6 +205,7 @@ def savitzky_golay(angles: Angles, *, window: int = 31, degree: int = 4) -> Link
     AnglesError
         For unequal steps or a window that is even, too short for its degree, or longer than the record.
     """
+    of_type("angles", angles, LinkAngles, like=_LIKE_ANGLES)
     t, phi, sigma = _checked(angles)
     step = float(np.median(np.diff(t)))
     # A tenth of a sample displaces the polynomial's argument by less than the noise does.

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pydpend import _native
+from pydpend.argument_types import all_of_type, of_type
 from pydpend.errors import SimulationError, fault
 from pydpend.model import FORCES, LAW_TABLE, Damping, Model, parameters
 from pydpend.tabular import TableResult, by_link, html_rows
@@ -169,6 +170,8 @@ def simulate(
     SimulationError
         For a state that is not finite, times that do not increase, or a tolerance that is not reached.
     """
+    of_type("model", model, Model)
+    of_type("damping", damping, Damping)
     t = np.atleast_1d(np.asarray(t_s, dtype=np.float64))
     how = _native.IntegratorSettings(tolerance=tolerance, width_rad_s=smooth_width_rad_s, pinned=pinned)
     run: _native.SimulatedMotion = _call(
@@ -263,6 +266,8 @@ def simulate_many(
     SimulationError
         Naming the run, as `simulate`.
     """
+    all_of_type("model", [model] if isinstance(model, Model) else model, Model)
+    all_of_type("damping", [damping] if isinstance(damping, Damping) else damping, Damping)
     x = np.ascontiguousarray(states, dtype=np.float64)
     if x.ndim != 2 or x.shape[1] != 4 or not np.all(np.isfinite(x)):
         raise SimulationError(

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import os
+import warnings as warnings_of_python
 from dataclasses import dataclass
 from typing import Any, NamedTuple, TypeAlias
 
@@ -24,12 +25,13 @@ from pydpend._typing import (
     Progress,
     Region,
 )
-from pydpend.errors import ArgumentError, fault
+from pydpend.errors import ArgumentError, RecordingWarning, fault
 from pydpend.nodes import Nodes, Rig, nodes_of, read_nodes
 from pydpend.output import AnyPath
 from pydpend.progress import callback
 from pydpend.reading_options import OpenOptions, ReadingOptions, given
 from pydpend.tabular import TableResult
+from pydpend.terminal import shown
 from pydpend.wanted import Numbers, Pairs, Places, wanted_arguments
 
 Path: TypeAlias = AnyPath
@@ -51,6 +53,15 @@ def _rig(rig: Rig | Path | None) -> str | None:
 def _files(rig: Rig | Path | None) -> list[str]:
     """Files that are read besides the recording."""
     return [] if rig is None or isinstance(rig, Rig) else [os.fsdecode(rig)]
+
+
+def _loss(nodes: Nodes) -> str | None:
+    """What lacks of a recording, in a sentence; None if nothing does."""
+    ending = nodes.meta.get("ending", {})
+    early = None
+    if ending.get("kind") == "early":
+        early = f"the recording ended early, after {ending['frames']} frames ({ending['reason']})"
+    return "; ".join(said for said in (nodes.damage, early) if said is not None) or None
 
 
 def track(
@@ -139,8 +150,8 @@ def track(
     Returns
     -------
     Nodes
-        The nodes of T frames. If the recording was damaged, `Nodes.complete` is False and `Nodes.meta` says how it
-        ended; what the run warned of is in ``meta["warnings"]``.
+        The nodes of T frames. If the recording was damaged, `Nodes.complete` is False, `Nodes.damage` says what is
+        lost and ``meta["ending"]`` how it ended; what the run warned of is in ``meta["warnings"]``.
 
     Raises
     ------
@@ -157,6 +168,11 @@ def track(
     KeyboardInterrupt
         On Ctrl-C, within two seconds. What was done until then is the exception's ``nodes``, and with `output` it is
         kept there, to go on with ``resume=True``.
+
+    Warns
+    -----
+    RecordingWarning
+        If the recording is damaged or ended early.
     """
     reading = given(ReadingOptions, locals())
     existing = "resume" if resume else "replace" if force else "refuse"
@@ -181,6 +197,9 @@ def track(
     if stopped is not None:
         stopped.nodes = nodes  # type: ignore[attr-defined]
         raise stopped
+    lost = _loss(nodes)
+    if lost is not None:
+        warnings_of_python.warn(f"{shown(os.fsdecode(path))}: {lost}", RecordingWarning, stacklevel=2)
     return nodes
 
 

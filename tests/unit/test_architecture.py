@@ -32,6 +32,7 @@ GROUPS: tuple[tuple[str, ...], ...] = (
         "_typing",
         "_native",
         "kinds",
+        "argument_types",
         "json_text",
         "tabular",
         "documents",

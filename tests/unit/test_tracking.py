@@ -21,6 +21,7 @@ from pydpend.nodes import Joint, Node, Rig
 
 from tests.support.long_recordings import lengthened, resident
 
+DEMO = Path(__file__).parent.parent.parent / "fixtures" / "demo"
 H, W = 120, 200
 REACH = {"upper": (12.0, 24.0, 38.0), "lower": (10.0, 21.0, 37.0)}
 ELBOW = 44.0
@@ -382,3 +383,21 @@ def test_a_recording_that_is_cut_while_it_is_read_is_an_error_and_not_the_end_of
         dp.SourceError, match=r"drop\.mraw, frame \d+: the file became shorter while it was read"
     ):
         dp.track(path, rig(), progress=cut)
+
+
+def test_what_a_recording_lacks_is_a_warning(tmp_path: Path) -> None:
+    damaged, cut = tmp_path / "damaged.mp4", tmp_path / "cut.mkv"
+    for path in (damaged, cut):
+        copied = ["-frames:v", "1000", "-c", "copy", str(path)]
+        subprocess.run(["ffmpeg", "-v", "error", "-i", str(DEMO / "drop.mp4"), *copied], check=True)
+    whole = damaged.read_bytes()
+    at = whole.index(b"mdat") + len(whole) // 2
+    damaged.write_bytes(whole[:at] + bytes(400) + whole[at + 400 :])
+    cut.write_bytes(cut.read_bytes()[: cut.stat().st_size * 7 // 10])
+    for path, said in (
+        (damaged, r"damaged\.mp4: damaged: frames? \d"),
+        (cut, r"cut\.mkv: .*the recording ended early, after \d+"),
+    ):
+        with pytest.warns(dp.RecordingWarning, match=said):
+            nodes = dp.track(path, progress=False)
+        assert not nodes.complete

@@ -9,13 +9,14 @@ from __future__ import annotations
 import importlib
 import math
 import threading
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pydpend.analyse.options import Options
 from pydpend.analyse.state import Going, Note, Tell
-from pydpend.errors import PydpendError
+from pydpend.errors import PydpendError, RecordingWarning
 from pydpend.fit_folder import FitFolder
 from pydpend.fit_status import FitStatus
 from pydpend.recording_folder import RecordingFolder, RunFile, StoredOverlay
@@ -58,17 +59,19 @@ def track(r: Recording, options: Options, into: Path, tell: Tell, resume: bool) 
 
     # Tracking is busy outside Python; what the stages after it compute with is imported meanwhile.
     threading.Thread(target=_import_ahead).start()
-    nodes = track_film(
-        r.path,
-        options.rig,
-        **options.reading(),
-        **options.of_markers(),
-        output=RecordingFolder(into).file(RunFile.NODES),
-        resume=resume,
-        force=True,
-        progress=_share(tell),
-    )
-    for note in nodes.meta.get("warnings", []):
+    with warnings.catch_warnings(record=True) as losses:
+        warnings.simplefilter("always", RecordingWarning)
+        nodes = track_film(
+            r.path,
+            options.rig,
+            **options.reading(),
+            **options.of_markers(),
+            output=RecordingFolder(into).file(RunFile.NODES),
+            resume=resume,
+            force=True,
+            progress=_share(tell),
+        )
+    for note in (*nodes.meta.get("warnings", []), *(loss.message for loss in losses)):
         tell(Note(str(note)))
     count = len(nodes.rig.nodes)
     return f"{nodes.frame.size} frames, {count} node{'s' if count > 1 else ''}"

@@ -111,9 +111,11 @@ def _parse(argv: list[str]) -> tuple[argparse.Namespace, CommandLine]:
     top, commands = _parsers()
     word = next((w for w in argv if not w.startswith("-")), None)
     if word is not None and word not in commands:
-        raise _Refused(unknown_command(word, COMMANDS))
+        with speaking(CommandLine(commands, COMMANDS[0])):
+            raise _Refused(unknown_command(word, COMMANDS))
     try:
-        args, rest = top.parse_known_args(_renamed(argv, word))
+        with speaking(CommandLine(commands, word or COMMANDS[0])):
+            args, rest = top.parse_known_args(_renamed(argv, word))
     except argparse.ArgumentError as problem:
         raise _Refused(f"{problem.argument_name}: {problem.message}") from None
     if rest:

@@ -17,7 +17,7 @@ HELP = "one figure of a run folder as PNG, SVG or PDF"
 
 def add_arguments(p: argparse.ArgumentParser) -> None:
     """The command's arguments."""
-    p.add_argument("figure", choices=FIGURES, metavar="FIGURE", help=", ".join(FIGURES))
+    p.add_argument("figure", type=_figure, choices=FIGURES, metavar="FIGURE", help=", ".join(FIGURES))
     p.add_argument("run_folder", metavar="RUN", help="a folder made by pydpend analyse")
     p.add_argument("-o", "--output", required=True, metavar="FILE", help=".png, .svg or .pdf")
     p.add_argument("--recording", metavar="NAME", help="which recording, where there are several")
@@ -36,6 +36,18 @@ FIGURES = (
     "prediction",
     "maps",
 )
+
+
+def _figure(word: str) -> str:
+    """A figure's name; a file in its place is named as what it is."""
+    from pydpend.kinds import kind_of, misplaced
+
+    if word in FIGURES:
+        return word
+    said = misplaced(word, () if kind_of(word) == "run" else ("run",))
+    if said is not None:
+        raise argparse.ArgumentTypeError(str(said))
+    return word
 
 
 def run(args: argparse.Namespace) -> int:

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from pydpend.errors import Setting, Step, listed
+from pydpend.kinds import misplaced
 
 VALUES: Mapping[tuple[str, object], str] = {("ratios", True): "free", ("ratios", False): "fixed"}
 """Values that are words on the command line and truth values in Python."""
@@ -95,6 +96,9 @@ def unknown_command(word: str, known: Iterable[str]) -> str:
     """The message for a command that is none."""
     if word in ELSEWHERE:
         return f"{word!r} is a command of the program tracker. Type `{ELSEWHERE[word]}`"
+    said = misplaced(word, ())
+    if said is not None:
+        return str(said)
     near = difflib.get_close_matches(word.lower(), list(known), 1, 0.6)
     advice = f"Did you mean {near[0]}?" if near else f"Give {listed(known)}"
     return f"{word!r} is not a command. {advice}"

@@ -16,6 +16,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from pydpend.argument_types import all_of_type
 from pydpend.documents import Table, read_json
 from pydpend.encoder.holds import Hold
 from pydpend.errors import CALIBRATE, EncoderError, fault
@@ -341,6 +342,7 @@ def calibrate(
         For fewer than two holds, holds all at one angle or far off a line, a voltage that does not change with the
         angle, and holds outside the range or at its rails.
     """
+    all_of_type("holds", holds, Hold)
     if len(holds) < 2:
         raise EncoderError(
             fault(

@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from pydpend.argument_types import of_type
 from pydpend.documents import Table
 from pydpend.encoder.camera import camera_in
 from pydpend.encoder.sync import Course, Synchronisation, synchronise
@@ -299,6 +300,8 @@ def compare(
     EncoderError
         If the recordings share no motion, or are the same.
     """
+    of_type("video", video, LinkAngles)
+    of_type("encoder", encoder, LinkAngles)
     sync = synchronise(video, encoder, link, clocks=clocks)
     course = Course.of(video, link)
     seen = encoder.seen[:, 0]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from pydpend.argument_types import of_type
 from pydpend.encoder.calibration import Calibration
 from pydpend.encoder.signal import EncoderSignal
 from pydpend.errors import CALIBRATE, EncoderError, Setting, fault
@@ -44,6 +45,9 @@ def encoder_angles(signal: EncoderSignal, calibration: Calibration | None = None
         For volts without a calibration, more than half of the readings unusable, or a gap in which an encoder of a
         single turn may have lost one.
     """
+    of_type("signal", signal, EncoderSignal)
+    if calibration is not None:
+        of_type("calibration", calibration, Calibration)
     if signal.unit == "rad":
         if calibration is not None:
             raise EncoderError(

@@ -86,7 +86,7 @@ def angles_from_names(names: Sequence[str]) -> list[float] | None:
 
 
 def read_holds(
-    paths: Sequence[str | Path],
+    paths: Sequence[str | Path] | str | Path,
     angles_deg: Sequence[float] | None = None,
     *,
     column: str | None = None,
@@ -98,7 +98,7 @@ def read_holds(
 
     Parameters
     ----------
-    paths : sequence of path-like
+    paths : path-like or sequence of path-like
         Recordings, folders of them, or one table with ``angle_deg`` (or ``angle_rad``) beside ``voltage_v``: all
         readings, or one row per hold with ``std_v`` and ``n``.
     angles_deg : sequence of float, optional
@@ -117,7 +117,8 @@ def read_holds(
         If angles are missing or their number is not the files', or a file cannot be read.
     """
     files: list[Path] = []
-    for path in map(Path, paths):
+    given = [paths] if isinstance(paths, (str, Path)) else paths
+    for path in map(Path, given):
         expect(path, ("encoder", "tables"), EncoderError)
         if path.is_dir():
             inside = [p for p in sorted(path.iterdir()) if p.suffix.lower() in ENDINGS]

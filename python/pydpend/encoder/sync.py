@@ -15,6 +15,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from pydpend.argument_types import of_type
 from pydpend.documents import Table
 from pydpend.errors import EncoderError, fault, one_of
 from pydpend.json_text import JsonResult, plain
@@ -284,6 +285,8 @@ def synchronise(
     EncoderError
         If they do not overlap or nothing moves.
     """
+    of_type("video", video, LinkAngles)
+    of_type("encoder", encoder, LinkAngles)
     course = Course.of(video, link)
     seen = encoder.seen[:, 0]
     t, phi = encoder.t_s[seen], encoder.phi_rad[seen, 0]

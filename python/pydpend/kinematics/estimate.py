@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
+from pydpend.argument_types import of_type
 from pydpend.errors import CHECK, AnglesError, Setting, fault, one_of
 from pydpend.kinematics.body_view import BodyView
 from pydpend.kinematics.camera import CameraPart, camera_part, known
@@ -20,9 +21,10 @@ from pydpend.kinematics.pairwise import pair_angles
 from pydpend.kinematics.pose import Pose, fit_pose
 from pydpend.kinematics.table import Floats, LinkAngles
 from pydpend.kinematics.unwrap import unwrap
+from pydpend.nodes import Nodes
 
 if TYPE_CHECKING:
-    from pydpend.nodes import Nodes, Rig
+    from pydpend.nodes import Rig
 
 Method = Literal["rigid", "linkage", "pairwise"]
 ESTIMATORS: tuple[Method, ...] = get_args(Method)
@@ -92,6 +94,7 @@ def angles(
         raise AnglesError(
             fault("method", "the option has another name now", "Give " + Setting("estimator", method))
         )
+    of_type("nodes", nodes, Nodes)
     markers = body_markers(nodes, bodies, mirrored)
     _check_length(estimator, len(markers), link_length_m, link_length_sigma_m)
     label = name if name is not None else _label(nodes)
@@ -164,6 +167,7 @@ def find_linkage(nodes: Nodes, *, bodies: Sequence[str] | None = None, mirrored:
     AnglesError
         If the links turn too little to find the joints.
     """
+    of_type("nodes", nodes, Nodes)
     poses = [fit_pose(m) for m in body_markers(nodes, bodies, mirrored)]
     return fit_linkage(poses[0], poses[1] if len(poses) > 1 else None).linkage
 

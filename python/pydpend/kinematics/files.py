@@ -16,6 +16,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from pydpend.argument_types import of_type
 from pydpend.arrays import read_npy
 from pydpend.columns import Columns, read_columns
 from pydpend.documents import parse_json, read_text
@@ -73,7 +74,9 @@ def read_angles(
     """
     path = path_of(path)
     # What a folder lacks is told below.
-    expect(path, ("angles", "tables") if path.is_dir() else ("angles",), AnglesError)
+    # A folder of the authors' that lacks a file is no other folder of tables.
+    is_theirs = path.is_dir() and any(path.glob("DP*.npy"))
+    expect(path, ("angles", "tables") if is_theirs else ("angles",), AnglesError)
     label = name if name is not None else (path.name if path.is_dir() else path.stem)
     meta: dict[str, Any]
     if path.is_dir():
@@ -339,6 +342,7 @@ def write_angles(angles: LinkAngles, path: AnyPath) -> None:
     AnglesError
         For another ending or a path that cannot be written.
     """
+    of_type("angles", angles, LinkAngles)
     path = path_of(path)
     meta = json.dumps({**angles.meta, "name": angles.name}, sort_keys=True)
     columns = angles.to_columns()

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pydpend.argument_types import of_type
 from pydpend.errors import AnglesError, Setting, fault
 from pydpend.kinematics.table import Floats, LinkAngles
 from pydpend.series import correlation_time
@@ -79,6 +80,7 @@ def find_rest(angles: LinkAngles, at_least_s: float = REST_AT_LEAST_S) -> list[R
     list of pydpend.kinematics.Rest
         Empty if there is none.
     """
+    of_type("angles", angles, LinkAngles)
     t, phi = angles.t_s, angles.phi_rad
     step = angles.step_s
     if not np.isfinite(step):

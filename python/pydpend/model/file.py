@@ -109,6 +109,7 @@ def model_called(word: str) -> Model:
 def check_model_called(word: str) -> None:
     """Raises OptionError if the option ``model`` names neither one of `NAMED` nor a file."""
     if word not in NAMED and not Path(word).is_file():
+        expect(word, ("model",), OptionError, "model")
         advice = f"Give {listed((*NAMED, 'a pendulum in TOML'))}"
         raise OptionError(fault(Setting("model"), f"there is no file {word}", advice))
 
