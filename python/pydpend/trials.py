@@ -167,8 +167,11 @@ def alone(fit: DampingFit) -> dict[str, Spread]:
     }
 
 
-def combine(values: Floats, sigmas: Floats, unit: str) -> Spread:
-    """Mean and spread of independent estimates (R,) by random effects."""
+def combine(values: Floats, sigmas: Floats, unit: str, shared: Floats | None = None) -> Spread:
+    """Mean and spread of estimates (R,) by random effects.
+
+    ``shared`` (R,): what of each standard error is one error of all, which their mean keeps; else they are independent.
+    """
     weight = 1 / sigmas**2
     fixed = float(np.sum(weight * values) / np.sum(weight))
     q = float(np.sum(weight * (values - fixed) ** 2))
@@ -176,11 +179,13 @@ def combine(values: Floats, sigmas: Floats, unit: str) -> Spread:
     scale = float(np.sum(weight) - np.sum(weight**2) / np.sum(weight))
     between = max(0.0, (q - (r - 1)) / scale) if r > 1 and scale > 0 else 0.0
     weight = 1 / (sigmas**2 + between)
+    common = np.zeros(r) if shared is None else np.minimum(shared, sigmas)
+    apart = np.sum(weight**2 * (sigmas**2 + between - common**2))
     return Spread(
         values,
         sigmas,
         float(np.sum(weight * values) / np.sum(weight)),
-        float(1 / np.sqrt(np.sum(weight))),
+        float(np.hypot(np.sqrt(apart), np.sum(weight * common)) / np.sum(weight)),
         float(np.sqrt(between)),
         float(np.std(values, ddof=1)) if r > 1 else float("nan"),
         float(scipy.special.chdtrc(r - 1, q)) if r > 1 else float("nan"),
@@ -216,11 +221,15 @@ def fit_trials(
 def summary(each: Sequence[DampingFit], joint: DampingFit) -> Trials:
     """Mean, spread and consistency of finished fits."""
     spreads = {}
+    # Fits that say nothing of their cameras' numbers may be of one camera.
+    one_camera = len({given.camera_numbers for given in joint.inputs}) == 1
     for group in ("coefficients", "ratios"):
         for name, estimate in getattr(joint, group).items():
             pairs = np.array([(getattr(f, group)[name].value, getattr(f, group)[name].sigma) for f in each])
             if (pairs[:, 1] > 0).all():
-                spreads[name] = combine(pairs[:, 0], pairs[:, 1], estimate.unit)
+                of_camera = np.array([f.camera_sigma.get(name, 0.0) for f in each])
+                shared = of_camera if one_camera and group == "coefficients" else None
+                spreads[name] = combine(pairs[:, 0], pairs[:, 1], estimate.unit, shared)
     differing = [name for name, s in spreads.items() if s.p_value < 0.01]
     message = (
         f"the trials differ beyond their errors in {', '.join(differing)}: use the spread between trials"

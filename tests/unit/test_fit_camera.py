@@ -15,6 +15,7 @@ from pydpend.damping.recording import prepare
 from pydpend.damping.shooting import Cameras
 from pydpend.kinematics import LinkAngles
 from pydpend.model import Damping, derived
+from pydpend.trials import combine
 
 from tests.support.free_decays import TRUTH, measured, released
 
@@ -175,3 +176,13 @@ def test_errors_are_what_is_stated_over_drawn_cameras() -> None:
     # Twenty errors, neighbours correlated: their RMS over the stated ones is known to some 20 %.
     assert 0.55 < np.sqrt(np.mean(np.square(z))) < 1.5
     assert np.mean(np.abs(z) < 1.96) > 0.8
+
+
+def test_the_mean_of_trials_keeps_the_error_of_the_camera_they_share() -> None:
+    values, sigmas = np.array([1.0, 1.1, 0.9, 1.0]), np.full(4, 0.1)
+    apart, one = combine(values, sigmas, "1"), combine(values, sigmas, "1", np.full(4, 0.08))
+    assert apart.sigma == pytest.approx(0.05)
+    assert one.mean == apart.mean
+    # 0.06 of each is its own and halves, 0.08 stays.
+    assert one.sigma == pytest.approx(np.hypot(0.03, 0.08))
+    assert combine(values, sigmas, "1", np.zeros(4)).sigma == pytest.approx(apart.sigma)

@@ -1,12 +1,13 @@
 """Angles and damping of films by cameras aimed by eye: errors over what is stated of them.
 
-Usage: python -m tests.validation.validate_camera [angles|trajectory|energy] [SEEDS]
+Usage: python -m tests.validation.validate_camera [angles|films|trajectory|energy] [SEEDS]
 """
 
 from __future__ import annotations
 
 import dataclasses
 import sys
+import tempfile
 
 import numpy as np
 import pydpend as dp
@@ -51,6 +52,34 @@ def show_angles(count: int) -> None:
                     f"{markers} | {swing} | phi{k + 1} | {e:.4f} | {n:.4f} | {c:.4f} | {e / n:.1f} | "
                     f"{pooled:.2f} (mean of each {both:.2f})"
                 )
+
+
+def show_films(count: int) -> None:
+    """Films of the preset ``clean`` by drawn cameras, tracked without settings: the tracker finds the camera."""
+    scores, noise, part = [], [], []
+    for seed in range(count):
+        rng = np.random.default_rng([seed, 77])
+        scene = dp.Film("clean", seed=900 + seed, frames=400).scene
+        scene["camera"]["view"] = {
+            "tilt_deg": abs(rng.normal(0, 3.0)),
+            "towards_deg": rng.uniform(0, 360),
+            "k1": rng.normal(0, 0.03),
+            "pixel_height": 1 + rng.normal(0, 0.002),
+        }
+        with tempfile.TemporaryDirectory() as folder:
+            film = dp.film(scene, f"{folder}/film.avi", codec="raw")
+            nodes = dp.track(f"{folder}/film.avi", progress=False)
+        found = dp.angles(nodes, zero="vertical")
+        off = found.phi_rad - film.truth().phi_rad[found.frame]
+        off = np.angle(np.exp(1j * (off - np.angle(np.nanmean(np.exp(1j * off), axis=0)))))
+        scores.append(np.nanmean((off / found.sigma_total_rad) ** 2, axis=0))
+        noise.append(np.nanmedian(found.sigma_rad, axis=0))
+        part.append(np.sqrt(np.nanmean(found.sigma_camera_rad**2, axis=0)))
+        z, n, c = np.sqrt(scores[-1]), np.degrees(noise[-1]), np.degrees(part[-1])
+        has = "a camera found" if nodes.rig.camera else "no camera found"
+        print(f"{seed}: {has}; error over both {z}, noise {n} deg, camera {c} deg", flush=True)
+    n, c = (np.degrees(np.median(v, axis=0)) for v in (noise, part))
+    print(f"error over both {np.sqrt(np.mean(scores, axis=0))}; median noise {n} deg, camera {c} deg")
 
 
 def filmed_decay(seed: int, seconds: float, fps: float) -> dp.LinkAngles:
@@ -104,6 +133,8 @@ def main() -> None:
     count = int(sys.argv[2]) if len(sys.argv) > 2 else 50
     if what == "angles":
         show_angles(count)
+    elif what == "films":
+        show_films(count)
     else:
         show_damping(what, count)
 

@@ -27,8 +27,11 @@ KEY_STEP_PX = 1.0
 """A frame tells something of the camera if some marker has moved by this since the last one that did: while nothing
 moves, the same error is seen again and again."""
 
-ROUNDS = 4
-"""Times that shape and poses are fitted in turn: one is enough where all frames show the same markers."""
+ROUNDS = 6
+"""Most times that shape and poses are fitted in turn: one is enough where all frames show the same markers."""
+
+SETTLED = 1e-4
+"""Change of the shape's derivatives, relative, at which they have settled: a ten-thousandth of the camera's part."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,6 +133,8 @@ class BodyView:
             back = _rotate_all(-theta, left)
             step = np.einsum("tk,tkdc->kdc", w, back) / np.where(total > 0, total, 1.0)[:, None, None]
             moves = moves + step
+            if np.abs(step).max() < SETTLED * np.abs(moves).max():
+                break
         p = self.template_px
         q = self.markers.reference_px
         q = q - q.mean(axis=0)
