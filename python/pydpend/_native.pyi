@@ -19,7 +19,6 @@ from pydpend.crossing import (
     Row,
     SegmentArrays,
     StartNumbers,
-    WantedArguments,
 )
 from pydpend.errors import Message
 from pydpend.kinds import Kind
@@ -40,6 +39,7 @@ __all__ = [
     "ShootingFit",
     "ShootingSettings",
     "SimulatedMotion",
+    "Wanted",
     "arrow_reader",
     "check_outputs",
     "check_table",
@@ -120,6 +120,19 @@ class DetectSettings:
     ) -> Self: ...
 
 @final
+class Wanted:
+    """What is to be followed: places ``X,Y[@FRAME]``, a count, numbers of the picture, pairs of nodes that are one."""
+
+    def __new__(
+        cls,
+        *,
+        marker: Sequence[str] = ...,
+        markers: int | None = None,
+        also: Sequence[int] = ...,
+        same: Sequence[tuple[str, str]] = ...,
+    ) -> Self: ...
+
+@final
 class OutputSettings:
     """Where the result of a run goes: `existing` is ``refuse``, ``replace`` or ``resume``."""
 
@@ -159,7 +172,7 @@ def track(
     frames: Frames,
     detect: DetectSettings,
     open: OpenOptions,
-    wanted: WantedArguments,
+    wanted: Wanted,
     output: OutputSettings,
     progress: Callback,
 ) -> tuple[Columns, list[Message], BaseException | None]:
@@ -170,7 +183,7 @@ def setup(
     frames: Frames,
     detect: DetectSettings,
     open: OpenOptions,
-    wanted: WantedArguments,
+    wanted: Wanted,
     output: OutputSettings,
     picture: str | None,
     progress: Callback,

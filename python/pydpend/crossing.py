@@ -19,27 +19,19 @@ HeldColumns: TypeAlias = tuple[
     NDArray[np.float32],
     NDArray[np.uint8],
 ]
-Columns: TypeAlias = tuple[
-    NDArray[np.int64],
-    NDArray[np.float64],
-    NDArray[np.float64],
-    NDArray[np.float32],
-    NDArray[np.float32],
-    NDArray[np.uint8],
-    str,
-]
+"""Frames, times, places, uncertainties, areas and status."""
+Columns: TypeAlias = tuple[*HeldColumns, str]
+"""The same, and the metadata as JSON."""
 
 Found: TypeAlias = tuple[NDArray[np.float64], NDArray[np.float32], NDArray[np.uint8]]
 Row: TypeAlias = tuple[NDArray[np.float64], NDArray[np.float32], NDArray[np.float32], NDArray[np.uint8]]
-WantedArguments: TypeAlias = tuple[list[str], int | None, list[int], list[tuple[str, str]]]
-"""Places that were pointed at, how many markers there are, numbers, pairs of nodes."""
 Frames: TypeAlias = tuple[int, int | None] | None
 Callback: TypeAlias = Callable[[str, int, int | None], object] | None
 """Called with stage, frames done and frames in all, if known."""
 
 
 class SegmentArrays(Protocol):
-    """What the compiled fit reads of `pydpend.damping.shooting.Segments`, K segments."""
+    """The arrays that the compiled fit reads of `pydpend.damping.shooting.Segments`, K segments."""
 
     @property
     def rows(self) -> NDArray[np.int64]:

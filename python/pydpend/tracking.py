@@ -32,7 +32,7 @@ from pydpend.progress import callback
 from pydpend.reading_options import OpenOptions, ReadingOptions, given
 from pydpend.tabular import TableResult
 from pydpend.terminal import shown
-from pydpend.wanted import Numbers, Pairs, Places, wanted_arguments
+from pydpend.wanted import Numbers, Pairs, Places, wanted
 
 Path: TypeAlias = AnyPath
 
@@ -186,7 +186,7 @@ def track(
             reading.span(),
             reading.detected(),
             reading.opened(),
-            wanted_arguments(marker, markers, also, same),
+            wanted(marker, markers, also, same),
             written,
             told,
         )
@@ -296,7 +296,7 @@ def setup(
             reading.span(),
             reading.detected(),
             reading.opened(),
-            wanted_arguments(marker, markers, also, same),
+            wanted(marker, markers, also, same),
             written,
             None if picture is None else os.fsdecode(picture),
             told,
@@ -395,7 +395,7 @@ def overlay(
     ArgumentError
         If an argument makes no sense.
     KeyboardInterrupt
-        On Ctrl-C, within two seconds; what was drawn is a whole film.
+        On Ctrl-C, within two seconds; what was drawn is a whole film, and there is none where nothing was.
     """
     opening = given(OpenOptions, locals())
     table = [] if isinstance(nodes, Nodes) else [os.fsdecode(nodes)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, TypeAlias
 
-from pydpend.crossing import WantedArguments
+from pydpend import _native
 from pydpend.errors import ArgumentError, Setting, fault
 
 Place: TypeAlias = tuple[float, float] | tuple[float, float, int] | str
@@ -63,19 +63,19 @@ def _pairs(given: Pairs) -> list[tuple[str, str]]:
     return out
 
 
-def wanted_arguments(
+def wanted(
     marker: Places | None,
     markers: int | None,
     also: Numbers,
     same: Pairs,
-) -> WantedArguments:
+) -> _native.Wanted:
     """The markers that are wanted, as the compiled half takes them, which knows what makes sense.
 
-    Returns
-    -------
-    tuple
-        Places as texts, how many markers there are, numbers, pairs of names.
+    Raises
+    ------
+    ArgumentError
+        Naming the keyword that is no place, number or pair of names.
     """
     if markers is not None and not 0 <= markers < 1 << 31:
         raise _refused("markers", markers, "Give 1 or more")
-    return _places(marker), markers, _numbers(also), _pairs(same)
+    return _native.Wanted(marker=_places(marker), markers=markers, also=_numbers(also), same=_pairs(same))

@@ -6,9 +6,11 @@ use std::collections::HashMap;
 
 use dynamics::shooting::{self, Span, follow};
 use dynamics::{Field, Fixed, Parameters, TERMS};
-use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
+use numpy::{PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::{PyKeyError, PyValueError};
 use pyo3::prelude::*;
+
+use crate::arrays::rows;
 
 /// The parameter of a name. Raises KeyError for one that is not known.
 pub(crate) fn field(name: &str) -> PyResult<Field> {
@@ -35,14 +37,6 @@ pub(crate) fn parameters(values: &HashMap<String, f64>) -> PyResult<Parameters<f
         }
     }
     Ok(out)
-}
-
-/// Rows of N numbers as an array, (K, N).
-pub(crate) fn rows<'py, const N: usize>(
-    py: Python<'py>,
-    rows: &[[f64; N]],
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    rows.as_flattened().to_pyarray(py).reshape([rows.len(), N])
 }
 
 /// States at `times_s` (ascending) from `state` at `start_s`.

@@ -2,6 +2,7 @@
 //!
 //! Each area has its file and is registered by one line in the module below; `python/pydpend` wraps it all.
 
+mod arrays;
 mod dynamics;
 mod errors;
 mod film;
@@ -29,7 +30,9 @@ mod _native {
     #[pymodule_export]
     use super::rig::{plane_places, plane_slopes, read_rig, recorded_places, rig_toml, write_rig};
     #[pymodule_export]
-    use super::settings::{OutputSettings, OverlaySettings, PyDetectSettings, PyOpenOptions, setting_words};
+    use super::settings::{
+        OutputSettings, OverlaySettings, PyDetectSettings, PyOpenOptions, PyWanted, setting_words,
+    };
     #[pymodule_export]
     use super::simulation::{
         IntegratorSettings, SimulatedMotion, poincare_section, simulate_ensemble, simulate_motion,

@@ -149,7 +149,7 @@ impl LiveTracker {
         ))
     }
 
-    /// What was detected in the last image.
+    /// The detections of the last image.
     fn detections<'py>(&self, py: Python<'py>) -> PyResult<Found<'py>> {
         found(py, &self.detections)
     }

@@ -70,21 +70,30 @@ impl PyDetectSettings {
     }
 }
 
-/// What is to be followed: places that were pointed at, how many markers there are, numbers of the picture, pairs of nodes that
-/// are one.
-pub type WantedArguments = (Vec<String>, Option<usize>, Vec<usize>, Vec<(String, String)>);
+/// The markers that are to be followed, as the user names them.
+#[pyclass(frozen, name = "Wanted", module = "pydpend._native")]
+pub struct PyWanted(pub Wanted);
 
-/// What is to be followed.
-pub fn wanted(py: Python<'_>, given: WantedArguments) -> PyResult<Wanted> {
-    let (marker, markers, also, same) = given;
-    let place = |text: String| {
-        text.parse().map_err(|why: String| {
-            argument(py, "marker", format!("{text:?} cannot be"), &format!("It is {why}"))
-        })
-    };
-    let marker = marker.into_iter().map(place).collect::<PyResult<Vec<_>>>()?;
-    let same = same.into_iter().map(|(a, b)| [a, b]).collect();
-    Ok(Wanted { marker, markers, also, same })
+#[pymethods]
+impl PyWanted {
+    /// `marker` are places `X,Y[@FRAME]`, `also` numbers of the picture, `same` pairs of nodes that are one marker.
+    #[new]
+    #[pyo3(signature = (*, marker=Vec::new(), markers=None, also=Vec::new(), same=Vec::new()))]
+    fn new(
+        py: Python<'_>,
+        marker: Vec<String>,
+        markers: Option<usize>,
+        also: Vec<usize>,
+        same: Vec<[String; 2]>,
+    ) -> PyResult<Self> {
+        let place = |text: String| {
+            text.parse().map_err(|why: String| {
+                argument(py, "marker", format!("{text:?} cannot be"), &format!("It is {why}"))
+            })
+        };
+        let marker = marker.into_iter().map(place).collect::<PyResult<Vec<_>>>()?;
+        Ok(Self(Wanted { marker, markers, also, same }))
+    }
 }
 
 /// Options of opening a recording.
@@ -178,7 +187,7 @@ impl OverlaySettings {
     }
 }
 
-/// How a CSV writes names.
+/// The form of names in a CSV.
 pub fn cells(safe_csv: bool) -> Cells {
     if safe_csv { Cells::Safe } else { Cells::Plain }
 }

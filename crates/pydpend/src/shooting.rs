@@ -14,7 +14,8 @@ use numpy::{
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::dynamics::{field, parameters, rows};
+use crate::arrays::rows;
+use crate::dynamics::{field, parameters};
 
 /// Angles of one recording, owned, columns apart.
 struct Angles {
@@ -91,10 +92,6 @@ impl Angles {
     }
 }
 
-fn matrix<'py>(py: Python<'py>, m: &[f64], n: usize) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    m.to_pyarray(py).reshape([n, n])
-}
-
 /// Whole numbers and two tables of numbers with the same rows.
 type Tables<'py> = (Bound<'py, PyArray2<i64>>, Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>);
 
@@ -119,8 +116,7 @@ pub fn shooting_segments<'py>(
             states.push(local_state(&view, s.start_s).unwrap_or([f64::NAN; 4]));
         }
     }
-    let n = whole.len();
-    Ok((whole.as_flattened().to_pyarray(py).reshape([n, 4])?, rows(py, &times)?, rows(py, &states)?))
+    Ok((rows(py, &whole)?, rows(py, &times)?, rows(py, &states)?))
 }
 
 /// Segments of recordings: the attributes of `pydpend.damping.shooting.Segments`.
@@ -230,7 +226,10 @@ impl ShootingFit {
     fn of(py: Python<'_>, fit: &Fit) -> PyResult<Self> {
         let n = fit.gradient.len();
         let (k, g) = fit.scores.shape();
-        let square = |m: &[f64]| matrix(py, m, n).map(Bound::unbind);
+        let table = |m: &[f64], shape: [usize; 2]| -> PyResult<Py<PyArray2<f64>>> {
+            Ok(m.to_pyarray(py).reshape(shape)?.unbind())
+        };
+        let square = |m: &[f64]| table(m, [n, n]);
         let list = |v: &[f64]| v.to_pyarray(py).unbind();
         let cube = |flat: &[f64], count: usize| -> PyResult<Py<PyArray3<f64>>> {
             Ok(flat.to_pyarray(py).reshape([count, 4, 4])?.unbind())
@@ -250,7 +249,7 @@ impl ShootingFit {
             jump_information: square(fit.jump_information.as_slice())?,
             jumps_shown: list(&fit.jumps_shown),
             gradient: list(fit.gradient.as_slice()),
-            scores: fit.scores.transpose().as_slice().to_pyarray(py).reshape([k, g])?.unbind(),
+            scores: table(fit.scores.transpose().as_slice(), [k, g])?,
             slack: list(&fit.slack),
             own_sigma: list(&fit.own_sigma),
             jump_chi2: list(&fit.jump_chi2),
@@ -358,10 +357,5 @@ pub fn shooting_trace<'py>(
         .zip(&trace.segment)
         .map(|((r, i), k)| [*r as i64, *i as i64, *k as i64])
         .collect();
-    let n = index.len();
-    Ok((
-        index.as_flattened().to_pyarray(py).reshape([n, 3])?,
-        rows(py, &trace.state)?,
-        rows(py, &trace.unit_power)?,
-    ))
+    Ok((rows(py, &index)?, rows(py, &trace.state)?, rows(py, &trace.unit_power)?))
 }

@@ -3,16 +3,16 @@
 use std::collections::HashMap;
 
 use dynamics::Contact;
-use dynamics::TERMS;
 use dynamics::analysis::ensemble::{Case, ensemble};
 use dynamics::analysis::lyapunov::{Growth, growth_rates};
 use dynamics::analysis::section::{Section, poincare};
 use dynamics::analysis::simulate::{Ending, Failure, Run, Sample, Settings, simulate};
 use dynamics::friction::Friction;
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
+use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+use crate::arrays::rows;
 use crate::dynamics::parameters;
 
 /// Settings of the integrator.
@@ -43,10 +43,6 @@ fn contact(c: Contact) -> f64 {
     }
 }
 
-fn table<'py>(py: Python<'py>, flat: &[f64], columns: usize) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    flat.to_pyarray(py).reshape([flat.len() / columns, columns])
-}
-
 /// One motion at T samples, with E events.
 #[pyclass(frozen, get_all, module = "pydpend._native")]
 pub struct SimulatedMotion {
@@ -63,21 +59,25 @@ pub struct SimulatedMotion {
 
 impl SimulatedMotion {
     fn of(py: Python<'_>, run: &Run) -> PyResult<Self> {
-        let columns = |width: usize, f: &dyn Fn(&Sample) -> Vec<f64>| -> PyResult<Py<PyArray2<f64>>> {
-            let flat: Vec<f64> = run.samples.iter().flat_map(f).collect();
-            Ok(table(py, &flat, width)?.unbind())
-        };
+        fn columns<const N: usize>(
+            py: Python<'_>,
+            run: &Run,
+            of: fn(&Sample) -> [f64; N],
+        ) -> PyResult<Py<PyArray2<f64>>> {
+            let all: Vec<[f64; N]> = run.samples.iter().map(of).collect();
+            rows(py, &all).map(Bound::unbind)
+        }
         let energy: Vec<f64> = run.samples.iter().map(|s| s.energy).collect();
-        let events: Vec<f64> =
-            run.events.iter().flat_map(|e| [e.t_s, e.joint as f64, contact(e.from), contact(e.to)]).collect();
+        let events: Vec<[f64; 4]> =
+            run.events.iter().map(|e| [e.t_s, e.joint as f64, contact(e.from), contact(e.to)]).collect();
         Ok(Self {
-            state: columns(4, &|s| s.x.to_vec())?,
-            a: columns(2, &|s| s.a.to_vec())?,
-            normal: columns(2, &|s| s.normal.to_vec())?,
-            dry: columns(2, &|s| s.dry.to_vec())?,
+            state: columns(py, run, |s| s.x)?,
+            a: columns(py, run, |s| s.a)?,
+            normal: columns(py, run, |s| s.normal)?,
+            dry: columns(py, run, |s| s.dry)?,
             energy: energy.to_pyarray(py).unbind(),
-            works: columns(TERMS.len(), &|s| s.works.to_vec())?,
-            events: table(py, &events, 4)?.unbind(),
+            works: columns(py, run, |s| s.works)?,
+            events: rows(py, &events)?.unbind(),
             at_rest: run.ending == Ending::AtRest,
             end_s: run.end_s,
         })
@@ -113,11 +113,11 @@ pub fn simulate_ensemble<'py>(
     settings: &IntegratorSettings,
 ) -> PyResult<Many<'py>> {
     let pendulums = models.iter().map(parameters).collect::<PyResult<Vec<_>>>()?;
-    let rows = states.as_array();
-    if rows.shape()[1] != 4 || (pendulums.len() != 1 && pendulums.len() != rows.shape()[0]) {
+    let given = states.as_array();
+    if given.shape()[1] != 4 || (pendulums.len() != 1 && pendulums.len() != given.shape()[0]) {
         return Err(PyValueError::new_err("states: give (K, 4), and one model or K"));
     }
-    let cases: Vec<Case> = rows
+    let cases: Vec<Case> = given
         .outer_iter()
         .enumerate()
         .map(|(i, r)| Case {
@@ -127,14 +127,14 @@ pub fn simulate_ensemble<'py>(
         .collect();
     let times = times_s.as_array().to_vec();
     let runs = py.detach(|| ensemble(&cases, &times, &settings.0));
-    let (mut x, mut energy, mut rest) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut x, mut energy, mut rest) = (Vec::<[f64; 4]>::new(), Vec::new(), Vec::new());
     for (i, run) in runs.iter().enumerate() {
         let run = run.as_ref().map_err(|e| PyValueError::new_err(format!("run {i}: {e}")))?;
-        x.extend(run.samples.iter().flat_map(|s| s.x));
+        x.extend(run.samples.iter().map(|s| s.x));
         energy.extend(run.samples.iter().map(|s| s.energy));
         rest.push(run.ending == Ending::AtRest);
     }
-    Ok((table(py, &x, 4)?, energy.to_pyarray(py), rest.to_pyarray(py)))
+    Ok((rows(py, &x)?, energy.to_pyarray(py), rest.to_pyarray(py)))
 }
 
 /// Passages of a link through an angle: rows of time and state, (K, 5).
@@ -157,8 +157,8 @@ pub fn poincare_section<'py>(
     let section = Section { link, angle_rad, direction };
     let found =
         py.detach(|| poincare(&p, state, duration_s, section, &settings.0)).map_err(|e| failed(&e))?;
-    let flat: Vec<f64> = found.iter().flat_map(|(t, x)| [*t, x[0], x[1], x[2], x[3]]).collect();
-    table(py, &flat, 5)
+    let passages: Vec<[f64; 5]> = found.iter().map(|(t, x)| [*t, x[0], x[1], x[2], x[3]]).collect();
+    rows(py, &passages)
 }
 
 /// Rates of growth of a tangent vector, one per counted interval, 1/s.

@@ -5,11 +5,31 @@ use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, ToPy
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-fn check(t: usize, phi: usize, sigma: usize) -> PyResult<()> {
-    if phi != t || sigma != t {
-        return Err(PyValueError::new_err(format!("{t} times, {phi} angles and {sigma} uncertainties")));
+/// Angles of one link, owned: times in s, angles and their standard uncertainties in rad.
+struct Angles {
+    t_s: Vec<f64>,
+    phi_rad: Vec<f64>,
+    sigma_rad: Vec<f64>,
+}
+
+impl Angles {
+    /// The angles of three arrays. Raises ValueError where these are not of one length.
+    fn of(
+        t_s: &PyReadonlyArray1<'_, f64>,
+        phi_rad: &PyReadonlyArray1<'_, f64>,
+        sigma_rad: &PyReadonlyArray1<'_, f64>,
+    ) -> PyResult<Self> {
+        let [t_s, phi_rad, sigma_rad] = [t_s, phi_rad, sigma_rad].map(|array| array.as_array().to_vec());
+        let (t, phi, sigma) = (t_s.len(), phi_rad.len(), sigma_rad.len());
+        if phi != t || sigma != t {
+            return Err(PyValueError::new_err(format!("{t} times, {phi} angles and {sigma} uncertainties")));
+        }
+        Ok(Self { t_s, phi_rad, sigma_rad })
     }
-    Ok(())
+
+    fn measured(&self) -> Measured<'_> {
+        Measured { t_s: &self.t_s, phi_rad: &self.phi_rad, sigma_rad: &self.sigma_rad }
+    }
 }
 
 type NoiseOut<'py> = (f64, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
@@ -26,12 +46,10 @@ pub fn learn_noise<'py>(
     scale: bool,
     stretch_s: f64,
 ) -> PyResult<NoiseOut<'py>> {
-    let (t, phi, sigma) =
-        (t_s.as_array().to_vec(), phi_rad.as_array().to_vec(), sigma_rad.as_array().to_vec());
-    check(t.len(), phi.len(), sigma.len())?;
+    let angles = Angles::of(&t_s, &phi_rad, &sigma_rad)?;
     let search = Search { scale, stretch_s };
     let noise = py.detach(|| {
-        let data = Measured { t_s: &t, phi_rad: &phi, sigma_rad: &sigma };
+        let data = angles.measured();
         if order == 4 { learn::<4>(data, &search) } else { learn::<3>(data, &search) }
     });
     Ok((noise.factor, noise.knots_s.to_pyarray(py), noise.log_q.to_pyarray(py)))
@@ -54,22 +72,22 @@ pub fn smooth_angles<'py>(
     log_q: PyReadonlyArray1<'py, f64>,
     white: PyReadonlyArray1<'py, f64>,
 ) -> PyResult<StatesOut<'py>> {
-    let (t, phi, sigma) =
-        (t_s.as_array().to_vec(), phi_rad.as_array().to_vec(), sigma_rad.as_array().to_vec());
-    check(t.len(), phi.len(), sigma.len())?;
-    let white = white.as_array().to_vec();
-    check(t.len(), phi.len(), white.len())?;
+    let angles = Angles::of(&t_s, &phi_rad, &sigma_rad)?;
+    let (white, t) = (white.as_array().to_vec(), angles.t_s.len());
+    if white.len() != t {
+        return Err(PyValueError::new_err(format!("{t} times and {} unit normals", white.len())));
+    }
     let noise = Noise { factor, knots_s: knots_s.as_array().to_vec(), log_q: log_q.as_array().to_vec() };
     if noise.knots_s.is_empty() || noise.knots_s.len() != noise.log_q.len() {
         return Err(PyValueError::new_err("the intensity needs as many knots as values, at least one"));
     }
     let out = py.detach(|| {
-        let data = Measured { t_s: &t, phi_rad: &phi, sigma_rad: &sigma };
+        let data = angles.measured();
         if order == 4 { all::<4>(data, &noise, &white) } else { all::<3>(data, &noise, &white) }
     });
     Ok((
-        out.states.to_pyarray(py).reshape([t.len(), 3])?,
-        out.covariances.to_pyarray(py).reshape([t.len(), 3, 3])?,
+        out.states.to_pyarray(py).reshape([t, 3])?,
+        out.covariances.to_pyarray(py).reshape([t, 3, 3])?,
         out.log_likelihood,
         out.factors,
     ))

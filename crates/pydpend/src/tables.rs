@@ -106,7 +106,7 @@ pub fn table_of(py: Python<'_>, held: &Held<'_>, meta: &str) -> PyResult<NodeTab
     Ok(NodeTable { meta, rows })
 }
 
-/// What of the recording is lost by a table's `meta["damage"]`, in a sentence; `None` if nothing is.
+/// The frames lost to damage by a table's `meta["damage"]`, in a sentence; `None` if none are.
 #[pyfunction]
 pub fn damage_words(py: Python<'_>, damage: &str) -> PyResult<Option<String>> {
     let damage: Damage = serde_json::from_str(damage).map_err(|e| {
@@ -149,13 +149,13 @@ pub fn arrow_reader(py: Python<'_>, held: Held<'_>, rig: &str) -> PyResult<PyRec
     Ok(PyRecordBatchReader::new(Box::new(RecordBatchIterator::new(batches, table::schema()))))
 }
 
-/// What a file or folder is: the name of a `tracker::kind::Kind`.
+/// The kind of a file or folder: the name of a `tracker::kind::Kind`.
 #[pyfunction]
 pub fn kind_of(path: PathBuf) -> &'static str {
     kind::kind_of(&path).name()
 }
 
-/// What to say of a file that is none of the kinds that are wanted.
+/// The message for a file that is none of the kinds that are wanted.
 #[pyfunction]
 pub fn misplaced(py: Python<'_>, path: PathBuf, wanted: Vec<String>) -> PyResult<Option<Bound<'_, PyAny>>> {
     let known = |name: &String| Kind::ALL.into_iter().find(|k| k.name() == name);

@@ -13,13 +13,10 @@ use tracker::overlay::{self, FilmSettings};
 use tracker::pipeline::{self, RunSettings};
 use tracker::source;
 use tracker::table::{Fingerprint, SourceFacts};
-use tracker::wanted::Wanted;
 
 use crate::errors::{argument, raise, to_python};
 use crate::rig::rig_json;
-use crate::settings::{
-    OutputSettings, OverlaySettings, PyDetectSettings, PyOpenOptions, WantedArguments, rig, wanted,
-};
+use crate::settings::{OutputSettings, OverlaySettings, PyDetectSettings, PyOpenOptions, PyWanted, rig};
 use crate::tables::{Columns, Held, columns, table_of};
 use crate::watch::Watch;
 
@@ -31,13 +28,13 @@ fn settings(
     frames: Frames,
     detect: &PyDetectSettings,
     open: &PyOpenOptions,
-    wanted: Wanted,
+    wanted: &PyWanted,
 ) -> RunSettings {
     RunSettings {
         input: text(&input),
         frames: frames.map(|(start, end)| start..end.unwrap_or(u64::MAX)),
         detect: detect.0.clone(),
-        wanted,
+        wanted: wanted.0.clone(),
         threads: open.0.threads,
         open: open.0.clone(),
         ..RunSettings::default()
@@ -69,7 +66,7 @@ pub fn track<'py>(
     frames: Frames,
     detect: &PyDetectSettings,
     open: &PyOpenOptions,
-    wanted: WantedArguments,
+    wanted: &PyWanted,
     output: &OutputSettings,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<(Columns<'py>, Messages<'py>, Option<PyErr>)> {
@@ -80,7 +77,7 @@ pub fn track<'py>(
         collect: true,
         cells: output.cells,
         reads: output.reads.clone(),
-        ..settings(input, frames, detect, open, self::wanted(py, wanted)?)
+        ..settings(input, frames, detect, open, wanted)
     };
     let mut watch = Watch::new(progress);
     let outcome = py.detach(|| pipeline::run(&settings, &mut watch));
@@ -100,8 +97,8 @@ type Found<'py> = (String, Messages<'py>, Bound<'py, PyArray3<u8>>);
 /// Lines, samples red, green, blue, width and height.
 type Unclear = (Vec<String>, Vec<u8>, [usize; 2]);
 
-/// What was found where it is not clear what is meant: a line of each, and the picture, which is also written if a file is given.
-/// Nothing where nothing was found or the picture cannot be drawn: the reason for it is the error that is raised.
+/// The candidates where it is not clear which are meant: a line for each, and the picture, which is also written if a file is
+/// given. Nothing where nothing was found or the picture cannot be drawn: the reason for it is the error that is raised.
 fn drawn(settings: &RunSettings, file: Option<&Path>, watch: &mut Watch) -> Option<Unclear> {
     let found = watch.candidates.take().filter(|c| !c.all.is_empty())?;
     let picture = tracker::setup::picture_of(settings, &found, watch).ok()?;
@@ -121,12 +118,12 @@ pub fn setup<'py>(
     frames: Frames,
     detect: &PyDetectSettings,
     open: &PyOpenOptions,
-    wanted: WantedArguments,
+    wanted: &PyWanted,
     output: &OutputSettings,
     picture: Option<PathBuf>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Found<'py>> {
-    let settings = settings(input, frames, detect, open, self::wanted(py, wanted)?);
+    let settings = settings(input, frames, detect, open, wanted);
     let mut watch = Watch::new(progress);
     let mut unclear = None;
     let outcome = py.detach(|| {
@@ -184,7 +181,7 @@ pub fn overlay_film<'py>(
     Ok((filmed.frame.into_pyarray(py), filmed.time_s.into_pyarray(py)))
 }
 
-/// What is known of a recording before it is read through, as JSON.
+/// The facts of a recording before it is read through, as JSON.
 #[pyfunction]
 pub fn info(py: Python<'_>, input: PathBuf, open: &PyOpenOptions) -> PyResult<String> {
     let mut watch = Watch::new(None);
@@ -217,7 +214,7 @@ pub fn recording_files(py: Python<'_>, input: PathBuf) -> PyResult<Vec<PathBuf>>
     source::files(&text(&input)).map_err(|e| raise(py, e))
 }
 
-/// What tells the contents of some files from others without reading all of them, in hexadecimal.
+/// The fingerprint of some files' contents, made without reading all of them, in hexadecimal.
 #[pyfunction]
 pub fn fingerprint(py: Python<'_>, files: Vec<PathBuf>) -> PyResult<String> {
     py.detach(|| Fingerprint::of(&files)).map(|f| f.sha256).map_err(|e| raise(py, e))

@@ -39,7 +39,7 @@ impl Watch {
         self.stopped.map(|(_, error)| error)
     }
 
-    /// What came of work that is all or nothing: the exception that stopped it comes before any other.
+    /// The result of work that is all or nothing; the exception that stopped the work comes before any other.
     pub fn done<T>(self, py: Python<'_>, outcome: Result<T, Error>) -> PyResult<T> {
         match (outcome, self.into_error()) {
             (Ok(value), None) => Ok(value),
