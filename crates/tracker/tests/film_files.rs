@@ -4,14 +4,17 @@
 
 use std::path::Path;
 
+use tracker::error::FaultKind;
 use tracker::frame::TimeBase;
-use tracker::pipeline::{RunSettings, Silent, run};
+use tracker::overlay::{self, FilmSettings};
+use tracker::pipeline::{Observer, RunSettings, Silent, Stage, run};
 use tracker::score::{LIMIT_PX, Tracked, score};
 use tracker::setup::{Setup, find};
 use tracker::source::{Ending, OpenOptions, open};
 use tracker::synth::encode::Codec;
 use tracker::synth::scene::{LinkMotion, Marker};
 use tracker::synth::{Film, Scene, Truth, WriteOptions, preset, write};
+use tracker::table::NodeTable;
 
 /// The paper's layout in a small image, 12 frames.
 fn scene(depth_bits: u32) -> Scene {
@@ -225,6 +228,41 @@ fn stated_uncertainties_hold_through_every_codec() {
         }
     }
     assert!(wrong.is_empty(), "{wrong:?}");
+}
+
+/// Asks to stop once drawing begins.
+#[derive(Default)]
+struct StopsDrawing(bool);
+
+impl Observer for StopsDrawing {
+    fn stage(&mut self, stage: Stage, _total: Option<u64>) {
+        self.0 = stage == Stage::Draw;
+    }
+
+    fn interrupted(&mut self) -> bool {
+        self.0
+    }
+}
+
+#[test]
+fn an_overlay_without_a_picture_leaves_no_film() {
+    let folder = tempfile::tempdir().unwrap();
+    let [filmed, drawn] = ["film.mp4", "drawn.mp4"].map(|name| folder.path().join(name));
+    let film = Film::new(&scene(8)).unwrap();
+    write(&film, &filmed, &WriteOptions::default(), &mut |_| Ok(())).unwrap();
+    let input = filmed.display().to_string();
+    let settings =
+        RunSettings { input: input.clone(), rig: Some(film.rig(0)), collect: true, ..RunSettings::default() };
+    let mut table = run(&settings, &mut Silent).unwrap().table.unwrap();
+    let draw = |table: &NodeTable, observer: &mut dyn Observer| {
+        let (open, settings) = (OpenOptions::default(), FilmSettings::default());
+        let outcome = overlay::film(&input, &open, table, &drawn, &settings, observer);
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "only the recording is there");
+        outcome.unwrap_err().kind()
+    };
+    assert_eq!(draw(&table, &mut StopsDrawing::default()), FaultKind::Interrupted);
+    table.rows.frame.iter_mut().for_each(|frame| *frame += 1000);
+    assert_eq!(draw(&table, &mut Silent), FaultKind::Invalid);
 }
 
 /// What `tracker setup` says of a film of `scene`.

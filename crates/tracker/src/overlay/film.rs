@@ -75,7 +75,7 @@ pub struct Filmed {
 /// # Errors
 /// [`Error::Source`] if the recording cannot be read, [`Error::Table`] if it is not the table's,
 /// [`Error::Film`] if the film is there already, is the recording, or cannot be written, [`Error::Argument`] for settings out of range,
-/// [`Error::Interrupted`] if the observer asks to stop: what was drawn is then a whole film.
+/// [`Error::Interrupted`] if the observer asks to stop: what was drawn is then a whole film, and nothing is left where nothing was.
 pub fn film(
     input: &str,
     open: &OpenOptions,
@@ -130,7 +130,10 @@ pub fn film(
     let mut t = 0;
     while let Some(frame) = source.next_frame()? {
         if observer.interrupted() {
-            writer.finish()?;
+            // Without a picture there is no film: what was begun goes with the writer.
+            if !filmed.frame.is_empty() {
+                writer.finish()?;
+            }
             return Err(Error::Interrupted);
         }
         while t < table.frames() && (table.rows.frame[t] as u64) < frame.index {
@@ -155,13 +158,13 @@ pub fn film(
         }
         observer.progress(t as u64 + 1);
     }
-    writer.finish()?;
     if filmed.frame.is_empty() {
         return Err(Error::Table(
             Fault::new(input, "it has none of the table's frames")
                 .advice("Give the recording that the table was made from"),
         ));
     }
+    writer.finish()?;
     Ok(filmed)
 }
 
