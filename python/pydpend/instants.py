@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import datetime
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
+
+from pydpend.errors import PydpendError, fault
 
 Floats = NDArray[np.float64]
 
@@ -74,6 +76,14 @@ def stamp_in(t_s: Floats) -> tuple[int, str] | None:
     ):
         return 0, "days since 1900 as spreadsheets store them"
     return None
+
+
+def refuse_stamps(name: str, t_s: Floats, error: type[PydpendError], place: Callable[[int], str]) -> None:
+    """Raises ``error`` for times (T,) of the file ``name`` that are stamps; ``place`` says where a row stands."""
+    found = stamp_in(t_s)
+    if found is not None:
+        row, what = found
+        raise error(fault(name, f"the time {t_s[row]:.14g} s may be {what}", STAMP_ADVICE, place=place(row)))
 
 
 def since_1970(t_s: Floats) -> tuple[Floats, str] | None:

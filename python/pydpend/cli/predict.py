@@ -1,4 +1,4 @@
-"""How well a fit predicts a recording: only the initial state of each window and the angle zeros are fitted.
+"""Predicts a recording with a fit: only the initial state of each window and the angle zeros are fitted.
 
 Writes predict.json, windows.csv and a figure into DIR.
 

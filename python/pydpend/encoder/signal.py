@@ -14,7 +14,7 @@ from pydpend.columns import Columns, read_columns
 from pydpend.documents import unreadable
 from pydpend.encoder.scales import Unit, in_base, in_seconds
 from pydpend.errors import EncoderError, Setting, fault
-from pydpend.instants import STAMP_ADVICE, seconds_of_numpy, since_1970, stamp_in
+from pydpend.instants import refuse_stamps, seconds_of_numpy, since_1970
 from pydpend.kinds import expect
 from pydpend.output import AnyPath, path_of
 from pydpend.tabular import TableResult
@@ -265,16 +265,8 @@ def _checked(
         raise EncoderError(
             fault(str(path), "there is no time", "Give every sample a time", place=place(int(bad[0]), when))
         )
-    stamp = None if table is not None and table.has_instants else stamp_in(t)
-    if stamp is not None:
-        raise EncoderError(
-            fault(
-                str(path),
-                f"the time {t[stamp[0]]:.14g} s may be {stamp[1]}",
-                STAMP_ADVICE,
-                place=place(stamp[0], when),
-            )
-        )
+    if table is None or not table.has_instants:
+        refuse_stamps(str(path), t, EncoderError, lambda row: place(row, when))
     bad = np.flatnonzero(np.diff(t) <= 0) + 1
     if bad.size:
         i = int(bad[0])

@@ -21,7 +21,7 @@ from pydpend.arrays import read_npy
 from pydpend.columns import Columns, read_columns
 from pydpend.documents import parse_json, read_text
 from pydpend.errors import AnglesError, Setting, fault
-from pydpend.instants import STAMP_ADVICE, since_1970, stamp_in
+from pydpend.instants import refuse_stamps, since_1970
 from pydpend.kinds import expect
 from pydpend.kinematics.table import CAMERA_NUMBERS, Floats, LinkAngles, camera_column, check_table
 from pydpend.output import AnyPath, path_of, whole, write_text
@@ -109,16 +109,8 @@ def read_angles(
         return f"row {row}, column {theirs}" if table is None else table.place(row, theirs)
 
     check_table(str(path), t, phi, sigma, frame, place)
-    stamp = None if table is not None and table.has_instants else stamp_in(t)
-    if stamp is not None:
-        raise AnglesError(
-            fault(
-                str(path),
-                f"the time {t[stamp[0]]:.14g} s may be {stamp[1]}",
-                STAMP_ADVICE,
-                place=place(stamp[0], "time_s"),
-            )
-        )
+    if table is None or not table.has_instants:
+        refuse_stamps(str(path), t, AnglesError, lambda row: place(row, "time_s"))
     return LinkAngles(t, phi, sigma, frame, meta, label, camera)
 
 
