@@ -61,7 +61,7 @@ pub trait Bytes: Send + Sync {
     /// The bytes, the same at every call; none where there is a fault.
     fn bytes(&self) -> &[u8];
 
-    /// What kept the bytes from being read, for those that are read when they are first asked for.
+    /// The fault that kept the bytes from being read, for planes that are read when they are first asked for.
     fn fault(&self) -> Option<&Fault> {
         None
     }
@@ -207,6 +207,25 @@ pub struct SourceInfo {
     pub warnings: Vec<Message>,
 }
 
+impl SourceInfo {
+    /// A frame of the recording without pixels so far. Its rows follow one another without padding; `stride` is 0 where they do
+    /// not end on whole bytes.
+    pub(crate) fn frame(&self, index: u64, ticks: i64) -> Frame {
+        let row_bits = self.width as usize * self.format.bits_per_pixel() as usize;
+        Frame {
+            index,
+            ticks,
+            width: self.width,
+            height: self.height,
+            stride: if row_bits.is_multiple_of(8) { row_bits / 8 } else { 0 },
+            format: self.format,
+            depth_bits: self.depth_bits,
+            plane: None,
+            colour: None,
+        }
+    }
+}
+
 /// Ending of a recording, known once [`FrameSource::next_frame`] gave `None`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Ending {
@@ -253,7 +272,7 @@ pub trait FrameSource: Send {
         Gaps::default()
     }
 
-    /// Why the first of the frames handed out without a plane have none, where that is more than that they cannot be decoded.
+    /// The reasons for which the first of the frames handed out without a plane have none, beyond that they cannot be decoded.
     fn reasons(&self) -> Vec<Reason> {
         Vec::new()
     }

@@ -9,7 +9,7 @@ const MOST_KEPT: usize = 1000;
 /// Maximum number of places that a sentence names.
 const MOST_TOLD: usize = 8;
 
-/// Why frames are not there.
+/// The cause of frames that are not there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Cause {
@@ -86,7 +86,7 @@ impl Gaps {
         within
     }
 
-    /// What is lost by damage, a part of a sentence each.
+    /// The frames lost by damage, a part of a sentence each.
     pub fn lost_words(&self) -> Vec<String> {
         let lost: Vec<&Gap> = self.places.iter().filter(|g| g.cause != Cause::Recorder).collect();
         let mut words: Vec<String> = lost
@@ -111,7 +111,7 @@ impl Gaps {
         words
     }
 
-    /// What the recorder left out; `None` if nothing.
+    /// The frames that the recorder left out, in words; `None` if there are none.
     pub fn dropped_words(&self) -> Option<String> {
         let dropped: Vec<&Gap> = self.places.iter().filter(|g| g.cause == Cause::Recorder).collect();
         let first = dropped.first()?;
@@ -183,7 +183,7 @@ fn listed(parts: &[String]) -> String {
     }
 }
 
-/// Why a frame that is there cannot be used.
+/// The reason for which a frame that is there cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Reason {
     /// Index of the frame.
@@ -234,7 +234,7 @@ impl Damage {
         Some(words.join("; ")).filter(|w| !w.is_empty())
     }
 
-    /// What is lost, in a sentence; `None` if nothing is.
+    /// The frames that are lost, in a sentence; `None` if none are.
     pub fn words(&self) -> Option<String> {
         let undecoded = (!self.undecoded.is_empty()).then(|| match self.reason_words() {
             None => format!("{} cannot be decoded", self.undecoded.words()),

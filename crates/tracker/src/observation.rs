@@ -75,7 +75,7 @@ impl Observation {
     /// A node in a frame that could not be decoded.
     pub const UNDECODED: Self = Self { status: Status::Undecoded, ..Self::MISSING };
 
-    /// What is known in the plane, in recorded pixels.
+    /// An observation known in the plane, in recorded pixels.
     pub(crate) fn to_recorded(mut self, plane: &Plane) -> Self {
         let aspect = plane.pixel_aspect;
         if let Some(camera) = &plane.camera

@@ -116,12 +116,12 @@ pub const LONGEST_NAME: usize = 255;
 /// What stands for standard output where a command writes there.
 const STANDARD_OUTPUT: &str = "-";
 
-/// What tells one file on a disk from another, links of either kind followed.
+/// The device and number of a file, which tell it from any other; links of either kind are followed.
 fn identity(path: &Path) -> Option<(u64, u64)> {
     fs::metadata(path).ok().map(|m| (m.dev(), m.ino()))
 }
 
-/// Where a file would be made: its folder, links resolved, and its name.
+/// The path at which a file would be made: its folder, links resolved, and its name.
 fn place(path: &Path) -> Option<PathBuf> {
     Some(fs::canonicalize(folder(path)).ok()?.join(path.file_name()?))
 }

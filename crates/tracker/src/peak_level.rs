@@ -49,8 +49,8 @@ fn greatest_in(bytes: &[u8], bits: usize, format: PixelFormat) -> u16 {
     }
 }
 
-/// Where samples lie in the big-endian words that start at byte `2 * lane + phase`: each word holds one whole sample
-/// or none. The bits that are left of it by `keep` are shifted down by `shift`.
+/// The layout of samples in the big-endian words that start at byte `2 * lane + phase`: each word holds one whole sample or none.
+/// The bits that are left of it by `keep` are shifted down by `shift`.
 struct Lanes<const N: usize> {
     keep: [[u16; N]; 2],
     shift: [[u32; N]; 2],

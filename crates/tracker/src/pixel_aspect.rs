@@ -89,7 +89,7 @@ impl PixelAspect {
         Some(Self { width: u32::try_from(width).ok()?, height: u32::try_from(height).ok()? })
     }
 
-    /// What a recording says of its pixels, 0 where it does not. What cannot be is said and not believed.
+    /// The pixel aspect that a recording states, 0 where it states none. A ratio that cannot be is warned of and not believed.
     pub(crate) fn said(width: u64, height: u64, warnings: &mut Vec<Message>) -> Self {
         if width == 0 || height == 0 {
             return Self::SQUARE;

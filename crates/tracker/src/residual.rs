@@ -9,7 +9,7 @@ use crate::rigid::body::Mechanism;
 use crate::rigid::pose::{Pair, fit_pose, place};
 use crate::table::Rows;
 
-/// What a table says of one node's motion. `None` where too little was seen.
+/// The residuals and speed of one node by a table. `None` where too little was seen.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct NodeMotion {
     /// Stretches without it after it was first seen.

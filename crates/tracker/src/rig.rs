@@ -104,7 +104,7 @@ pub struct Lens {
     pub distortion: Vec<f64>,
 }
 
-/// Where a camera's numbers come from.
+/// The origin of a camera's numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CameraOrigin {
@@ -114,7 +114,7 @@ pub enum CameraOrigin {
     Found,
 }
 
-/// What the camera makes of the plane in which the bodies move; see [`Camera`].
+/// The camera through which the plane of the bodies is seen; see [`Camera`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RigCamera {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use crate::detect::{DetectSettings, Detection, Detector, Flags};
 use crate::discover::advice::advise;
-use crate::error::{Error, Fault, Place, Result};
+use crate::error::{Error, Fault, FaultKind, Place, Result};
 use crate::frame::Frame;
 use crate::message::Message;
 use crate::overlay::{self, Picture, still};
@@ -152,5 +152,7 @@ fn frame_at(
             return Ok((frame, detections, detect.pixel_aspect));
         }
     }
-    Err(Error::Source(Fault::new(input, "it ends before this frame").at(Place::Frame(index))))
+    Err(Error::Source(
+        Fault::new(input, "it ends before this frame").of_kind(FaultKind::Damaged).at(Place::Frame(index)),
+    ))
 }

@@ -1,4 +1,4 @@
-//! What a user says of what to follow: places that were pointed at, how many markers there are, numbers of the picture, nodes
+//! The user's choice of markers to follow: places that were pointed at, how many markers there are, numbers of the picture, nodes
 //! that are one marker.
 //!
 //! Owns: [`Wanted`], [`Pointed`]. Must not: look at a recording.
@@ -23,7 +23,7 @@ pub struct Pointed {
     pub frame: Option<u64>,
 }
 
-/// What is to be followed. The default says nothing, and all is found.
+/// The markers that are to be followed. By default none is named, and all are found.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Wanted {

@@ -47,7 +47,7 @@ pub struct Event {
     pub to: Contact,
 }
 
-/// Why a simulation could not be done.
+/// The reason for which a simulation could not be done.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Failure {
     /// The state is not finite, or a pinned joint turns.

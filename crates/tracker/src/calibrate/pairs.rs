@@ -29,7 +29,7 @@ const LONGEST_STEP: f64 = 0.1;
 /// Step at which the estimate stands.
 const STANDS: f64 = 1e-8;
 
-/// Where two markers are in one frame, in square pixels.
+/// The places of two markers in one frame, in square pixels.
 #[derive(Debug, Clone, Copy)]
 pub struct PairPlace {
     /// The one.

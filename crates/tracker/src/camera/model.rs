@@ -34,7 +34,7 @@ pub struct Camera {
     back: Matrix2<f64>,
 }
 
-/// How a place of the plane changes.
+/// The derivatives of a place of the plane.
 #[derive(Debug, Clone, Copy)]
 pub struct Slopes {
     /// The place in the plane, px.
@@ -130,7 +130,7 @@ impl Camera {
         Vector2::new(self.numbers[2], self.numbers[3])
     }
 
-    /// Where a place of the plane is in the picture, px.
+    /// The place in the picture of a place of the plane, px.
     pub fn to_picture(&self, plane: Vector2<f64>) -> Vector2<f64> {
         let m = self.forth * (plane - self.middle) / self.radius_px;
         let q = m / (1.0 - self.vanishing().dot(&m));
@@ -152,7 +152,7 @@ impl Camera {
         s
     }
 
-    /// Where in the plane is what the picture shows at a place, px.
+    /// The place in the plane of a place in the picture, px.
     pub fn to_plane(&self, picture: Vector2<f64>) -> Vector2<f64> {
         let u = (picture - self.middle) / self.radius_px;
         let r = u.norm();

@@ -47,7 +47,7 @@ pub struct Detection {
 }
 
 impl Detection {
-    /// What is known in recorded pixels, in square ones.
+    /// A detection known in recorded pixels, in square ones.
     pub(crate) fn to_square(mut self, aspect: PixelAspect) -> Self {
         if !aspect.is_square() {
             [self.x_px, self.y_px] = aspect.to_square(Vector2::new(self.x_px, self.y_px)).into();
@@ -56,7 +56,7 @@ impl Detection {
         self
     }
 
-    /// What is known in square pixels, in the plane. The uncertainty grows by the most that the surroundings are stretched in
+    /// A detection known in square pixels, in the plane. The uncertainty grows by the most that the surroundings are stretched in
     /// any direction.
     pub(crate) fn to_plane(mut self, plane: &Plane) -> Self {
         if let Some(camera) = &plane.camera {

@@ -89,7 +89,7 @@ impl Detector {
         })
     }
 
-    /// What it was made with.
+    /// The levels that the detector was made with.
     pub fn levels(&self) -> &Levels {
         &self.levels
     }

@@ -13,7 +13,7 @@ use crate::pixel_aspect::PixelAspect;
 /// Contrast, in standard deviations of the background's noise, above which a misfit of one pixel shows.
 const HIGH_CONTRAST_SIGMA: f64 = 30.0;
 
-/// What was learned of a recording. Written into the table's metadata.
+/// The grey levels, noise and marker learned from a recording. Written into the table's metadata.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Levels {
     /// Polarity; `side` in files.

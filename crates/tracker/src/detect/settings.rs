@@ -12,7 +12,7 @@ use crate::pixel_aspect::PixelAspect;
 use crate::rig::{Lens, Region};
 use crate::setting_words::{Worded, words};
 
-/// Where the threshold comes from.
+/// The origin of the threshold.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Threshold {
@@ -52,7 +52,7 @@ impl Worded for PolaritySetting {
         &[("auto", None), ("bright", Some(Polarity::Bright)), ("dark", Some(Polarity::Dark))];
 }
 
-/// How a centre is taken from a blob.
+/// The estimator of a blob's centre.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Centroid {
@@ -89,7 +89,7 @@ impl FromStr for Threshold {
     }
 }
 
-/// What a user may say about detection. The default says nothing and everything is learned.
+/// The settings of detection. By default all of them are learned from the recording.
 #[derive(Debug, Clone, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct DetectSettings {
     /// Threshold.

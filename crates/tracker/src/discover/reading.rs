@@ -17,7 +17,7 @@ use crate::rigid::pose::place;
 use crate::stop::Stop;
 use crate::store::PlaneView;
 
-/// What a recording shows: bodies with their poses in the sample's frames.
+/// The bodies of a recording with their poses in the sample's frames.
 pub(super) struct Reading {
     /// Frames that differ.
     pub sample: Sample,
@@ -36,7 +36,7 @@ const FITS: f64 = 2.0;
 /// Frames in which that is looked at.
 const JUDGED: usize = 100;
 
-/// How far bodies of three explain what is seen.
+/// The extent to which bodies of three markers explain the detections.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Explains {
     /// They are nearly all that is seen.
@@ -46,7 +46,7 @@ pub(super) struct Explains {
 }
 
 impl Reading {
-    /// What to know of markers that move by themselves and are too many.
+    /// The warning of markers that move by themselves and are too many.
     pub(super) fn left_out_words(&self) -> Option<Message> {
         let others =
             if self.left_out == 1 { "one more is".to_owned() } else { format!("{} more are", self.left_out) };
@@ -186,7 +186,7 @@ fn moving_bodies(sample: &mut Sample, stop: &Stop) -> Result<Vec<Found>> {
     }
 }
 
-/// Where a body was found, for a message.
+/// The frame and place at which a body was found, for a message.
 fn place_words(found: &Found, plane: &Plane) -> String {
     let at = plane.to_recorded(found.link.home + found.link.template[0]);
     format!("one with a marker at ({:.0}, {:.0}) px", at.x, at.y)

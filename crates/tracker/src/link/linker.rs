@@ -8,7 +8,7 @@ use super::tracklet::{Point, Tracklet};
 use crate::detect::{Detection, Flags};
 use crate::rigid::index::DetectionIndex;
 
-/// How far from its prediction a marker may be, and by how much nearer than any other.
+/// The gate of a link: how far from its prediction a marker may be, and by how much nearer than any other.
 #[derive(Debug, Clone, Copy)]
 struct Gate {
     /// Largest distance, px.
@@ -60,7 +60,7 @@ impl Nearest {
     }
 }
 
-/// Where a tracklet goes, and its gate.
+/// The predicted place of a tracklet, and its gate.
 fn expected(points: &[Point]) -> (Vector2<f64>, Gate) {
     let n = points.len();
     let p = |back: usize| points[n - back].place;

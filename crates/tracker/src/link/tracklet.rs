@@ -42,7 +42,7 @@ impl Tracklet {
         self.first + self.points.len()
     }
 
-    /// What it is in a frame.
+    /// The tracklet's point in a frame.
     pub fn at(&self, frame: usize) -> Option<&Point> {
         self.points.get(frame.checked_sub(self.first)?)
     }

@@ -8,7 +8,7 @@ use std::ops::Range;
 use std::os::unix::fs::FileExt;
 
 use super::picture::{Film, Picture};
-use crate::error::{Error, Fault, Result};
+use crate::error::{Error, Fault, FaultKind, Result};
 use crate::frame::{Ending, Frame, FrameSource};
 use crate::gaps::Damage;
 use crate::gray::gray8;
@@ -122,6 +122,7 @@ impl<'a> WorkFilm<'a> {
                         MOST_BYTES >> 30
                     ),
                 )
+                .of_kind(FaultKind::Unsupported)
                 .advice("Give a part of it"),
             ));
         }
@@ -241,6 +242,7 @@ impl Film for WorkFilm<'_> {
 fn unusable(error: &std::io::Error) -> Error {
     Error::Source(
         Fault::new("work pictures", format!("the temporary file cannot be used ({error})"))
+            .caused_by(error)
             .advice("Make room on the disk of temporary files"),
     )
 }

@@ -277,7 +277,7 @@ impl Overlay {
         self.write(picture, &number.to_string(), beside, colour_of(number))
     }
 
-    /// Where what is said of the whole picture stands, in square pixels.
+    /// The place of the words about the whole picture, in square pixels.
     pub(super) fn corner(&self) -> Vector2<f64> {
         Vector2::new(12.0, 26.0) * self.scale
     }
@@ -287,7 +287,7 @@ impl Overlay {
         self.rig.pixel_aspect.to_square(Vector2::new(x, y))
     }
 
-    /// Where a node is, in square pixels.
+    /// The place of a node, in square pixels.
     fn place(&self, o: &Observation) -> Vector2<f64> {
         self.rig.pixel_aspect.to_square(Vector2::new(o.x_px, o.y_px))
     }

@@ -59,12 +59,12 @@ impl Ahead {
         Ok(Self { batches, stop, reader })
     }
 
-    /// Where batches come out, for any number of threads; closed after the last.
+    /// The channel from which batches come, for any number of threads; closed after the last.
     pub fn batches(&self) -> &Receiver<Batch> {
         &self.batches
     }
 
-    /// How reading ended, once the last batch is out.
+    /// The end of reading, once the last batch is out.
     pub fn end(self) -> Result<End> {
         self.reader.join().unwrap_or_else(|_| {
             Err(Error::Source(Fault::new("source", "the decoder failed; please report this")))

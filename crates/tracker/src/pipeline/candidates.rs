@@ -1,4 +1,4 @@
-//! What was found of what moves, for a picture with numbers and for words: where it is unclear what is meant, and where more
+//! Candidates among what moves, for a picture with numbers and for words: where it is unclear which are meant, and where more
 //! moves than is followed.
 //!
 //! Owns: [`Candidates`], [`Candidate`]. Must not: draw, or decide.
@@ -6,7 +6,7 @@
 use crate::message::{Message, Setting};
 use crate::moving::{Marker, Model, Spot, WorkFilm};
 
-/// What was found, in pixels of the recording.
+/// The candidates of a recording, in its pixels.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Candidates {
     /// The frame in which most of them are seen.
@@ -47,7 +47,7 @@ impl Candidate {
         format!("{}, at {}: {}", self.number, self.place(), self.words)
     }
 
-    /// How it is said that this is what is meant.
+    /// The settings with which a user says that this candidate is meant.
     pub fn advice(&self) -> Message {
         let place = Setting::Marker.set_to(self.place());
         if self.path_px.is_empty() {

@@ -173,9 +173,14 @@ impl Run<'_> {
     fn judge(&mut self, nodes: &[NodeSummary], sizes: &mut Sizes) -> Result<Vec<String>> {
         if self.settings.rig.is_none() && nodes.iter().all(|n| n.seen == 0) {
             return Err(Error::Rig(
-                Fault::new("recording", "what stands out cannot be told apart in any frame").advice(
-                    "Point at each marker with " + Setting::Marker + ", or give a rig with " + Setting::Rig,
-                ),
+                Fault::new("recording", "what stands out cannot be told apart in any frame")
+                    .of_kind(FaultKind::NothingFound)
+                    .advice(
+                        "Point at each marker with "
+                            + Setting::Marker
+                            + ", or give a rig with "
+                            + Setting::Rig,
+                    ),
             ));
         }
         let doubtful: Vec<String> = sizes.uneven().map(|k| nodes[k].node.clone()).collect();
@@ -224,7 +229,7 @@ impl Run<'_> {
         }
     }
 
-    /// What the frames' times are, from all their stamps.
+    /// The times of the frames, from all their stamps.
     fn times(&self) -> Result<(Timing, Clock)> {
         let mut steps = Steps::default();
         for i in 0..self.store.len() {
@@ -254,7 +259,7 @@ impl Run<'_> {
         Error::Source(fault)
     }
 
-    /// What was asked for and what was learned. Neither threads nor folders: they change nothing.
+    /// The settings that were given and the levels that were learned. Neither threads nor folders: they change nothing.
     fn settings_json(&self) -> serde_json::Value {
         let mut settings = json!({
             "detect": self.detect,
@@ -282,7 +287,7 @@ impl Run<'_> {
     }
 }
 
-/// What to know of frames in which more stood out than is tried.
+/// The warning of frames in which more stood out than is tried.
 fn bounded_words(frames: u64) -> Option<Message> {
     let which = if frames == 1 { "one frame".to_owned() } else { format!("{frames} frames") };
     let words = format!(

@@ -43,7 +43,7 @@ pub trait Observer {
     /// A stage begins; `total` frames are ahead, if that is known.
     fn stage(&mut self, _stage: Stage, _total: Option<u64>) {}
 
-    /// What was found of what moves: where it is unclear what is meant, and where more moves than is followed.
+    /// The candidates among what moves are told: where it is unclear which are meant, and where more moves than is followed.
     fn candidates(&mut self, _found: Candidates) {}
 
     /// So many frames of the stage are done. Called some hundred times a second at most per thousand frames.

@@ -140,7 +140,7 @@ impl<'a> Run<'a> {
         Ok(end)
     }
 
-    /// How the recording ended; not well if it became another one while it was read.
+    /// The end of the recording; an error if it became another one while it was read.
     fn unchanged(&self, end: End) -> Result<End> {
         if self.files.is_empty() || self.changes == Some(Fingerprint::of(&self.files)?.changes) {
             return Ok(end);

@@ -18,7 +18,7 @@ use crate::source;
 use crate::store::Spool;
 use crate::table::{RunEnding, SourceFacts, changed, read_table, table_files};
 
-/// What can be refused before anything is read. Gives the files of the recording.
+/// Refuses what can be refused before anything is read. Gives the files of the recording.
 pub(super) fn check(settings: &RunSettings) -> Result<Vec<PathBuf>> {
     if let Some(frames) = &settings.frames
         && frames.is_empty()

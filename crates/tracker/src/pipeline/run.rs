@@ -10,7 +10,8 @@ use super::request::{Request, already_done, check};
 use super::settings::RunSettings;
 use super::state;
 use super::summary::RunSummary;
-use crate::error::{Error, Fault, Result};
+use crate::error::{Error, Fault, FaultKind, Result};
+use crate::frame::FrameSource;
 use crate::message::Message;
 
 /// Follows the markers of a recording and writes the table. Where none stand out, what moves is followed if it is clear what is
@@ -53,24 +54,41 @@ pub fn run(settings: &RunSettings, observer: &mut dyn Observer) -> Result<RunSum
     }
 }
 
-/// Follows what was named and only moves: it need not stand out.
-fn run_named(settings: &RunSettings, observer: &mut dyn Observer) -> Result<RunSummary> {
-    moving::check(settings)?;
+/// A run that was begun.
+enum Begun {
+    /// An earlier run of the same request is complete.
+    Done(Box<RunSummary>),
+    /// The open recording, and the request on it.
+    Open(Box<dyn FrameSource>, Box<Request>),
+}
+
+/// Checks the settings, opens the recording and looks for a complete earlier run.
+fn begin(settings: &RunSettings, observer: &mut dyn Observer) -> Result<Begun> {
     let files = check(settings)?;
     observer.stage(Stage::Open, None);
     let source = open(&settings.input, &settings.open, observer)?;
     let request = Request::new(settings, source.info(), files)?;
-    if let Some(done) = already_done(settings, &request)? {
-        return Ok(done);
+    Ok(match already_done(settings, &request)? {
+        Some(done) => Begun::Done(Box::new(done)),
+        None => Begun::Open(source, Box::new(request)),
+    })
+}
+
+/// Follows what was named and only moves: it need not stand out.
+fn run_named(settings: &RunSettings, observer: &mut dyn Observer) -> Result<RunSummary> {
+    moving::check(settings)?;
+    match begin(settings, observer)? {
+        Begun::Done(summary) => return Ok(*summary),
+        Begun::Open(source, _) => drop(source),
     }
-    drop(source);
     match moving::run(settings, observer)? {
         Outcome::Followed(summary) => {
             settings.output.as_ref().map_or(Ok(()), |output| state::remove(output))?;
             Ok(*summary)
         }
         Outcome::Unclear(unclear) => {
-            Err(Error::Detect(Fault::new(&settings.input, unclear.why).advice(unclear.advice)))
+            let fault = Fault::new(&settings.input, unclear.why).of_kind(FaultKind::NothingFound);
+            Err(Error::Detect(fault.advice(unclear.advice)))
         }
     }
 }
@@ -81,13 +99,10 @@ fn run_markers(
     observer: &mut dyn Observer,
     unclear: &mut Option<Unclear>,
 ) -> Result<RunSummary> {
-    let files = check(settings)?;
-    observer.stage(Stage::Open, None);
-    let source = open(&settings.input, &settings.open, observer)?;
-    let request = Request::new(settings, source.info(), files)?;
-    if let Some(done) = already_done(settings, &request)? {
-        return Ok(done);
-    }
+    let (source, request) = match begin(settings, observer)? {
+        Begun::Done(summary) => return Ok(*summary),
+        Begun::Open(source, request) => (source, *request),
+    };
     let (mut run, source) = Run::begin(settings, request, source, observer)?;
     let fresh = run.resumed == 0;
     let outcome = run.detect(source, observer).and_then(|end| run.finish(end, observer, unclear));

@@ -68,12 +68,12 @@ pub struct RunSettings {
 }
 
 impl RunSettings {
-    /// How interlaced film is read, `null` unless that was said.
+    /// The setting for interlaced film, `null` unless it was given.
     pub(super) fn interlaced_json(&self) -> serde_json::Value {
         json!(Some(self.open.interlaced).filter(|i| *i != Interlaced::Refuse))
     }
 
-    /// What is to be followed: by the settings, or else by the rig.
+    /// The markers that are to be followed: by the settings, or else by the rig.
     pub(super) fn asked(&self) -> &Wanted {
         let of_rig = self.rig.as_ref().map(|r| &r.wanted).filter(|_| self.wanted.is_default());
         of_rig.unwrap_or(&self.wanted)

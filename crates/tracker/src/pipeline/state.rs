@@ -21,7 +21,7 @@ use crate::output::LONGEST_NAME;
 use crate::store::{Finished, Spool};
 use crate::table::{Fingerprint, SourceFacts, TableMeta};
 
-/// Where the state of a run for `output` is kept.
+/// The file in which the state of a run for `output` is kept.
 pub fn partial_path(output: &Path) -> PathBuf {
     let mut name = output.file_name().unwrap_or_default().to_owned();
     name.push(".partial");
@@ -58,7 +58,7 @@ struct Header {
     levels: Levels,
 }
 
-/// What was asked of an earlier run, whose centres by discs may be called by the word of before.
+/// The settings of an earlier run in today's words: centres by discs had another name.
 fn in_words_of_today(before: &Value) -> Value {
     let mut before = before.clone();
     if let Some(word) = before.pointer_mut("/detection settings/centroid")
@@ -69,8 +69,7 @@ fn in_words_of_today(before: &Value) -> Value {
     before
 }
 
-/// What tells one recording from another. Its rate, known for certain only when it was read through, follows from
-/// that.
+/// The facts that tell one recording from another. Its rate, known for certain only when it was read through, follows from that.
 fn identity(facts: &SourceFacts) -> SourceFacts {
     SourceFacts { rate_hz: None, rate_origin: RateOrigin::Unknown, ..facts.clone() }
 }
@@ -156,7 +155,7 @@ impl State {
     }
 }
 
-/// What to do where an earlier run is of no use.
+/// The advice where an earlier run is of no use.
 pub fn anew() -> Message {
     "Begin anew with " + Setting::Force
 }
@@ -166,7 +165,7 @@ fn named(key: &str) -> Message {
     Setting::ALL.into_iter().find(|s| s.name() == key).map_or_else(|| key.into(), Message::from)
 }
 
-/// What differs, in few words.
+/// The difference of two values, in few words.
 fn difference(before: Option<&Value>, now: &Value) -> String {
     match (before.and_then(Value::as_object), now.as_object()) {
         (Some(before), Some(now)) => {
@@ -187,7 +186,7 @@ struct EndingText {
     reasons: Vec<Reason>,
 }
 
-/// How reading ended, as the state file has it.
+/// The end of reading, as the state file has it.
 pub fn finished(end: &End) -> Result<Finished> {
     let early = match &end.ending {
         Ending::Complete => None,

@@ -7,7 +7,7 @@ use crate::frame::{FrameSource, SourceInfo};
 use crate::message::Setting;
 use crate::timing::{Clock, Steps, Timing, decide};
 
-/// What the times of frames with these stamps are; `first` is the index of the first frame.
+/// The times of frames with these stamps; `first` is the index of the first frame.
 ///
 /// # Errors
 /// [`Error::Source`] if two frames have one time stamp and the stamps are not those of an even grid.

@@ -30,7 +30,7 @@ pub struct Link {
     pub excess_px: f64,
 }
 
-/// What a point of a body hangs on.
+/// The holder of a point on which a body hangs.
 #[derive(Debug, Clone, Copy)]
 pub enum Holder {
     /// A point of the image, px.
@@ -159,8 +159,8 @@ impl Link {
         pairs.map(|(i, j)| (self.template[i] - self.template[j]).norm()).fold(f64::INFINITY, f64::min)
     }
 
-    /// How far the centre of a blob of `area_px` may be from node `j`'s, px, if what lacks is hidden: the part
-    /// hidden of a disc, where small, moves the centre of the rest by that part of the radius. Areas scatter too.
+    /// Greatest distance of the centre of a blob of `area_px` from node `j`'s, px, if the missing part is hidden: the part hidden
+    /// of a disc, where small, moves the centre of the rest by that part of the radius. Areas scatter too.
     pub fn cut_px(&self, j: usize, area_px: f32) -> f64 {
         let (usual, scatter) = self.area_px[j];
         if usual <= 0.0 {
@@ -170,7 +170,7 @@ impl Link {
         radius * ((usual - f64::from(area_px)).max(0.0) + scatter) / usual
     }
 
-    /// Where the nodes are in a pose, px.
+    /// The places of the nodes in a pose, px.
     pub fn places(&self, pose: &Isometry2<f64>) -> Vec<Vector2<f64>> {
         self.template.iter().map(|&t| place(pose, t)).collect()
     }

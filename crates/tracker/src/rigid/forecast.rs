@@ -88,7 +88,7 @@ impl Motion {
         self.past.clear();
     }
 
-    /// How many poses carry the prediction.
+    /// The number of poses that carry the prediction.
     pub fn depth(&self) -> usize {
         self.past.len()
     }

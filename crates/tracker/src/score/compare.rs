@@ -169,7 +169,7 @@ impl Comparison<'_> {
         own.filter(|&j| agrees(j)).or_else(|| (0..self.truth.nodes.len()).find(|&j| agrees(j)))
     }
 
-    /// Which marker each node was at, row by row: wrong ones, changes, none.
+    /// Counts of the rows by the marker that each node was at: wrong ones, changes, none.
     fn identities(&self, of: &[Option<usize>]) -> Identities {
         let mut out = Identities::default();
         let mut at: Vec<Option<usize>> = vec![None; of.len()];

@@ -40,11 +40,13 @@ impl Input {
         if options.allow_protocol && !kind.is_dir() {
             return Ok(Input::Address(name.into()));
         }
-        Err(Error::Source(Fault::new(name, "not a file but a folder or a device").advice(
-            "Give a recording; for a device add "
-                + Setting::AllowProtocol
-                + ", for pictures a folder with PNG, TIFF or BMP files",
-        )))
+        Err(Error::Source(
+            Fault::new(name, "not a file but a folder or a device").of_kind(FaultKind::Unsupported).advice(
+                "Give a recording; for a device add "
+                    + Setting::AllowProtocol
+                    + ", for pictures a folder with PNG, TIFF or BMP files",
+            ),
+        ))
     }
 
     fn address(name: &str, options: &OpenOptions) -> Result<Self> {

@@ -144,7 +144,7 @@ impl OpencvSource {
         Ok(self.ahead.take().and_then(|taken| taken.plane))
     }
 
-    /// How it ended, once the first decoder has no more frames.
+    /// The end of the recording, once the first decoder has no more frames.
     fn end(&mut self) -> Result<Ending> {
         let ending = self.beside.ending();
         let is_more = self.ahead.is_some() || self.take()?.is_some();
@@ -217,17 +217,7 @@ fn read(
 }
 
 fn frame(info: &SourceInfo, index: u64, ticks: i64, plane: Option<Vec<u8>>) -> Frame {
-    Frame {
-        index,
-        ticks,
-        width: info.width,
-        height: info.height,
-        stride: info.width as usize,
-        format: PixelFormat::Gray8,
-        depth_bits: 8,
-        plane: plane.map(|p| Box::new(p) as _),
-        colour: None,
-    }
+    Frame { plane: plane.map(|p| Box::new(p) as _), ..info.frame(index, ticks) }
 }
 
 impl FrameSource for OpencvSource {

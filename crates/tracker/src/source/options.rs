@@ -4,7 +4,7 @@ use crate::message::{Message, Setting};
 use crate::pixel_aspect::{AspectOrigin, PixelAspect};
 use crate::setting_words::words;
 
-/// Which decoder reads compressed film.
+/// The decoder that reads compressed film.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Decoder {
@@ -59,7 +59,7 @@ pub struct OpenOptions {
 }
 
 impl OpenOptions {
-    /// What pixels are, with what the recording says of them, and where that comes from.
+    /// The pixel aspect and its origin, by these options and by the recording's own word.
     pub(crate) fn aspect(&self, recorded: PixelAspect) -> (PixelAspect, AspectOrigin) {
         match self.pixel_aspect {
             Some(given) => (given, AspectOrigin::User),
@@ -81,7 +81,7 @@ pub(crate) fn cores(threads: usize) -> usize {
     }
 }
 
-/// What to tell a user who asked for more threads than are begun.
+/// The note for a user who asked for more threads than are begun.
 pub(crate) fn threads_note(threads: usize) -> Option<Message> {
     let begun = cores(threads);
     (threads > begun).then(|| {

@@ -51,7 +51,7 @@ impl Orientation {
         self.words().unwrap_or("not turned")
     }
 
-    /// What a person should know of it, if anything is turned.
+    /// The warning of turned pictures, if they are turned.
     pub(crate) fn warning(self) -> Option<Message> {
         self.words().map(|words| format!("turned as the file says: {words}").into())
     }

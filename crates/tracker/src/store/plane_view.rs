@@ -15,7 +15,7 @@ pub struct PlaneView<'a> {
 }
 
 impl<'a> PlaneView<'a> {
-    /// What a camera has filmed; `None` faces the plane squarely.
+    /// A view of detections in the plane that a camera has filmed; without a camera the plane is faced squarely.
     pub fn new(store: &'a DetectionStore, camera: Option<Camera>) -> Self {
         Self { store, plane: Plane { pixel_aspect: store.pixel_aspect(), camera } }
     }

@@ -208,12 +208,12 @@ impl Spool {
         self.blocks.len()
     }
 
-    /// How the recording ended, if the earlier run read all of it.
+    /// The end of the recording, if the earlier run read all of it.
     pub fn finished(&self) -> Option<&Finished> {
         self.finished.as_ref()
     }
 
-    /// Where it is; `None` for a temporary one.
+    /// The path of the file; `None` for a temporary one.
     pub fn path(&self) -> Option<&Path> {
         self.path.as_deref()
     }

@@ -104,7 +104,7 @@ impl Film {
         if self.scene.camera.depth_bits > 8 { 2 } else { 1 }
     }
 
-    /// How recorded frames are stored.
+    /// The form in which recorded frames are stored.
     pub fn format(&self) -> PixelFormat {
         if self.scene.camera.depth_bits > 8 { PixelFormat::Gray16 } else { PixelFormat::Gray8 }
     }
@@ -152,12 +152,12 @@ impl Film {
         }
     }
 
-    /// Where in the picture a place of the links' plane is.
+    /// The place in the picture of a place of the links' plane.
     pub(super) fn seen(&self, plane: [f64; 2]) -> [f64; 2] {
         self.camera.map_or(plane, |c| c.to_picture(plane.into()).into())
     }
 
-    /// How much larger than in the plane small things are in the picture: the root of what their area gains.
+    /// The magnification of small things from the plane to the picture: the root of what their area gains.
     pub(super) fn scale(&self, plane: [f64; 2]) -> f64 {
         self.camera.map_or(1.0, |c| {
             c.slopes(c.to_picture(Vector2::from(plane))).by_picture.determinant().abs().powf(-0.5)

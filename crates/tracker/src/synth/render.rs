@@ -18,7 +18,7 @@ const SUB_STEP_PX: f64 = 0.125;
 /// Most instants of one exposure.
 const MAX_INSTANTS: usize = 512;
 
-/// How many instants stand for the exposure of a frame: so many that no marker moves far between them.
+/// The instants that stand for the exposure of a frame: so many that no marker moves far between them.
 pub(super) fn instants(film: &Film, index: u64, poses: &mut Vec<Pose>) -> usize {
     let exposure = film.scene.camera.exposure_s;
     if exposure <= 0.0 {

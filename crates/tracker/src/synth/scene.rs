@@ -95,8 +95,8 @@ pub struct Camera {
     pub view: Option<View>,
 }
 
-/// How the camera stands and what its lens does. Links keep their places in the plane that a square camera would film; markers,
-/// bars and joints are given there.
+/// The camera's stand and its lens. Links keep their places in the plane that a square camera would film; markers, bars and
+/// joints are given there.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct View {

@@ -46,7 +46,7 @@ fn facts(path: &Path) -> Result<Metadata> {
     path.metadata().map_err(|e| unreadable(path, &e))
 }
 
-/// When its bytes were last written, ns since 1970.
+/// The time at which a file's bytes were last written, ns since 1970.
 fn written_ns(m: &Metadata) -> i128 {
     i128::from(m.mtime()) * 1_000_000_000 + i128::from(m.mtime_nsec())
 }

@@ -424,7 +424,7 @@ impl<'a> Part<'a> {
     }
 }
 
-/// What is not seen is null; a NaN is somebody's mistake.
+/// Refuses NaN: a place that is not seen is null, and a NaN is somebody's mistake.
 fn no_nan<T: Copy + Into<f64>>(
     values: &[T],
     array: &ArrayRef,

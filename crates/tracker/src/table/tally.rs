@@ -94,7 +94,7 @@ impl Tally {
         }
     }
 
-    /// What became of each node so far, in the rig's order.
+    /// The summary of each node so far, in the rig's order.
     pub fn summary(&self) -> Vec<NodeSummary> {
         let mut nodes = self.nodes.clone();
         for (node, square) in nodes.iter_mut().zip(&self.squares) {
@@ -105,7 +105,7 @@ impl Tally {
 }
 
 impl NodeTable {
-    /// What became of each node.
+    /// The summary of each node.
     pub fn summary(&self) -> Vec<NodeSummary> {
         let nodes = self.nodes();
         let mut tally = Tally::new(&self.meta.rig);

@@ -18,7 +18,7 @@ pub enum TimingKind {
     Variable,
 }
 
-/// Why a rate may not be the camera's: every rate and every coefficient scales with it.
+/// The reason for which a rate may not be the camera's: every rate and every coefficient scales with it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Doubt {

@@ -59,8 +59,8 @@ fn step_of(rate: [u64; 2], base: TimeBase) -> f64 {
     over as f64 / (u128::from(rate[0]) * u128::from(base.numerator)) as f64
 }
 
-/// Where frames lack between stamps of an even grid: the place of the first frame after each gap, and frames that lack up
-/// to there. `None` where the stamps are on no grid.
+/// The gaps between stamps of an even grid: the place of the first frame after each gap, and frames that lack up to there. `None`
+/// where the stamps are on no grid.
 pub(crate) fn gaps(steps: &Steps, base: TimeBase, claims: &[[u64; 2]]) -> Option<Gaps> {
     fit(steps, base, claims).map(|fit| fit.gaps)
 }

@@ -83,7 +83,7 @@ pub fn rate_words(timing: &Timing) -> Message {
     Message::from(rate) + ", " + origin
 }
 
-/// What the times are, for a person.
+/// The kind and rate of the times, in words.
 pub fn times_words(timing: &Timing) -> String {
     match timing.kind {
         TimingKind::Given => "frame numbers over the rate that was given".to_owned(),
@@ -145,7 +145,7 @@ fn lacking(timing: &Timing) -> Option<String> {
     })
 }
 
-/// What a person should know of the times, a sentence each.
+/// The notes on the times, a sentence each.
 pub fn notes(timing: &Timing) -> Vec<Message> {
     let mut notes: Vec<Message> = Vec::new();
     match timing.kind {
@@ -184,7 +184,7 @@ pub fn notes(timing: &Timing) -> Vec<Message> {
     notes
 }
 
-/// What a wrong rate would do.
+/// The note on a rate that may be wrong.
 fn doubt(timing: &Timing) -> Option<Message> {
     let (Doubt::Player, Some(hz)) = (timing.doubt?, timing.rate_hz) else {
         return Some(

@@ -54,7 +54,7 @@ impl Bodies {
         out
     }
 
-    /// Where a body is expected at `time`.
+    /// The forecast of a body's pose at `time`.
     pub fn forecast(&self, body: usize, time: f64, anchors: &[Anchor]) -> Option<Forecast> {
         let f = self.motions[body].forecast(time, self.priors.floor[body], self.priors.first[body])?;
         Some(anchors.first().map_or(f, |a| f.hung(a.local, a.place)))

@@ -43,7 +43,7 @@ pub(super) struct SearchOutcome {
     pub(super) is_bounded: bool,
 }
 
-/// What of a frame a body may be, as far as nothing decides.
+/// The detections of a frame that may be a body's, as far as nothing decides.
 pub(super) struct Open {
     /// For each node whether something that is seen may be it.
     pub(super) nodes: Vec<bool>,
@@ -165,12 +165,12 @@ impl Bodies {
         (s.inliers == n && near && self.chance(&search, &s, 1) < CHANCE_NEAR).then_some(s)
     }
 
-    /// How far a hypothesis is from a body's newest pose: the farthest of its nodes, px.
+    /// The distance of a hypothesis from a body's newest pose: that of the farthest of its nodes, px.
     fn moved_px(&self, b: usize, s: &PoseHypothesis) -> f64 {
         self.motions[b].newest_pose().map_or(f64::INFINITY, |before| self.apart_px(b, &s.fit.pose, &before))
     }
 
-    /// How far two poses of a body are apart: the farthest of its nodes, px.
+    /// The distance of two poses of a body: that of the farthest of its nodes, px.
     fn apart_px(&self, b: usize, one: &Isometry2<f64>, other: &Isometry2<f64>) -> f64 {
         let far = |&t: &Vector2<f64>| (place(one, t) - place(other, t)).norm();
         self.mechanism.links[b].template.iter().map(far).fold(0.0, f64::max)

@@ -94,7 +94,7 @@ fn occluded(
     (r <= near && free[d] && off && !nearer).then(|| found(d))
 }
 
-/// Where a body's pose says that a node is, if it says so firmly.
+/// The place of a node by its body's pose, if the pose is known firmly.
 fn firm_place(link: &Link, seen: &BodySeen, j: usize) -> Option<Vector2<f64>> {
     let local = link.template[j];
     seen.fit.as_ref().filter(|f| f.sigma_at(local) <= FIRM_PX).map(|f| place(&f.pose, local))

@@ -64,9 +64,9 @@ fn median(values: &mut [f64]) -> Option<f64> {
     (n > 0).then(|| *values.select_nth_unstable_by(n / 2, f64::total_cmp).1)
 }
 
-/// What the places of a rigid body's nodes scatter beyond their stated uncertainty: variance of each coordinate,
-/// px^2. A compressed recording moves a whole marker by what its encoder spared, which its pixels do not show; only
-/// its body does. `None` where too few frames show every node.
+/// The variance of each coordinate, px^2, by which the places of a rigid body's nodes scatter beyond their stated uncertainty. A
+/// compressed recording moves a whole marker by what its encoder spared, which its pixels do not show; only its body does. `None`
+/// where too few frames show every node.
 ///
 /// With n nodes the pose takes three of the 2 n coordinates, so the residuals hold `(2 n - 3) / 2` variances.
 fn excess(samples: &[Samples]) -> Option<f64> {

@@ -21,7 +21,7 @@ use crate::rigid::index::DetectionIndex;
 use crate::stop::Stop;
 use crate::store::{DetectionStore, FrameStamp, PlaneView};
 
-/// What came of a recording.
+/// The outcome of tracking a recording.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct TrackSummary {
     /// Frames written.

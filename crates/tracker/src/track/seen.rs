@@ -7,7 +7,7 @@ use nalgebra::Vector2;
 use crate::rigid::pose::PoseFit;
 use crate::rigid::search::PoseHypothesis;
 
-/// What a frame says about one body.
+/// The evidence of one frame about one body.
 #[derive(Debug, Clone, Default)]
 pub struct BodySeen {
     /// The accepted pose.
@@ -38,7 +38,7 @@ pub struct Occluded {
     pub off: Vector2<f64>,
 }
 
-/// What a hypothesis that stands says of a body of `n` nodes.
+/// The evidence of an accepted hypothesis about a body of `n` nodes.
 pub(super) fn accepted(s: PoseHypothesis, n: usize) -> BodySeen {
     BodySeen { fit: Some(s.fit), picks: s.picks, open: vec![false; n], occluded: vec![None; n] }
 }

@@ -46,7 +46,7 @@ enum Command {
 }
 
 impl Cli {
-    /// What was typed. A number below zero behind an option is its value, to be judged as such.
+    /// The command line as it was typed. A number below zero behind an option is its value, to be judged as such.
     pub fn read() -> Result<Self, clap::Error> {
         let takes_number = |a: &clap::Arg| a.get_action().takes_values() && !a.is_positional();
         let signed = |a: clap::Arg| if takes_number(&a) { a.allow_negative_numbers(true) } else { a };

@@ -54,7 +54,7 @@ pub fn line(error: &clap::Error) -> Option<String> {
     }
 }
 
-/// Why a value cannot be.
+/// The reason for which a value cannot be.
 fn why(source: &(dyn Error + 'static)) -> String {
     let whole = source.downcast_ref::<ParseIntError>().map(|e| match e.kind() {
         IntErrorKind::PosOverflow => "the number is too large".to_owned(),
@@ -92,7 +92,7 @@ fn unknown_command(word: &str, near: &[String]) -> String {
     format!("{word:?} is not a command. {advice}")
 }
 
-/// What clap knows of an error under a name.
+/// The words that clap keeps of an error under a name.
 fn words(error: &clap::Error, kind: ContextKind) -> Vec<String> {
     match error.get(kind) {
         Some(ContextValue::String(word)) => vec![word.clone()],

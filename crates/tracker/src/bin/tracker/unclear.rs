@@ -1,4 +1,4 @@
-//! What is said and drawn where it is not clear what is to be followed.
+//! The words and the picture for a recording in which it is not clear which markers are meant.
 //!
 //! Owns: [`tell`], [`picture_beside`]. Must not: find anything.
 
@@ -11,7 +11,7 @@ use tracker::{output, setup, source};
 use crate::print;
 use crate::watch::Watch;
 
-/// Where the picture goes that is drawn in the table's stead.
+/// The file of the picture that is drawn in the table's stead.
 pub fn picture_beside(output: &Path) -> PathBuf {
     output.with_extension("png")
 }

@@ -58,7 +58,7 @@ pub(crate) struct DiscFit<'a> {
     pub usual_chi2: f64,
 }
 
-/// Where a fit begins and what it leaves alone.
+/// The first guess of a fit, with the numbers that the fit leaves alone.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Start {
     pub disc: Disc,

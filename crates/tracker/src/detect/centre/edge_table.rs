@@ -103,9 +103,9 @@ impl EdgeTable {
         }
     }
 
-    /// Where the table says of eight pixels how much of them is covered: at distances inside the edge, where the edge's
-    /// normal has a direction: its smaller component (at most 0.71) where pixels are square, else half of 1 and what its
-    /// component along y has more than that along x.
+    /// The entries of the table that have the coverage of eight pixels: at distances inside the edge, where the edge's normal has
+    /// a direction: its smaller component (at most 0.71) where pixels are square, else half of 1 and what its component along y
+    /// has more than that along x.
     #[inline(always)]
     pub fn spot<V: Eight>(&self, token: V::Token, inside_px: V, direction: V) -> Spot {
         // Adding 2^23 rounds to a whole number.

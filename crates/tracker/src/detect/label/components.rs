@@ -10,7 +10,7 @@ use crate::detect::pixels::Pixels;
 use crate::detect::settings::Polarity;
 use crate::frame::PixelFormat;
 
-/// What one pass adds up about a connected set of pixels beyond the threshold.
+/// A connected set of pixels beyond the threshold, as one pass adds it up.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Blob {
     /// Pixels.

@@ -24,7 +24,7 @@ pub(crate) trait Sample: Copy {
     fn limit(threshold: u16, polarity: Polarity) -> Option<Self>;
     /// Whether any sample in blocks of little-endian bytes is beyond the limit.
     fn any(blocks: &[Block], limit: Self, polarity: Polarity) -> bool;
-    /// Which of many samples are beyond the limit, as bits from the lowest on.
+    /// The samples beyond the limit, as bits from the lowest on.
     fn beyond(many: &[Self; MASK_BITS], limit: Self, polarity: Polarity) -> u64;
 }
 
@@ -425,7 +425,7 @@ impl Prefilter {
         }
     }
 
-    /// What [`Prefilter::find`] found, in order.
+    /// The marks that [`Prefilter::find`] found, in order.
     pub fn marks(&self) -> impl Iterator<Item = Mark> {
         self.marks.iter().flatten().copied()
     }

@@ -19,7 +19,7 @@ use crate::message::{INFO, Message, Setting};
 /// Frames that are looked at; more would change nothing.
 const MOST_FRAMES: usize = 12;
 
-/// What to try where no marker is found: what is not given yet, or other values of what is.
+/// The advice where no marker is found: settings not given yet, or other values of those that are.
 fn other_than(settings: &DetectSettings) -> Message {
     let lit = ", or check that markers are lit; " + INFO + " says which container and depth was read";
     let given = match (settings.threshold, settings.polarity) {

@@ -264,7 +264,7 @@ mod tests {
     use super::avx2::{Avx2, Register};
     use super::*;
 
-    /// What every operation gives of some numbers.
+    /// The results of every operation for some numbers.
     fn all_of<V: Eight>(
         t: V::Token,
         a: &[f32; LANES],

@@ -83,7 +83,7 @@ impl<'a> Evidence<'a> {
         }
     }
 
-    /// Where tracklet `t` is in the `k`-th frame looked at, if it is whole there.
+    /// The place of tracklet `t` in the `k`-th frame looked at, if it is whole there.
     pub fn place(&self, t: usize, k: usize) -> Option<Vector2<f64>> {
         self.places[t].get(k.checked_sub(self.spans[t].start)?).copied().flatten()
     }

@@ -16,7 +16,7 @@ const FAR_PX: f64 = 1.6;
 const MANY_FRAMES: usize = 100;
 const TURNED_RAD: f64 = 0.3;
 
-/// What two tracklets do to each other.
+/// The relation of two tracklets: how their distance and direction change.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PairFacts {
     /// Frames in which both are whole.

@@ -70,7 +70,9 @@ impl Header {
         };
         let word = |at: u64| u32_at(bytes, at).ok_or_else(|| cut(at));
         if bytes.get(..2) != Some(b"CI") {
-            return Err(Error::Source(Fault::new(name, "not a CINE file").at(Place::Byte(0))));
+            return Err(Error::Source(
+                Fault::new(name, "not a CINE file").of_kind(FaultKind::Unsupported).at(Place::Byte(0)),
+            ));
         }
         let frames = u64::from(word(20)?);
         let first_frame = i64::from(word(16)? as i32);

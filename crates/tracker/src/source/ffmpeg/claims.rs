@@ -22,7 +22,7 @@ const MODEL: [&CStr; 3] = [c"com.apple.quicktime.model", c"com.android.model", c
 /// Apple's word on how a film is meant to be played; its time stamps are the camera's in both cases.
 const APPLE: &CStr = c"com.apple.quicktime.full-frame-rate-playback-intent";
 
-/// What container and metadata say of the rate. A tag that is no rate is warned of and not used.
+/// The rates that container and metadata claim. A tag that is no rate is warned of and not used.
 pub(super) fn claims(
     demuxer: &Demuxer,
     warnings: &mut Vec<Message>,

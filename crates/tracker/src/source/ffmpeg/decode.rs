@@ -9,7 +9,7 @@ use ffmpeg_next::ffi;
 use super::demux::{Demuxer, Packet};
 use super::watch::{Fate, Watch};
 use super::{codec_name, message};
-use crate::error::{Error, Fault, Result};
+use crate::error::{Error, Fault, FaultKind, Result};
 use crate::source::cores;
 
 /// Codecs whose decoders keep silent about damage. H.264's says by its messages what it fills in, which [`Watch`] hears; told to
@@ -31,7 +31,7 @@ pub(super) struct Decoder {
 // SAFETY: the context is owned by this value alone; libavcodec allows use from any one thread at a time.
 unsafe impl Send for Decoder {}
 
-/// What became of a request for a picture.
+/// The outcome of a request for a picture.
 pub(super) enum Received {
     /// A picture, in display order.
     Picture(Picture),
@@ -52,13 +52,14 @@ impl Decoder {
         if codec.is_null() {
             return Err(Error::Source(
                 Fault::new(name, format!("no decoder for {} is installed", codec_name(parameters.codec_id)))
+                    .of_kind(FaultKind::Unsupported)
                     .advice("Install FFmpeg's libraries with it, or convert the recording with `-c:v ffv1`"),
             ));
         }
         // SAFETY: allocation only; null is checked.
         let context = unsafe { ffi::avcodec_alloc_context3(codec) };
         if context.is_null() {
-            return Err(Error::Source(Fault::new(name, "out of memory")));
+            return Err(Error::Source(Fault::new(name, "out of memory").of_kind(FaultKind::System)));
         }
         let decoder = Self { context, watch: Watch::new(parameters.codec_id) };
         // SAFETY: the context is allocated and not yet open; parameters and stream live during the calls.
@@ -79,14 +80,12 @@ impl Decoder {
             if code < 0 { code } else { ffi::avcodec_open2(context, codec, ptr::null_mut()) }
         };
         if code < 0 {
-            return Err(Error::Source(Fault::new(
-                name,
-                format!(
-                    "the decoder of {} does not open ({})",
-                    codec_name(parameters.codec_id),
-                    message(code)
-                ),
-            )));
+            let codec = codec_name(parameters.codec_id);
+            return Err(Error::Source(
+                Fault::new(name, format!("the decoder of {codec} does not open ({})", message(code)))
+                    .of_kind(FaultKind::Unsupported)
+                    .advice("Check that `ffmpeg -i` reads the file, or convert it with `-c:v ffv1`"),
+            ));
         }
         Ok(decoder)
     }
@@ -102,7 +101,7 @@ impl Decoder {
         unsafe { ffi::avcodec_send_packet(self.context, packet.map_or(ptr::null(), |(p, _)| p.as_ptr())) };
     }
 
-    /// What became of packet `number`; to be asked when its picture or that of a later packet is out.
+    /// The fate of packet `number`; to be asked when its picture or that of a later packet is out.
     pub(super) fn fate(&self, number: u64) -> Fate {
         self.watch.fate(number)
     }
@@ -157,7 +156,7 @@ impl Picture {
         // SAFETY: allocation only; null is checked.
         let frame = unsafe { ffi::av_frame_alloc() };
         if frame.is_null() {
-            return Err(Error::Source(Fault::new("decoder", "out of memory")));
+            return Err(Error::Source(Fault::new("decoder", "out of memory").of_kind(FaultKind::System)));
         }
         Ok(Self(frame))
     }
@@ -180,7 +179,7 @@ impl Picture {
         Some(unsafe { std::slice::from_raw_parts(start as *const u8, end - start) })
     }
 
-    /// Where plane `plane` may be read: its first row's address, and its buffer's first and past-last ones.
+    /// The memory of plane `plane`: its first row's address, and its buffer's first and past-last ones.
     fn range(&self, plane: usize) -> Option<(usize, usize, usize)> {
         // SAFETY: the frame is valid; the call only looks which of its buffers holds the plane.
         let buffer = unsafe { ffi::av_frame_get_plane_buffer(self.0, i32::try_from(plane).ok()?).as_ref() }?;

@@ -205,7 +205,7 @@ impl Demuxer {
         rates.iter().any(|r| (r.num, r.den) == (NOT_GIVEN.num, NOT_GIVEN.den))
     }
 
-    /// What the file's boxes say, if it has such.
+    /// The contents of the file's boxes, if it has such.
     pub(super) fn boxes(&self) -> &Boxes {
         &self.boxes
     }
@@ -251,8 +251,8 @@ impl Demuxer {
         })
     }
 
-    /// Where the stream ends by what the container itself declares, in ticks; `None` if it does not say, or says
-    /// it of several streams together.
+    /// The end of the stream that the container itself declares, in ticks; `None` if it declares none, or one for several streams
+    /// together.
     pub(super) fn declared_end(&self) -> Option<i64> {
         let stream = self.stream();
         // SAFETY: the context is open.
@@ -329,7 +329,7 @@ impl Packet {
         // SAFETY: allocation only; null is checked.
         let packet = unsafe { ffi::av_packet_alloc() };
         if packet.is_null() {
-            return Err(Error::Source(Fault::new(name, "out of memory")));
+            return Err(Error::Source(Fault::new(name, "out of memory").of_kind(FaultKind::System)));
         }
         Ok(Self(packet))
     }
@@ -340,7 +340,7 @@ impl Packet {
         unsafe { &*self.0 }
     }
 
-    /// What it holds of the stream.
+    /// The packet's bytes of the stream.
     pub(super) fn bytes(&self) -> &[u8] {
         let fields = self.get();
         match usize::try_from(fields.size) {

@@ -1,4 +1,4 @@
-//! Which pictures are predicted from damaged or lost ones, and are as little to be believed as those.
+//! Pictures that are predicted from damaged or lost ones, and are as little to be believed as those.
 //!
 //! Owns: [`Dependence`]. Must not: decode, or find damage. Pure bookkeeping, in decoding order: a picture may be shown before
 //! the one that it is predicted from.

@@ -15,7 +15,7 @@ use crate::pixel_aspect::PixelAspect;
 use crate::source::orientation::Orientation;
 use crate::source::{OpenOptions, clock};
 
-/// What is known of a recording before any of it is decoded, and how its pictures are to be turned.
+/// The facts of a recording before any of it is decoded, and how its pictures are to be turned.
 ///
 /// # Errors
 /// [`Error::Source`] for a size that is none; [`Error::Argument`] for a rate that is none.
@@ -143,7 +143,7 @@ fn aspect(demuxer: &Demuxer, orientation: Orientation, warnings: &mut Vec<Messag
     if orientation.transposed { aspect.turned() } else { aspect }
 }
 
-/// How the container says that pictures are to be turned.
+/// The turn of pictures that the container states.
 fn turn(demuxer: &Demuxer, warnings: &mut Vec<Message>) -> Orientation {
     let mut size = 0usize;
     // SAFETY: the stream is valid, and the data it gives lives as long as the stream.

@@ -59,8 +59,8 @@ fn number(rest: &mut &[u8]) -> Option<i64> {
 }
 
 impl FfmpegSource {
-    /// How much of the length that the container declares is not there, s; `None` if it is all there, but for
-    /// two of the longest steps between frames.
+    /// The part of the length declared by the container that is not there, s; `None` if it is all there, but for two of the
+    /// longest steps between frames.
     pub(super) fn missing_s(&self) -> Option<f64> {
         let (last, longest) = self.stamps.last()?;
         let missing = self.feed.demuxer.declared_end()?.saturating_sub(last);

@@ -140,7 +140,7 @@ impl Feed {
         !is_numbered && (self.structure.is_none() || ["flv", "mpeg", "nut"].contains(&container.as_str()))
     }
 
-    /// Why nothing more could be read, if that is not the end of the file.
+    /// The reason for which nothing more could be read, if that is not the end of the file.
     pub(super) fn stop_reason(&self) -> Option<&str> {
         self.failed.as_deref()
     }
@@ -155,7 +155,7 @@ impl Feed {
         self.structure.as_ref().is_some_and(Structure::ends_in_pictures)
     }
 
-    /// Which field is first, for interlaced film: as the container says, else as the first picture does.
+    /// The field that was filmed first, for interlaced film: as the container says, else as the first picture does.
     pub(super) fn field_order(&self, name: &str) -> Result<Option<FieldOrder>> {
         let parameters = self.demuxer.parameters();
         if parameters.field_order != ffi::AVFieldOrder::AV_FIELD_UNKNOWN {

@@ -8,7 +8,7 @@ use std::ptr;
 use ffmpeg_next::ffi;
 
 use super::demux::{Demuxer, Packet};
-use crate::error::{Error, Fault};
+use crate::error::{Error, Fault, FaultKind};
 use crate::message::{Message, Setting};
 use crate::name::shell_word;
 use crate::setting_words::Worded;
@@ -89,7 +89,7 @@ impl Drop for Fields {
     }
 }
 
-/// Which field of a picture was filmed first.
+/// The field of a picture that was filmed first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum FieldOrder {
     /// The one with the top line.
@@ -145,7 +145,7 @@ fn command(name: &str) -> String {
     )
 }
 
-/// Why interlaced film is not read unasked.
+/// The error for interlaced film, which is not read unasked.
 pub(super) fn refusal(name: &str, order: FieldOrder) -> Error {
     Error::Source(
         Fault::new(
@@ -156,6 +156,7 @@ pub(super) fn refusal(name: &str, order: FieldOrder) -> Error {
                 order.words()
             ),
         )
+        .of_kind(FaultKind::Unsupported)
         .advice(
             Message::from(format!(
                 "Make a picture of each field, at twice the rate: {}. If the camera filmed whole pictures and only the \
@@ -166,7 +167,7 @@ pub(super) fn refusal(name: &str, order: FieldOrder) -> Error {
     )
 }
 
-/// What is to be known of interlaced film that is read as it is.
+/// The warning of interlaced film that is read as it is.
 pub(super) fn warning(name: &str, order: FieldOrder) -> Message {
     format!(
         "interlaced, {}: its pictures are read whole, as if both fields were filmed at once. If they were not, a marker \

@@ -39,8 +39,8 @@ pub(super) fn allowed(at_address: bool) -> String {
     READ.to_owned() + if at_address { READ_AT_ADDRESSES } else { "" }
 }
 
-/// What the file at `url` is, as a clause, if it is nothing that is read here; `None` if it may be, or cannot be read
-/// again to find out.
+/// The kind of the file at `url`, as a clause, if it is nothing that is read here; `None` if it may be, or cannot be read again
+/// to find out.
 pub(super) fn not_read(url: &str) -> Option<String> {
     let path = url.strip_prefix("file:")?;
     if !std::fs::metadata(path).ok()?.is_file() {

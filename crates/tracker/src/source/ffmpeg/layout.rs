@@ -8,7 +8,7 @@ use std::ptr;
 use ffmpeg_next::ffi;
 
 use super::decode::Picture;
-use crate::error::{Error, Fault, Result};
+use crate::error::{Error, Fault, FaultKind, Result};
 use crate::frame::{Bytes, PixelFormat};
 use crate::source::orientation::Orientation;
 
@@ -84,6 +84,7 @@ impl Layout {
         let unknown = || {
             Error::Source(
                 Fault::new(name, format!("pixel format {raw} is not known"))
+                    .of_kind(FaultKind::Unsupported)
                     .advice("Convert the recording with `ffmpeg -i IN -pix_fmt gray -c:v ffv1 OUT.mkv`"),
             )
         };
@@ -94,7 +95,10 @@ impl Layout {
         let label = unsafe { CStr::from_ptr(descriptor.name) }.to_string_lossy().into_owned();
         let has = |flag: i32| descriptor.flags & flag as u64 != 0;
         if has(ffi::AV_PIX_FMT_FLAG_HWACCEL) {
-            return Err(Error::Source(Fault::new(name, format!("pictures of {label} lie outside memory"))));
+            return Err(Error::Source(
+                Fault::new(name, format!("pictures of {label} lie outside memory"))
+                    .of_kind(FaultKind::Unsupported),
+            ));
         }
         let component = |i: usize| {
             let c = &descriptor.comp[i];

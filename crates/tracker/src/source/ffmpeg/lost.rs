@@ -103,7 +103,7 @@ impl Lost {
         }
     }
 
-    /// What is not there between the frames handed out so far.
+    /// The frames that are not there between those handed out so far.
     pub(super) fn gaps(&self) -> Gaps {
         let mut gaps = Gaps::default();
         if self.begins_broken {

@@ -16,7 +16,7 @@ pub(super) struct Sent {
     pub number: u64,
 }
 
-/// What a picture's arrival tells.
+/// The conclusions from a picture's arrival.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub(super) struct Arrival {
     /// Packets whose pictures will not come any more, in display order.
@@ -67,7 +67,7 @@ impl Order {
         std::mem::take(&mut self.waiting).into_values().collect()
     }
 
-    /// How many packets wait.
+    /// The number of packets that wait.
     pub(super) fn waiting(&self) -> usize {
         self.waiting.len()
     }

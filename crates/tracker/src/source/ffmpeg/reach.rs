@@ -1,4 +1,4 @@
-//! How far damage to a packet's picture reaches: which other pictures may be predicted from it, by the headers of its units.
+//! Reach of damage to a packet's picture: the other pictures that may be predicted from it, by the headers of its units.
 //!
 //! Owns: [`Reach`], [`References`]. Must not: decode, or know which packets are damaged.
 
@@ -6,7 +6,7 @@ use ffmpeg_next::ffi;
 
 use super::units::Units;
 
-/// Which pictures after a packet's, in decoding order, may be predicted from it.
+/// The pictures after a packet's, in decoding order, that may be predicted from it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Reach {
     /// None.

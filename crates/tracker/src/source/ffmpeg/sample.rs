@@ -119,7 +119,7 @@ struct Place {
     key: bool,
 }
 
-/// Where to decode: the key frames before `count` moments spread evenly, each once.
+/// The places at which to decode: the key frames before `count` moments spread evenly, each once.
 fn places(demuxer: &mut Demuxer, name: &str, count: usize) -> Result<Vec<Place>> {
     let start = match demuxer.stream().start_time {
         ffi::AV_NOPTS_VALUE => 0,
@@ -277,16 +277,6 @@ impl<'a> Sampler<'a> {
         }
         let ticks = picture.get().best_effort_timestamp;
         let (plane, stride) = layout.plane(picture, *orientation)?;
-        Some(Frame {
-            index: 0,
-            ticks,
-            width: info.width,
-            height: info.height,
-            stride,
-            format: info.format,
-            depth_bits: info.depth_bits,
-            plane: Some(plane),
-            colour: None,
-        })
+        Some(Frame { stride, plane: Some(plane), ..info.frame(0, ticks) })
     }
 }

@@ -21,7 +21,7 @@ pub(super) struct SliceSums {
     is_stale: bool,
 }
 
-/// What a packet's own bytes tell.
+/// The verdict of a packet's own checksums.
 #[derive(Debug, PartialEq, Eq)]
 enum Sums {
     Right,

@@ -18,7 +18,7 @@ use super::order::{Order, Sent};
 use super::reach::{Reach, References};
 use super::stamps::{Stamps, Survey, display_times};
 use super::watch::Fate;
-use crate::error::{Error, Fault, Place, Result};
+use crate::error::{Error, Fault, FaultKind, Place, Result};
 use crate::frame::{Bytes, Ending, Frame, FrameSource, SourceInfo};
 use crate::gaps::Gaps;
 use crate::message::Setting;
@@ -185,7 +185,7 @@ impl FfmpegSource {
         })
     }
 
-    /// How its pictures are turned.
+    /// The turn of the recording's pictures.
     pub(crate) fn orientation(&self) -> Orientation {
         self.orientation
     }
@@ -344,6 +344,7 @@ impl FfmpegSource {
                 &self.info.name,
                 format!("its pixels are {aspect} (width:height) from here on, and {before} before"),
             )
+            .of_kind(FaultKind::Unsupported)
             .at(Place::Frame(index))
             .advice(
                 "Give the frames of one shape with "
@@ -416,17 +417,8 @@ impl FfmpegSource {
             Some((plane, stride)) => (Some(plane), stride),
             None => (None, 0),
         };
-        Frame {
-            index,
-            ticks: if self.counts_frames { index as i64 } else { ready.ticks },
-            width: self.info.width,
-            height: self.info.height,
-            stride,
-            format: self.info.format,
-            depth_bits: self.info.depth_bits,
-            plane,
-            colour: ready.colour,
-        }
+        let ticks = if self.counts_frames { index as i64 } else { ready.ticks };
+        Frame { stride, plane, colour: ready.colour, ..self.info.frame(index, ticks) }
     }
 
     pub(super) fn decode_next(&mut self) -> Result<Option<Frame>> {
@@ -442,6 +434,7 @@ impl FfmpegSource {
                     };
                     return Err(Error::Source(
                         Fault::new(&self.info.name, format!("no frame can be decoded: {reason}"))
+                            .of_kind(FaultKind::Damaged)
                             .advice("Check that the file is complete and that `ffmpeg -i` reads it"),
                     ));
                 }

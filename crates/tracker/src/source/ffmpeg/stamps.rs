@@ -105,8 +105,7 @@ impl Stamps {
         }
     }
 
-    /// What the picture of the `number`-th packet will be known by: its time, or, in a stream without display
-    /// times, the number.
+    /// The key of the picture of the `number`-th packet: its time, or, in a stream without display times, the number.
     pub(super) fn key(&mut self, packet: &ffi::AVPacket, number: i64) -> i64 {
         match &mut self.origin {
             Origin::Packets(keys) => keys.key(packet.pts, packet.dts, packet.duration),

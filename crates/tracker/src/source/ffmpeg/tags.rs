@@ -16,7 +16,7 @@ pub(super) const PICTURES: [ffi::AVCodecID; 5] = [
     ffi::AVCodecID::AV_CODEC_ID_WEBP,
 ];
 
-/// What the pictures of a film say.
+/// The orientation that the pictures of a film state.
 pub(super) struct Tags {
     /// What the first one says; nothing is not turned.
     first: Option<Orientation>,

@@ -5,7 +5,7 @@
 
 use ffmpeg_next::ffi;
 
-/// How a stream's packets are parted into units.
+/// The division of a stream's packets into units.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Units {
     /// Bytes of the length before each unit; 0 where marks part them.

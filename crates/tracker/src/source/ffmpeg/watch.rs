@@ -1,4 +1,4 @@
-//! What the decoder's threads know of damage to a packet's picture, heard from them while they decode it.
+//! Damage to a packet's picture, as heard from the decoder's threads while they decode it.
 //!
 //! Owns: [`Watch`]. FFmpeg hides errors in a picture's data and marks the picture; but up to version 7.0 a thread copies that
 //! mark when it hands the picture on, while another thread may still be decoding it, so that the same damaged film is marked
@@ -40,7 +40,7 @@ impl Slot {
     }
 }
 
-/// What became of a packet.
+/// The fate of a packet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Fate {
     /// Nothing was heard of damage.
@@ -100,7 +100,7 @@ impl Watch {
         context.opaque = self.pointer(number);
     }
 
-    /// What became of a packet; to be asked when the picture of it or of a later packet is out. Of one that was not given to the
+    /// The fate of a packet; to be asked when the picture of it or of a later packet is out. Of one that was not given to the
     /// decoder, or long ago, nothing is known, and it counts as whole.
     pub(super) fn fate(&self, number: u64) -> Fate {
         let slot = self.slot(number);

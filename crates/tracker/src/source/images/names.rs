@@ -102,6 +102,7 @@ fn leave_out(folder: &str, names: &mut Vec<String>) -> Result<Option<String>> {
                 folder,
                 format!("the folder holds several sequences of pictures ({}{more})", kinds.join(", ")),
             )
+            .of_kind(FaultKind::Unsupported)
             .advice("Give one of them as a pattern, such as 'frames/img_%05d.png'"),
         ));
     }

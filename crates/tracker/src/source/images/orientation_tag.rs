@@ -17,7 +17,7 @@ const SHORT: usize = 3;
 /// Bytes of an entry of such a directory.
 const ENTRY_BYTES: usize = 12;
 
-/// What the bytes of a picture file say; `None` if nothing.
+/// The orientation that the bytes of a picture file state; `None` if none.
 pub(crate) fn told(bytes: &[u8]) -> Option<Orientation> {
     match bytes {
         [b'I', b'I', 42 | 43, 0, ..] | [b'M', b'M', 0, 42 | 43, ..] => {
@@ -27,7 +27,7 @@ pub(crate) fn told(bytes: &[u8]) -> Option<Orientation> {
     }
 }
 
-/// What the EXIF block of a JPEG, PNG or WebP file says.
+/// The orientation in the EXIF block of a JPEG, PNG or WebP file.
 fn by_exif(bytes: &[u8]) -> Option<Orientation> {
     let block = match bytes {
         [0x89, b'P', b'N', b'G', b'\r', b'\n', 0x1a, b'\n', ..] => in_png(bytes),
@@ -38,7 +38,7 @@ fn by_exif(bytes: &[u8]) -> Option<Orientation> {
     block.and_then(tag).and_then(Orientation::from_tag)
 }
 
-/// What the bytes of a JPEG or PNG file say.
+/// The orientation that the bytes of a JPEG or PNG file state.
 pub(super) fn of_file(bytes: &[u8]) -> Orientation {
     by_exif(bytes).unwrap_or_default()
 }
@@ -48,7 +48,7 @@ pub(crate) fn is_turned(path: &Path) -> bool {
     std::fs::read(path).is_ok_and(|bytes| of_file(&bytes) != Orientation::default())
 }
 
-/// What the page at which a decoder stands says.
+/// The orientation of the page at which a decoder stands.
 pub(super) fn of_tiff<R: Read + Seek>(decoder: &mut Decoder<R>) -> Orientation {
     tag_of_page(decoder).unwrap_or_default()
 }

@@ -3,7 +3,7 @@
 //! Owns: [`Picture`], [`Alike`]. Must not: decode.
 
 use super::pixel_size::{self, PixelSize};
-use crate::error::{Error, Fault, Place, Result};
+use crate::error::{Error, Fault, FaultKind, Place, Result};
 use crate::frame::{Frame, PixelFormat, RateOrigin, SourceInfo, TimeBase};
 use crate::message::{Message, Setting};
 use crate::pixel_aspect::PixelAspect;
@@ -57,7 +57,9 @@ impl Alike {
     /// # Errors
     /// [`Error::Source`] if the picture of frame `index` is to be turned otherwise than the others, or has other pixels.
     pub(super) fn check(&self, name: &str, index: u64, picture: &Picture) -> Result<()> {
-        let fault = |problem: String| Fault::new(name, problem).at(Place::Frame(index));
+        let fault = |problem: String| {
+            Fault::new(name, problem).of_kind(FaultKind::Unsupported).at(Place::Frame(index))
+        };
         if picture.orientation != self.orientation {
             let [own, others] = [picture.orientation, self.orientation].map(Orientation::words_or_none);
             return Err(Error::Source(
@@ -94,13 +96,13 @@ pub(super) fn format(depth_bits: u32) -> PixelFormat {
     if depth_bits > 8 { PixelFormat::Gray16 } else { PixelFormat::Gray8 }
 }
 
-/// How a picture that stands for no frame is not as the recording's are.
+/// The difference, in words, of a picture that stands for no frame from the recording's.
 pub(super) fn other_kind(name: &str, odd: &Picture, info: &SourceInfo) -> String {
     let own = (odd.width, odd.height, odd.depth_bits);
     other_size(name, own, (info.width, info.height, info.depth_bits))
 }
 
-/// How a picture differs from most, each width and height in px and depth in bits.
+/// The difference, in words, of a picture from most: each width and height in px and depth in bits.
 pub(super) fn other_size(name: &str, own: (u32, u32, u32), usual: (u32, u32, u32)) -> String {
     let words = |(width, height, bits): (u32, u32, u32)| {
         let depth = if own.2 == usual.2 { String::new() } else { format!(" of {bits} bits") };
@@ -116,15 +118,6 @@ pub(super) fn frame(info: &SourceInfo, index: u64, picture: Option<Picture>) -> 
         (p.width, p.height, p.depth_bits) == (info.width, info.height, info.depth_bits)
             && p.samples.len() >= p.width as usize * p.height as usize * bytes
     };
-    Frame {
-        index,
-        ticks: index as i64,
-        width: info.width,
-        height: info.height,
-        stride: info.width as usize * bytes,
-        format: info.format,
-        depth_bits: info.depth_bits,
-        plane: picture.filter(fits).map(|p| Box::new(p.samples) as _),
-        colour: None,
-    }
+    let plane = picture.filter(fits).map(|p| Box::new(p.samples) as _);
+    Frame { plane, ..info.frame(index, index as i64) }
 }

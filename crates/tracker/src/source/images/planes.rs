@@ -28,7 +28,7 @@ pub(super) struct Declared {
 }
 
 impl Declared {
-    /// What is to be said of the order of the pictures, if they are not simply one for each moment.
+    /// The warning of the order of the pictures, if they are not simply one for each moment.
     pub fn order(&self) -> Option<String> {
         (self.channels > 1 || self.slices > 1 && self.frames > 1).then(|| {
             format!(
@@ -47,7 +47,7 @@ pub(super) fn are_behind<R: Read + Seek>(decoder: &mut Decoder<R>, size: u64) ->
     declared.is_some_and(|d| Planes::new(&layout, d.pictures, size).is_ok_and(|p| p.whole > 1))
 }
 
-/// How many pictures the page at which a decoder stands says that there are, if more than one.
+/// The number of pictures that the page at which a decoder stands declares, if more than one.
 pub(super) fn declared<R: Read + Seek>(decoder: &mut Decoder<R>, layout: &Layout) -> Option<Declared> {
     let simple =
         |pictures: u64, by: &'static str| Declared { pictures, by, channels: 1, slices: 1, frames: pictures };
@@ -64,7 +64,7 @@ pub(super) fn declared<R: Read + Seek>(decoder: &mut Decoder<R>, layout: &Layout
     found.filter(|d| d.pictures > 1)
 }
 
-/// What is to be said of an OME-TIFF whose pages are not simply one for each moment.
+/// The warning of an OME-TIFF whose pages are not simply one for each moment.
 pub(super) fn channels_of_ome<R: Read + Seek>(decoder: &mut Decoder<R>, layout: &Layout) -> Option<String> {
     let text = decoder.get_tag_ascii_string(Tag::ImageDescription).ok().filter(|t| t.contains("<OME"))?;
     let number = |key: &str| text.split_once(key)?.1.split('"').nth(1)?.parse::<u64>().ok();
@@ -150,12 +150,12 @@ impl Planes {
         Ok(Self { stored, depth_bits: layout.bits, bytes: bytes as usize, whole, start })
     }
 
-    /// Where a picture begins in the file.
+    /// The place at which a picture begins in the file, bytes.
     pub fn place(&self, index: u64) -> u64 {
         self.start + index * self.bytes as u64
     }
 
-    /// What the samples were before they were made brightness, if they were anything else.
+    /// The form of the samples before they were made brightness, if it was another.
     pub fn converted_from(&self) -> Option<String> {
         matches!(self.stored, Stored::Colour { .. }).then(|| "RGB(8)".to_owned())
     }

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::picture::{Alike, Picture, format, frame, other_kind, other_size, rate};
 use super::{names, picture_file, pixel_size};
-use crate::error::{Error, Fault, Result};
+use crate::error::{Error, Fault, FaultKind, Result};
 use crate::frame::{Ending, Frame, FrameSource, RateClaims, SourceInfo};
 use crate::gaps::{Reason, keep_reason};
 use crate::message::Message;
@@ -63,7 +63,7 @@ fn size_of_most<'a>(
     // Of several as many, the first.
     let Some(best) = (0..pictures.len()).rev().max_by_key(|i| like(&pictures[*i].2)) else {
         let (path, problem) = problem.map_or_else(Default::default, |(p, e)| (p.display().to_string(), e));
-        return Err(Error::Source(Fault::new(path, problem).advice(
+        return Err(Error::Source(Fault::new(path, problem).of_kind(FaultKind::Damaged).advice(
             "Check that the pictures were copied whole; a file with several pictures is given by itself, without its folder",
         )));
     };

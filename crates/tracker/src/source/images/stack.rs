@@ -76,6 +76,7 @@ fn no_pages(name: &str, declared: &Declared, problem: &str) -> Error {
             name,
             format!("{by} says that it holds {pictures} pictures, but there is one page and {problem}"),
         )
+        .of_kind(FaultKind::Damaged)
         .advice("Save it with a page for each picture"),
     )
 }
@@ -207,11 +208,14 @@ fn page(pages: &mut Pages) -> std::result::Result<Picture, String> {
 }
 
 fn decoder(name: &str) -> Result<Decoder<BufReader<File>>> {
-    let fault = |problem: String| {
-        Error::Source(Fault::new(name, problem).advice("Check that the file was copied whole"))
-    };
-    let file = File::open(path(name)).map_err(|e| fault(format!("the file cannot be read ({e})")))?;
-    Decoder::new(BufReader::new(file)).map_err(|e| fault(format!("not a TIFF file that can be read ({e})")))
+    const ADVICE: &str = "Check that the file was copied whole";
+    let fault = |problem: String| Fault::new(name, problem).advice(ADVICE);
+    let file = File::open(path(name))
+        .map_err(|e| Error::Source(fault(format!("the file cannot be read ({e})")).caused_by(&e)))?;
+    Decoder::new(BufReader::new(file)).map_err(|e| {
+        let problem = format!("not a TIFF file that can be read ({e})");
+        Error::Source(fault(problem).of_kind(FaultKind::Damaged))
+    })
 }
 
 impl FrameSource for StackSource {

@@ -72,7 +72,7 @@ fn compression(number: u32) -> String {
     }
 }
 
-/// What a picture's samples stand for.
+/// The meaning of a picture's samples.
 fn meaning(photometric: u32) -> String {
     match photometric {
         4 => "a mask".into(),
@@ -86,7 +86,7 @@ fn meaning(photometric: u32) -> String {
 }
 
 impl Layout {
-    /// What the directory of the page at which the decoder stands says.
+    /// The layout by the directory of the page at which the decoder stands.
     pub fn of<R: Read + Seek>(decoder: &mut Decoder<R>) -> Result<Self, String> {
         let (width, height) = decoder.dimensions().map_err(|e| e.to_string())?;
         let tiled = decoder.find_tag(Tag::TileOffsets).map_err(|e| e.to_string())?.is_some();
@@ -157,7 +157,7 @@ impl Layout {
         self.photometric == RGB && self.bits == 8 && self.samples >= 3 && !self.planar
     }
 
-    /// What cannot be read, in words.
+    /// Refuses a layout that is not read, in words.
     pub fn judge(&self) -> Result<(), String> {
         let bits = self.bits;
         match self.sample_format {

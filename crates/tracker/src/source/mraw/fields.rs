@@ -149,7 +149,7 @@ impl Header {
         })
     }
 
-    /// How frames lie in the pixel file.
+    /// The layout of frames in the pixel file.
     ///
     /// # Errors
     /// [`Error::Source`] for bits that are not read or a frame that no file can hold.

@@ -4,7 +4,7 @@
 
 use super::fields::Header;
 use super::{cih, cihx};
-use crate::error::{Error, Fault, Place, Result};
+use crate::error::{Error, Fault, FaultKind, Place, Result};
 
 impl Header {
     /// Reads a header of either form; `name` is for messages.
@@ -18,11 +18,13 @@ impl Header {
     }
 
     fn check(&self, name: &str) -> Result<()> {
-        let fault = |key: &str, problem: String, advice: &str| {
-            Err(Error::Source(Fault::new(name, problem).at(Place::Key(key.into())).advice(advice)))
+        let fault = |kind: FaultKind, key: &str, problem: String, advice: &str| {
+            let fault = Fault::new(name, problem).of_kind(kind).at(Place::Key(key.into()));
+            Err(Error::Source(fault.advice(advice)))
         };
         if self.width == 0 || self.height == 0 {
             return fault(
+                FaultKind::Damaged,
                 "image size",
                 format!("{} x {} px", self.width, self.height),
                 "Export the recording again; the header is not complete",
@@ -32,6 +34,7 @@ impl Header {
             && !["mono", "raw", "bayer"].contains(&kind.to_lowercase().as_str())
         {
             return fault(
+                FaultKind::Unsupported,
                 "color type",
                 format!("{kind} is not read, only Mono, Raw and Bayer are"),
                 "Export the recording as Raw or as AVI",
@@ -41,6 +44,7 @@ impl Header {
             && !format.to_lowercase().contains("mraw")
         {
             return fault(
+                FaultKind::Unsupported,
                 "file format",
                 format!("the pixels were saved as {format}, not as MRaw"),
                 "Give the file or folder that holds the pictures",

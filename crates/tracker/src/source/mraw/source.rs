@@ -97,33 +97,13 @@ impl MrawSource {
         Ok(Self { info, pixels, packing, frames, next: 0, ending: Ending::Complete })
     }
 
-    /// Where the frame at `index` begins in the file, and how many bytes it takes.
+    /// The place at which the frame at `index` begins in the file, and the number of its bytes.
     fn place(&self, index: u64) -> (u64, usize) {
         (index * self.packing.frame_bytes, self.packing.frame_bytes as usize)
     }
 
     fn frame(&self, index: u64, plane: Box<dyn Bytes>) -> Frame {
-        let (format, width) = (self.packing.format, self.info.width as usize);
-        let stride = match format {
-            PixelFormat::Gray8 => width,
-            PixelFormat::Gray16 => 2 * width,
-            // A row of packed pixels is a whole number of bytes or the frame is one run of bits.
-            _ if (width * format.bits_per_pixel() as usize).is_multiple_of(8) => {
-                width * format.bits_per_pixel() as usize / 8
-            }
-            _ => 0,
-        };
-        Frame {
-            index,
-            ticks: index as i64,
-            width: self.info.width,
-            height: self.info.height,
-            stride,
-            format,
-            depth_bits: self.packing.depth_bits,
-            plane: Some(plane),
-            colour: None,
-        }
+        Frame { plane: Some(plane), ..self.info.frame(index, index as i64) }
     }
 }
 

@@ -4,7 +4,7 @@
 //! `ReadJpegSEQ`): all numbers are little-endian; pixels begin at byte 1024, or at 8192 from version 5 on where they are
 //! not compressed; each picture is followed by its time. Must not: read pixels.
 
-use crate::error::{Error, Fault, Place, Result};
+use crate::error::{Error, Fault, FaultKind, Place, Result};
 use crate::frame::PixelFormat;
 use crate::source::raw::Stored;
 
@@ -66,7 +66,7 @@ pub struct Header {
     pub version: u32,
 }
 
-/// What a number of an image format stands for, where it is not read.
+/// The name of an image format that is not read, by its number.
 fn format_name(number: u32) -> &'static str {
     match number {
         1 | 2 => "PNG pictures",
@@ -95,15 +95,12 @@ impl Header {
     /// # Errors
     /// [`Error::Source`] naming the byte where something is missing, wrong, or not read here.
     pub fn parse(bytes: &[u8], name: &str) -> Result<Self> {
-        let fault = |at: usize, problem: String, advice: &str| {
-            Error::Source(Fault::new(name, problem).at(Place::Byte(at as u64)).advice(advice))
+        let fault = |at: usize, problem: String, kind: FaultKind| {
+            let advice = if kind == FaultKind::Damaged { COPY } else { EXPORT };
+            Error::Source(Fault::new(name, problem).of_kind(kind).at(Place::Byte(at as u64)).advice(advice))
         };
         let bytes: &[u8; HEADER_BYTES] = bytes.first_chunk().ok_or_else(|| {
-            fault(
-                bytes.len(),
-                format!("the header is cut; it has {HEADER_BYTES} bytes"),
-                "Copy the recording again",
-            )
+            fault(bytes.len(), format!("the header is cut; it has {HEADER_BYTES} bytes"), FaultKind::Damaged)
         })?;
         let word = |at: usize| u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]);
         let (version, width, height) = (word(28), word(548), word(552));
@@ -112,23 +109,19 @@ impl Header {
         let rate = f64::from_le_bytes([584, 585, 586, 587, 588, 589, 590, 591].map(|at| bytes[at]));
         let pixels = u64::from(width) * u64::from(height);
         if pixels == 0 || pixels > 1 << 40 {
-            return Err(fault(
-                548,
-                format!("a picture of {width} x {height} px"),
-                "Copy the recording again",
-            ));
+            return Err(fault(548, format!("a picture of {width} x {height} px"), FaultKind::Damaged));
         }
         let is_jpeg = compression == 1 || matches!(number, 102 | 103 | 201);
         if compression > 1 {
             let problem =
                 format!("pictures are compressed by {}, which is not read", compression_name(compression));
-            return Err(fault(620, problem, EXPORT));
+            return Err(fault(620, problem, FaultKind::Unsupported));
         }
         let form = if is_jpeg {
             Form::Jpeg
         } else {
             raw(number, bits, real_bits, [u64::from(width), u64::from(height)], image_bytes)
-                .map_err(|problem| fault(556, problem, EXPORT))?
+                .map_err(|problem| fault(556, problem, FaultKind::Unsupported))?
         };
         let has_microseconds = version >= ALIGNED_VERSION;
         let aligned = has_microseconds && !is_jpeg;
@@ -150,7 +143,7 @@ impl Header {
             let problem = format!(
                 "{step_bytes} bytes from picture to picture do not hold {image_bytes} bytes of samples and a time"
             );
-            return Err(fault(580, problem, "Copy the recording again"));
+            return Err(fault(580, problem, FaultKind::Damaged));
         }
         Ok(header)
     }
@@ -170,9 +163,10 @@ impl Header {
     }
 }
 
+const COPY: &str = "Copy the recording again";
 const EXPORT: &str = "Export it from StreamPix as uncompressed AVI or as TIFF files";
 
-/// How uncompressed samples of an image format lie in the file; an error is a clause.
+/// The layout of uncompressed samples of an image format; an error is a clause.
 fn raw(
     number: u32,
     bits: u32,

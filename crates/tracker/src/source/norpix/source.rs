@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use super::header::{Form, HEADER_BYTES, Header};
 use super::times;
-use crate::error::{Error, Fault, Place, Result};
+use crate::error::{Error, Fault, FaultKind, Place, Result};
 use crate::frame::{Bytes, Ending, Frame, FrameSource, PixelFormat, RateClaims, RateOrigin, SourceInfo};
 use crate::message::Message;
 use crate::pixel_aspect::PixelAspect;
@@ -79,7 +79,10 @@ impl NorpixSource {
                 header.start
             );
             return Err(Error::Source(
-                Fault::new(name, problem).at(Place::Byte(header.start)).advice("Copy the recording again"),
+                Fault::new(name, problem)
+                    .of_kind(FaultKind::Damaged)
+                    .at(Place::Byte(header.start))
+                    .advice("Copy the recording again"),
             ));
         }
         let mut warnings = Vec::new();
@@ -135,17 +138,8 @@ impl NorpixSource {
     }
 
     fn frame(&self, index: usize, stride: usize, plane: Option<Box<dyn Bytes>>) -> Frame {
-        Frame {
-            index: index as u64,
-            ticks: self.ticks.as_ref().map_or(index as i64, |t| t[index]),
-            width: self.info.width,
-            height: self.info.height,
-            stride,
-            format: self.info.format,
-            depth_bits: self.info.depth_bits,
-            plane,
-            colour: None,
-        }
+        let ticks = self.ticks.as_ref().map_or(index as i64, |t| t[index]);
+        Frame { stride, plane, ..self.info.frame(index as u64, ticks) }
     }
 
     /// The picture at `index`, read and decoded.
@@ -190,7 +184,7 @@ fn timed(
     Ok(times)
 }
 
-/// What JPEG pictures were before they were made brightness: the first that can be decoded says whether there are colours.
+/// The form of JPEG pictures before they were made brightness: the first that can be decoded says whether there are colours.
 fn converted_from(file: &RawFrames, pictures: &[Recorded]) -> Option<String> {
     let first = pictures.iter().take(AHEAD).find_map(|p| {
         let bytes = file.copy(0, p.at, p.length).ok()?;
@@ -254,7 +248,7 @@ fn taken_us(file: &File, header: &Header, at: u64) -> std::io::Result<u64> {
     Ok(header.stamp_us(stamp))
 }
 
-/// How the sequence ends by what its header declares.
+/// The end of the sequence, held against its header.
 fn ending(header: &Header, pictures: &[Recorded], size: u64, warnings: &mut Vec<Message>) -> Ending {
     let there = pictures.len() as u64;
     if header.declared == 0 {

@@ -193,8 +193,8 @@ impl VideoWriter {
     }
 }
 
-/// Why a file of this ending holds at most 1000 frames per second, as FFmpeg writes it; `None` if it holds more. Matroska
-/// has the exact time from frame to frame beside its time stamps only where that is longer than a tick.
+/// The reason for which a file of this ending holds at most 1000 frames per second, as FFmpeg writes it; `None` if it holds more.
+/// Matroska has the exact time from frame to frame beside its time stamps only where that is longer than a tick.
 fn up_to_1000_hz(path: &Path) -> Option<&'static str> {
     match path.extension()?.to_string_lossy().to_ascii_lowercase().as_str() {
         "mkv" | "mk3d" | "webm" => Some("keeps time stamps in milliseconds"),

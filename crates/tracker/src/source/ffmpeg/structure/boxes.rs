@@ -12,7 +12,7 @@ const BODY: [u8; 4] = *b"mdat";
 /// What may follow the last fragment and holds no pictures.
 const NO_PICTURES: [[u8; 4]; 6] = [*b"mfra", *b"free", *b"skip", *b"udta", *b"meta", *b"uuid"];
 
-/// Where the boxes stop to fit together, found before the first packet: there are few.
+/// The boxes of a file, and where they stop to fit together, found before the first packet: there are few.
 #[derive(Debug, Default)]
 pub(super) struct Boxes {
     /// Places where the chain of boxes or of fragments is broken, rising, and how.

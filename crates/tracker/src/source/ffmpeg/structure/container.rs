@@ -44,12 +44,12 @@ impl Structure {
         Some(Self { file, walk })
     }
 
-    /// How all elements from the last packet to the one whose first byte is at `to` fit together.
+    /// The fit of all elements from the last packet to the one whose first byte is at `to`.
     pub(in super::super) fn reach(&mut self, to: u64) -> Fit {
         self.walk.reach(&mut self.file, to)
     }
 
-    /// How all elements from the last packet to the end of the file fit together.
+    /// The fit of all elements from the last packet to the end of the file.
     pub(in super::super) fn rest(&mut self) -> Fit {
         self.walk.rest(&mut self.file)
     }

@@ -8,8 +8,7 @@ use super::{Fit, Walk};
 
 /// A kind of page.
 pub(super) trait Pages: Send {
-    /// Where the page at `at` ends, and how it and the pages before it fit together; `None` where there is no whole
-    /// page.
+    /// The end of the page at `at`, and how it and the pages before it fit together; `None` where there is no whole page.
     fn page(&mut self, file: &mut Bytes, at: u64) -> Option<(u64, Fit)>;
 
     /// The next place after `at` where a page may begin.
@@ -20,7 +19,7 @@ pub(super) trait Pages: Send {
         true
     }
 
-    /// Where the pages end.
+    /// The place at which the pages end.
     fn end(&self, file: &Bytes) -> u64 {
         file.length()
     }
