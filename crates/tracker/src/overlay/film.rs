@@ -11,11 +11,12 @@ use opencv::prelude::*;
 use super::draw::Overlay;
 use super::picture::failed;
 use crate::error::{Error, Fault, Result};
-use crate::frame::TimeBase;
+use crate::frame::{SourceInfo, TimeBase};
 use crate::message::Setting;
 use crate::observation::Observation;
 use crate::output;
 use crate::pipeline::{self, Observer, Stage};
+use crate::rig::Rig;
 use crate::source::{self, OpenOptions};
 use crate::synth::encode::{Codec, VideoSettings, VideoWriter};
 use crate::table::NodeTable;
@@ -91,23 +92,7 @@ pub fn film(
     let n = rig.nodes.len();
     observer.stage(Stage::Open, None);
     let mut source = pipeline::open(input, open, observer)?;
-    let info = source.info();
-    if [info.width, info.height] != rig.image_px {
-        let [w, h] = rig.image_px;
-        return Err(Error::Table(
-            Fault::new(input, format!("{} x {} px, the table is of {w} x {h} px", info.width, info.height))
-                .advice("Give the recording that the table was made from"),
-        ));
-    }
-    if let Some(given) = open.pixel_aspect.filter(|given| !given.agrees(rig.pixel_aspect)) {
-        return Err(Error::Table(
-            Fault::new(
-                input,
-                format!("pixels of {given} were asked for, the table is of {}", rig.pixel_aspect),
-            )
-            .advice("Leave out " + Setting::PixelAspect + ", or track the recording with it"),
-        ));
-    }
+    check_recording(input, source.info(), rig, open)?;
     let mut overlay = match settings.width {
         Some(width) => Overlay::of_width(rig, width),
         None => Overlay::new(rig),
@@ -166,6 +151,27 @@ pub fn film(
     }
     writer.finish()?;
     Ok(filmed)
+}
+
+/// Refuses a recording whose size or pixels are not those of the table's rig.
+fn check_recording(input: &str, info: &SourceInfo, rig: &Rig, open: &OpenOptions) -> Result<()> {
+    if [info.width, info.height] != rig.image_px {
+        let [w, h] = rig.image_px;
+        return Err(Error::Table(
+            Fault::new(input, format!("{} x {} px, the table is of {w} x {h} px", info.width, info.height))
+                .advice("Give the recording that the table was made from"),
+        ));
+    }
+    match open.pixel_aspect {
+        Some(given) if !given.agrees(rig.pixel_aspect) => Err(Error::Table(
+            Fault::new(
+                input,
+                format!("pixels of {given} were asked for, the table is of {}", rig.pixel_aspect),
+            )
+            .advice("Leave out " + Setting::PixelAspect + ", or track the recording with it"),
+        )),
+        _ => Ok(()),
+    }
 }
 
 /// The picture as planes of brightness and half-size colour (I420, full range), for an encoder. The last row and
