@@ -27,6 +27,13 @@ pub struct Found {
 const JOINT_PX: f64 = 1.0;
 const JOINT_PART: f64 = 0.01;
 
+/// A background before a moving camera has at least so many marks, over this part of the picture's shorter side; the camera's own
+/// shake turns it by less than this and moves it by less than this part of its extent. A link of so many markers turns.
+const BACKGROUND_NODES: usize = 12;
+const BACKGROUND_PART: f64 = 0.5;
+const BACKGROUND_TURN_RAD: f64 = 0.05;
+const BACKGROUND_TRAVEL: f64 = 0.05;
+
 /// The same for a joint beside those on which bodies hang, px: nothing else would show that it is none.
 const LOOP_PX: f64 = 0.35;
 /// Joints nearer together than this are one, px.
@@ -45,6 +52,27 @@ impl Found {
     /// Whether it is a single marker, whose poses have no angle yet.
     fn is_lone(&self) -> bool {
         self.link.nodes.len() == 1
+    }
+
+    /// Whether it is the picture's background before a camera that moves: a body of many marks that covers much of a picture
+    /// whose shorter side is given, and neither turns nor goes anywhere.
+    pub fn is_background(&self, shorter_px: f64) -> bool {
+        let t = &self.link.template;
+        let span = |k: usize| {
+            let (low, high) = t.iter().fold((f64::MAX, f64::MIN), |(l, h), p| (l.min(p[k]), h.max(p[k])));
+            high - low
+        };
+        let extent_px = span(0).max(span(1));
+        if t.len() < BACKGROUND_NODES || extent_px < BACKGROUND_PART * shorter_px {
+            return false;
+        }
+        let Some(first) = self.poses.iter().flatten().next() else { return false };
+        let still = |p: &&Isometry2<f64>| {
+            p.rotation.angle_to(&first.rotation).abs() < BACKGROUND_TURN_RAD
+                && (p.translation.vector - first.translation.vector).norm() < BACKGROUND_TRAVEL * extent_px
+        };
+        let posed = self.poses.iter().flatten().count();
+        10 * self.poses.iter().flatten().filter(still).count() >= 9 * posed
     }
 
     /// Its first node as body `on` sees it (`None` is the ground), in each frame in which both are known.

@@ -17,6 +17,7 @@ use crate::rigid::body::Link;
 use crate::rigid::index::DetectionIndex;
 use crate::rigid::pose::place;
 use crate::rigid::search::{PoseHypothesis, Search};
+use crate::rigid::work::{MOST_OF_FRAME, Work};
 use crate::stop::Stop;
 
 /// Frames from which bodies are sought.
@@ -29,6 +30,9 @@ const REACH_SIGMA: f64 = 4.5;
 pub const FLOOR_PX: f64 = 0.06;
 /// Pairs of detections from which motions are sought.
 const PAIRS: usize = 250;
+/// Work of comparing a base with a frame, and of finding the poses of all bodies in a frame.
+const GROUPS_WORK: u64 = 100_000;
+const POSES_WORK: u64 = 200_000;
 /// Detections of a frame beyond which it is no base: it is full of glints.
 const CROWD: usize = 120;
 
@@ -56,6 +60,7 @@ pub fn hypotheses(
     index: &DetectionIndex<'_>,
     free: &[bool],
     pairs: usize,
+    work: &Work,
 ) -> Vec<PoseHypothesis> {
     let search = Search {
         link,
@@ -66,6 +71,7 @@ pub fn hypotheses(
         reach_sigma: REACH_SIGMA,
         floor_px: FLOOR_PX,
         pairs,
+        work,
     };
     search.run().hypotheses
 }
@@ -78,8 +84,9 @@ pub fn poses(links: &[Link], frame: &[Detection]) -> Vec<Option<PoseHypothesis>>
     let mut out = vec![None; links.len()];
     let mut order: Vec<usize> = (0..links.len()).collect();
     order.sort_by_key(|&b| std::cmp::Reverse(links[b].nodes.len()));
+    let work = Work::of(POSES_WORK);
     for b in order {
-        let mut found = hypotheses(&links[b], &index, &free, 60).into_iter();
+        let mut found = hypotheses(&links[b], &index, &free, 60, &work).into_iter();
         let Some(best) = found.next().filter(|s| s.inliers >= 3) else { continue };
         let rival = found.take_while(|s| s.inliers + 1 >= best.inliers.max(4)).any(|s| {
             links[b].template.iter().any(|&t| (place(&s.fit.pose, t) - place(&best.fit.pose, t)).norm() > 2.0)
@@ -100,13 +107,14 @@ pub fn poses(links: &[Link], frame: &[Detection]) -> Vec<Option<PoseHypothesis>>
 /// # Errors
 /// [`crate::error::Error::Interrupted`] once `stop` was asked for.
 pub fn alike(links: &[Link], stop: &Stop) -> Result<Option<(usize, usize)>> {
+    let work = Work::of(MOST_OF_FRAME);
     for a in 0..links.len() {
         for b in (0..links.len()).filter(|&b| b != a && links[b].nodes.len() >= links[a].nodes.len()) {
             stop.heed()?;
             let point = |p: &Vector2<f64>| Detection { x_px: p.x, y_px: p.y, ..Default::default() };
             let points: Vec<Detection> = links[b].template.iter().map(point).collect();
             let found =
-                hypotheses(&links[a], &DetectionIndex::new(&points), &vec![true; points.len()], PAIRS);
+                hypotheses(&links[a], &DetectionIndex::new(&points), &vec![true; points.len()], PAIRS, &work);
             if found.first().is_some_and(|s| s.inliers == links[a].nodes.len()) {
                 return Ok(Some((a, b)));
             }
@@ -125,9 +133,11 @@ fn groups(base: &[Detection], others: &[&[Detection]], stop: &Stop) -> Result<Ve
     for other in others {
         stop.heed()?;
         let index = DetectionIndex::new(other);
+        let work = Work::of(GROUPS_WORK);
         let mut used_b = vec![false; other.len()];
         let mut motion: Vec<Option<usize>> = vec![None; n];
-        for (m, s) in hypotheses(&link, &index, &vec![true; other.len()], PAIRS).iter().enumerate() {
+        let found = hypotheses(&link, &index, &vec![true; other.len()], PAIRS, &work);
+        for (m, s) in found.iter().enumerate() {
             let fresh: Vec<(usize, usize)> = s
                 .picks
                 .iter()

@@ -8,13 +8,14 @@ use super::arrange;
 use super::arrange::Found;
 use super::continuity::{self, Evidence};
 use super::discovery::Discovery;
-use super::reading::{Explains, Reading, by_continuity, by_shape};
+use super::reading::{Explains, Reading, by_continuity, by_shape, nothing_found};
 use super::sample::Sample;
 use super::trial::choose;
 use crate::calibrate::{Calibration, words};
 use crate::camera::Plane;
 use crate::error::{Error, Result};
 use crate::link::link;
+use crate::message::Setting;
 use crate::rig::{CameraOrigin, RigCamera};
 use crate::rigid::pose::place;
 use crate::stop::Stop;
@@ -67,6 +68,21 @@ fn finish(
 ) -> Result<Discovery> {
     let mut warnings: Vec<_> = reading.left_out_words().into_iter().collect();
     let Reading { sample, found, .. } = reading;
+    let (background, found): (Vec<Found>, Vec<Found>) =
+        found.into_iter().partition(|f| f.is_background(f64::from(image_px[0].min(image_px[1]))));
+    let marks: usize = background.iter().map(|f| f.link.nodes.len()).sum();
+    if marks > 0 && found.is_empty() {
+        return Err(nothing_found(
+            format!(
+                "what stands out is {marks} marks of one body that neither turns nor goes anywhere, as a background does before a \
+                 camera that moves"
+            ),
+            "Point at what is meant with " + Setting::Marker + ", or film from a stand",
+        ));
+    }
+    if marks > 0 {
+        warnings.push(format!("the camera moves: {marks} marks of its background are left out").into());
+    }
     let standing = sample.standing.clone();
     let plane = store.plane();
     let (reference, whole) = reference(&sample, &found, image_px, &plane, stop)?;

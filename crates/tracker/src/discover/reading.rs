@@ -87,7 +87,7 @@ impl Reading {
 }
 
 /// A recording in which no rig is found.
-fn nothing_found(problem: impl Into<Message>, advice: Message) -> Error {
+pub(super) fn nothing_found(problem: impl Into<Message>, advice: Message) -> Error {
     Error::Rig(Fault::new("recording", problem).of_kind(FaultKind::NothingFound).advice(advice))
 }
 

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::backdrop::Backdrop;
 use super::model::Model;
-use super::outline::circle_of;
+use super::outline::{Circle, circle_of, circle_of_radius};
 use super::own_colour::own_colour;
 use super::picture::Film;
 use super::response::Direction;
@@ -41,6 +41,8 @@ const CIRCLE_DOUBT: f64 = 0.25;
 /// Region and circle agree where their centres are nearer to each other than this, in radii: from there on it is said of a
 /// centre that it is doubtful.
 const DIFFER_RADII: f64 = 0.1;
+/// Places before and after one whose circles tell its radius.
+const RADIUS_AROUND: usize = 10;
 /// What the filter's answer alone leaves open of a centre, in radii.
 const COARSE_DOUBT_RADII: f64 = 0.3;
 
@@ -54,15 +56,16 @@ pub struct Centres {
 }
 
 /// A centre that was found, px of the octave.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 struct Found {
     region: Region,
     /// How far it is from the spot.
     moved: f64,
     /// What the way of finding it leaves open.
     doubt: f64,
-    /// From it to the middle of the circle that most of its outline lies on, where there is one.
-    to_circle: Option<[f64; 2]>,
+    /// Its outline, px from its centre, and the circle that most of it lies on, where there is one.
+    outline: Vec<[f64; 2]>,
+    circle: Option<Circle>,
 }
 
 /// How the markers of one track are looked at closely.
@@ -102,19 +105,34 @@ impl Look<'_> {
         // Where what is behind its edge is uneven, a higher level has another centre than a lower one.
         let [low, high] =
             [-LEVEL_STEP, LEVEL_STEP].map(|step| w.region(place, radius, step).unwrap_or(region));
-        let circle = self.own.and_then(|_| circle_of(&w.outline(place, radius), (region.area / PI).sqrt()));
-        let to_circle = circle.map(|c| [c.middle[0] - region.x, c.middle[1] - region.y]);
+        let silhouette = match (self.backdrop, self.own) {
+            (Some(backdrop), Some(_)) => w.silhouette(backdrop, place, radius),
+            _ => None,
+        };
+        let silhouette = silhouette.filter(|(s, _)| SILHOUETTE_RATIO.contains(&(s.area / region.area)));
         let mut doubt = LEVEL_DOUBT * (high.x - low.x).hypot(high.y - low.y);
-        if let (Some(backdrop), Some(_)) = (self.backdrop, self.own)
-            && let Some(s) = w.silhouette(backdrop, place, radius)
-            && SILHOUETTE_RATIO.contains(&(s.area / region.area))
-        {
-            // Which of the two is the marker is not known: a shadow belongs to the silhouette, a net to the marker.
+        if let Some((s, _)) = &silhouette {
+            // Which of the two is the marker is not known: strings belong to the silhouette, a net to the marker.
             doubt = doubt.hypot(SILHOUETTE_DOUBT * (s.x - region.x).hypot(s.y - region.y));
         }
+        // A marker's own colour may leave out a part of it that its silhouette shows.
+        let about = |outline: Vec<[f64; 2]>| -> Vec<[f64; 2]> {
+            outline.iter().map(|p| [p[0] - region.x, p[1] - region.y]).collect()
+        };
+        let whole = silhouette.map(|(s, outline)| (about(outline), s.area));
+        let whole = whole.and_then(|(o, area)| circle_of(&o, (area / PI).sqrt()).map(|c| (o, Some(c))));
+        let (outline, circle) = match (self.own, whole) {
+            (None, _) => (Vec::new(), None),
+            (Some(_), Some(whole)) => whole,
+            (Some(_), None) => {
+                let own = about(w.outline(place, radius));
+                let circle = circle_of(&own, (region.area / PI).sqrt());
+                (own, circle)
+            }
+        };
         let region = Region { x: region.x + x0, y: region.y + y0, ..region };
         let moved = (region.x - at[0]).hypot(region.y - at[1]);
-        Ok(Some(Found { region, moved, doubt, to_circle }))
+        Ok(Some(Found { region, moved, doubt, outline, circle }))
     }
 }
 
@@ -146,16 +164,16 @@ pub fn refine(
         None => learning_radius(&places, first, found)?,
     };
     let usual = median(&mut results.iter().flatten().map(|f| f.region.area).collect::<Vec<_>>());
-    let covered = usual_to_circle(&results, radius);
+    let to_circles = to_circles(&results, radius);
     // What the region is off the filter's answer by, px of the octave.
     let shifts: Vec<Option<([f64; 2], f64)>> = places
         .iter()
-        .zip(&results)
-        .map(|(place, found)| {
-            let Found { region, moved, doubt, to_circle } = (*found)?;
+        .zip(results.iter().zip(&to_circles))
+        .map(|(place, (found, to_circle))| {
+            let Found { region, moved, doubt, .. } = found.as_ref()?;
             let at = on_octave(spot(place));
-            let fits = moved < radius + 0.5 && AREA_RATIO.contains(&(region.area / usual));
-            let [x, y] = covered.map_or([0.0; 2], |usual| to_circle.unwrap_or(usual));
+            let fits = *moved < radius + 0.5 && AREA_RATIO.contains(&(region.area / usual));
+            let &[x, y] = to_circle;
             let doubt = doubt.hypot(CIRCLE_DOUBT * x.hypot(y));
             fits.then_some(([region.x + x - at[0], region.y + y - at[1]], doubt))
         })
@@ -182,14 +200,27 @@ pub fn refine(
     Ok(Centres { radius_px: radius * scale, found: good as f64 / places.len().max(1) as f64 })
 }
 
-/// From regions to the middles of their outlines' circles, usually, px of the octave; `None` where they agree or most have none. Where
-/// they do not agree, the marker is a disc of which something covers a part: a net, a stripe, a highlight, fingers.
-fn usual_to_circle(results: &[Option<Found>], radius: f64) -> Option<[f64; 2]> {
-    let all: Vec<[f64; 2]> = results.iter().flatten().filter_map(|f| f.to_circle).collect();
-    let mut apart: Vec<f64> = all.iter().map(|d| d[0].hypot(d[1])).collect();
+/// From each region to the middle of its outline's circle, px of the octave; 0 where they agree or most have none. Where they do not
+/// agree, the marker is a disc of which something covers a part: a net, a stripe, a highlight, fingers. Its radius is the usual one
+/// of the pictures around, and a picture that shows no circle has the usual offset.
+fn to_circles(results: &[Option<Found>], radius: f64) -> Vec<[f64; 2]> {
+    let circles: Vec<Option<Circle>> = results.iter().map(|f| f.as_ref().and_then(|f| f.circle)).collect();
+    let all: Vec<Circle> = circles.iter().flatten().copied().collect();
+    let mut apart: Vec<f64> = all.iter().map(|c| c.middle[0].hypot(c.middle[1])).collect();
     let most = 2 * all.len() > results.iter().flatten().count();
-    let differ = median(&mut apart) > DIFFER_RADII * radius;
-    (most && differ).then(|| [0, 1].map(|k| median(&mut all.iter().map(|d| d[k]).collect::<Vec<_>>())))
+    if !most || median(&mut apart) <= DIFFER_RADII * radius {
+        return vec![[0.0; 2]; results.len()];
+    }
+    let usual = [0, 1].map(|k| median(&mut all.iter().map(|c| c.middle[k]).collect::<Vec<_>>()));
+    (0..results.len())
+        .map(|i| {
+            let around = i.saturating_sub(RADIUS_AROUND)..(i + RADIUS_AROUND + 1).min(results.len());
+            let mut radii: Vec<f64> = circles[around].iter().flatten().map(|c| c.radius).collect();
+            let known = median(&mut radii);
+            let circle = results[i].as_ref().and_then(|f| circle_of_radius(&f.outline, known));
+            circle.map_or(usual, |c| c.middle)
+        })
+        .collect()
 }
 
 type Place = (usize, usize);
@@ -203,7 +234,7 @@ fn learning_radius(
     let (mut radius, mut results, mut areas) = (first, Vec::with_capacity(places.len()), Vec::new());
     for (k, place) in places.iter().enumerate() {
         let result = found(place, radius)?;
-        areas.extend(result.map(|f| f.region.area));
+        areas.extend(result.as_ref().map(|f| f.region.area));
         results.push(result);
         if RADIUS_AFTER.contains(&k) && areas.len() * 2 > k {
             let mut last = areas[areas.len().saturating_sub(5)..].to_vec();

@@ -39,9 +39,13 @@ const OTHER_MODEL_PART: f64 = 0.5;
 const COMPANION_PART: f64 = 0.5;
 const COMPANION_SEEN: f64 = 0.8;
 const COMPANION_OFFSET: f64 = 0.25;
-/// Looks of one marker in two stretches agree to a quarter, as logarithms of peak and area, and so many times better than others'.
-const SAME_LOOK: f64 = 0.25;
+/// Looks of one marker in two stretches: its contrast changes by a third with what is behind it, its area by a tenth (standard
+/// deviations of the logarithms). They agree below two of them, and others' looks must be two farther away.
+const LOOK_SCATTER: [f64; 2] = [0.3, 0.1];
+const SAME_LOOK: f64 = 2.0;
 const CLEAR_LOOK: f64 = 2.0;
+/// Part of what looks like the only thing that moves which it must explain.
+const SOLE_PART: f64 = 0.2;
 /// Pictures of which the one that shows most is taken, and places in it.
 const STRONGEST_PICTURES: usize = 15;
 const STRONGEST: usize = 9;
@@ -57,6 +61,9 @@ pub struct Survey {
     pub answers: usize,
     /// Part of what looks like them that the answers explain, times how compact they are: 0 to 1.
     pub confidence: f64,
+    /// Whether there is nothing but one thing that moves, whole, smoothly and far, though it is seldom of the size that it was
+    /// looked for: beside it there are only scraps.
+    pub is_sole: bool,
 }
 
 struct Candidate {
@@ -233,7 +240,7 @@ pub fn survey(search: &Search) -> Result<Survey> {
     runs.sort_by(|a, b| b.score.total_cmp(&a.score));
     let mut runs = runs.into_iter();
     let Some(winner) = runs.next() else { return Ok(Survey::default()) };
-    let (model, confidence) = (winner.model, winner.purity * winner.compact);
+    let (model, purity, confidence) = (winner.model, winner.purity, winner.purity * winner.compact);
     let (keep, others, heaviest) = answers(winner, search.width);
     let marker = |t: Track, model: Model| Marker::of(film, t, model);
     let mut markers: Vec<Marker> = keep.into_iter().map(|t| marker(t, model)).collect::<Result<_>>()?;
@@ -256,7 +263,11 @@ pub fn survey(search: &Search) -> Result<Survey> {
         }
     }
     markers[answers..].sort_by(|a, b| b.track.weight().total_cmp(&a.track.weight()));
-    Ok(Survey { markers, answers, confidence })
+    let is_sole = match markers.as_slice() {
+        [only] if answers == 1 => only.goes_far() && purity * only.whole(film)? >= SOLE_PART,
+        _ => false,
+    };
+    Ok(Survey { markers, answers, confidence, is_sole })
 }
 
 /// Of a run the tracks that answer, others that move, and the weight of the heaviest of all.
@@ -311,10 +322,18 @@ fn is_companion(t: &Track, of: &Track) -> bool {
     beside.len() as f64 > COMPANION_SEEN * t.count as f64 && offset < COMPANION_OFFSET * travel
 }
 
-/// Joins tracks that are never seen together where the look of two agrees better than that of any other two that could be one.
+/// Joins tracks that are never seen together where the look of two agrees better than those of any other two of which one is seen
+/// while one of them is.
 fn join_by_look(tracks: &mut Vec<Track>, radius_px: f64) {
     loop {
-        let apart = |a: &Track, b: &Track| (a.look[0] - b.look[0]).hypot(a.look[1] - b.look[1]);
+        let apart = |a: &Track, b: &Track| {
+            let [peak, area] = [0, 1].map(|k| (a.look[k] - b.look[k]) / LOOK_SCATTER[k]);
+            peak.hypot(area)
+        };
+        let span = |t: &Track| (t.spots().next().map_or(0, |s| s.0), t.spots().last().map_or(0, |s| s.0));
+        let spans: Vec<(usize, usize)> = tracks.iter().map(span).collect();
+        // Two that are seen at one time are two markers, so that only one of them is the same as a third.
+        let meet = |a: usize, b: usize| spans[a].0 <= spans[b].1 && spans[b].0 <= spans[a].1;
         let follows = |a: &Track, b: &Track| match (a.spots().last(), b.spots().next()) {
             (Some((end, p)), Some((begin, q))) => {
                 let fastest = |t: &Track| t.pieces.iter().map(|p| p.longest_step_px()).fold(0.0, f64::max);
@@ -329,12 +348,21 @@ fn join_by_look(tracks: &mut Vec<Track>, radius_px: f64) {
             .filter(|&(a, b)| a != b && follows(&tracks[a], &tracks[b]))
             .map(|(a, b)| (apart(&tracks[a], &tracks[b]), a, b))
             .collect();
-        let clear = |&&(d, a, b): &&(f64, usize, usize)| {
-            let rivals = pairs.iter().filter(|p| (p.1 == a) != (p.2 == b));
-            d < SAME_LOOK
-                && rivals.map(|p| p.0).fold(f64::INFINITY, f64::min) > CLEAR_LOOK * d + SAME_LOOK / 2.0
+        let gap = |a: usize, b: usize| spans[b].0 - spans[a].1;
+        // One that is seen in between and may be the same decides first.
+        let between = |a: usize, b: usize| {
+            let ends = pairs.iter().filter(|p| p.1 == a && p.0 < SAME_LOOK).map(|p| p.2);
+            ends.into_iter().any(|c| spans[c].1 < spans[b].0)
         };
-        let Some(&(_, a, b)) = pairs.iter().filter(clear).min_by(|a, b| a.0.total_cmp(&b.0)) else { return };
+        let clear = |&&(d, a, b): &&(f64, usize, usize)| {
+            let rivals = pairs
+                .iter()
+                .filter(|p| (p.1 == a && p.2 != b && meet(p.2, b)) || (p.2 == b && p.1 != a && meet(p.1, a)));
+            d < SAME_LOOK
+                && !between(a, b)
+                && rivals.map(|p| p.0).fold(f64::INFINITY, f64::min) > d + CLEAR_LOOK
+        };
+        let Some(&(_, a, b)) = pairs.iter().filter(clear).min_by_key(|p| gap(p.1, p.2)) else { return };
         let mut pieces = tracks[a].pieces.clone();
         pieces.extend(tracks[b].pieces.iter().cloned());
         tracks[a] = Track::of(pieces, radius_px);

@@ -16,6 +16,10 @@ use crate::error::Result;
 /// Places from which the radius of a marker is learned.
 const RADIUS_PLACES: usize = 24;
 
+/// What moves so smoothly and so far, in radii, is one thing and no chance of scraps.
+const FAR_SMOOTHNESS: f64 = 0.5;
+const FAR_RADII: f64 = 6.0;
+
 /// A marker that moves.
 #[derive(Debug, Clone)]
 pub struct Marker {
@@ -32,6 +36,16 @@ impl Marker {
     pub fn of(film: &dyn Film, track: Track, model: Model) -> Result<Self> {
         let (radius_px, _) = compact(film, &track, &model)?;
         Ok(Self { track, model, radius_px })
+    }
+
+    /// Whether it moves smoothly over three times its own size.
+    pub fn goes_far(&self) -> bool {
+        self.track.smoothness >= FAR_SMOOTHNESS && self.track.extent_px >= FAR_RADII * self.radius_px
+    }
+
+    /// Part of its places at which a compact region is found.
+    pub fn whole(&self, film: &dyn Film) -> Result<f64> {
+        Ok(refine(film, &mut self.track.clone(), &self.model, RADIUS_PLACES, None, None)?.found)
     }
 
     /// Whether two are one: near each other where both are seen.

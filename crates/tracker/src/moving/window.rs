@@ -17,6 +17,10 @@ const LARGE_LEVEL: f64 = 0.4;
 /// A pixel that differs from its backdrop by so many standard deviations is covered.
 const COVERED_SIGMA: f32 = 6.0;
 
+/// A shadow leaves at least this part of its backdrop's light, and the colour as it is, to so many standard deviations.
+const SHADOW_PART: f32 = 0.3;
+const SHADOW_SIGMA: f32 = 6.0;
+
 /// What is thinner than twice this, in radii of the marker, is no part of it.
 const THIN_RADII: f64 = 0.25;
 /// A marker of a smaller radius has no middle apart from its edge, px of the octave.
@@ -152,12 +156,16 @@ impl Window {
         let level = low + (high - low) * LARGE_LEVEL;
         let inside: Vec<bool> = self.values.iter().map(|v| f64::from(*v) > level).collect();
         let Some(cells) = self.connected(&inside, at, radius) else { return Vec::new() };
-        let cells = fill(&cells, self.width, self.height);
+        self.border(&fill(&cells, self.width, self.height))
+    }
+
+    /// Points half way between a pixel of a region and one beside it.
+    fn border(&self, cells: &[usize]) -> Vec<[f64; 2]> {
         let mut covered = vec![false; self.width * self.height];
         cells.iter().for_each(|&c| covered[c] = true);
         let place = |c: usize| [(c % self.width) as f64, (c / self.width) as f64];
         let mut points = Vec::new();
-        for &c in &cells {
+        for &c in cells {
             for n in neighbours(c, self.width, self.height).filter(|n| !covered[*n]) {
                 let (p, q) = (place(c), place(n));
                 points.push([(p[0] + q[0]) / 2.0, (p[1] + q[1]) / 2.0]);
@@ -166,15 +174,20 @@ impl Window {
         points
     }
 
-    /// The region about a place that differs from the backdrop in brightness or in colour, with its holes.
-    pub fn silhouette(&self, backdrop: &Backdrop, at: [f64; 2], radius: f64) -> Option<Region> {
+    /// The region about a place that differs from the backdrop in brightness or in colour and is no shadow, with its holes; and
+    /// the points of its outline.
+    pub fn silhouette(
+        &self,
+        backdrop: &Backdrop,
+        at: [f64; 2],
+        radius: f64,
+    ) -> Option<(Region, Vec<[f64; 2]>)> {
         let behind = backdrop.part((self.x0, self.y0), (self.width, self.height));
         let differs: Vec<bool> = (0..self.width * self.height)
             .map(|i| {
-                let planes = self.planes.planes.iter().zip(&behind.planes).zip(&backdrop.noise);
-                let squares: f32 =
-                    planes.map(|((now, then), noise)| ((now[i] - then[i]) / noise).powi(2)).sum();
-                squares > COVERED_SIGMA * COVERED_SIGMA
+                let value = |p: &Planes, k: usize| p.planes.get(k).map_or(0.0, |v| v[i]);
+                let [now, then] = [&self.planes, &behind].map(|p| [0, 1, 2].map(|k| value(p, k)));
+                is_covered(now, then, backdrop.noise)
             })
             .collect();
         // Strings and edges that a marker hangs on are thinner than it.
@@ -185,7 +198,8 @@ impl Window {
             let (i, j) = (c % self.width, c / self.width);
             i == 0 || j == 0 || i + 1 == self.width || j + 1 == self.height
         };
-        (!cells.iter().any(border)).then(|| self.middle(&fill(&cells, self.width, self.height)))
+        let cells = fill(&cells, self.width, self.height);
+        (!cells.iter().any(border)).then(|| (self.middle(&cells), self.border(&cells)))
     }
 
     fn middle(&self, cells: &[usize]) -> Region {
@@ -224,6 +238,17 @@ impl Window {
         }
         best.map(|b| b.1)
     }
+}
+
+/// Whether a colour (luma, and blue and red about 0) is of something before its backdrop: it differs, and not as a shadow does,
+/// which makes all of it darker by one factor.
+fn is_covered(now: [f32; 3], then: [f32; 3], noise: [f32; 3]) -> bool {
+    let part = now[0] / then[0].max(1.0);
+    let away = |k: usize, then: f32| (now[k] - then) / noise[k];
+    let squares: f32 = (0..3).map(|k| away(k, then[k]).powi(2)).sum();
+    let is_shadow =
+        (SHADOW_PART..1.0).contains(&part) && (1..3).all(|k| away(k, part * then[k]).abs() < SHADOW_SIGMA);
+    squares > COVERED_SIGMA * COVERED_SIGMA && !is_shadow
 }
 
 /// The pixels beside, above and below one.
@@ -273,4 +298,21 @@ fn fill(cells: &[usize], w: usize, h: usize) -> Vec<usize> {
         }
     }
     (0..w * h).filter(|&c| !outside[c]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_shadow_covers_nothing_and_a_thing_of_another_colour_does_however_dark() {
+        let (wall, noise) = ([150.0, -12.0, 15.0], [1.5; 3]);
+        let shaded = wall.map(|v| 0.6 * v);
+        assert!(!is_covered(wall, wall, noise));
+        assert!(!is_covered(shaded, wall, noise));
+        // A red ball of the shadow's own brightness, a white net, a black bob.
+        assert!(is_covered([90.0, -20.0, 60.0], wall, noise));
+        assert!(is_covered([200.0, -2.0, 2.0], wall, noise));
+        assert!(is_covered([20.0, 0.0, 0.0], wall, noise));
+    }
 }

@@ -169,7 +169,7 @@ impl Run<'_> {
     /// Nodes that hardly are markers, of which it is told why.
     ///
     /// # Errors
-    /// [`Error::Rig`] where no node of a rig that was found is ever seen.
+    /// [`Error::Rig`] where no node of a rig that was found is ever seen, or all of them change their sizes so much.
     fn judge(&mut self, nodes: &[NodeSummary], sizes: &mut Sizes) -> Result<Vec<String>> {
         if self.settings.rig.is_none() && nodes.iter().all(|n| n.seen == 0) {
             return Err(Error::Rig(
@@ -184,6 +184,23 @@ impl Run<'_> {
             ));
         }
         let doubtful: Vec<String> = sizes.uneven().map(|k| nodes[k].node.clone()).collect();
+        if !doubtful.is_empty()
+            && doubtful.len() == nodes.len()
+            && self.settings.rig.is_none()
+            && moving::applies(self.settings)
+        {
+            return Err(Error::Rig(
+                Fault::new(
+                    "recording",
+                    format!(
+                        "what stands out changes its size by more than a factor {MOST_SIZES}, as no disc does: it is an arm, a hand \
+                         or several things"
+                    ),
+                )
+                .of_kind(FaultKind::NothingFound)
+                .advice("If it is a marker, say so with " + Setting::Threshold),
+            ));
+        }
         if !doubtful.is_empty() {
             self.warnings.push(format!(
                 "{} changes size by more than a factor {MOST_SIZES}, as no disc does: an arm, a hand or several things may be taken \

@@ -237,8 +237,8 @@ fn follow(film: &WorkFilm, limits: &Limits, wanted: &Wanted, rig: Option<&Rig>) 
 
 /// What is likeliest meant, or was named by its number.
 fn surveyed(film: &WorkFilm, search: &Search, wanted: &Wanted) -> Result<Found> {
-    let Survey { markers, answers, confidence } = survey(search)?;
-    let is_clear = answers > 0 && confidence >= LEAST_CONFIDENCE;
+    let Survey { markers, answers, confidence, is_sole } = survey(search)?;
+    let is_clear = answers > 0 && (confidence >= LEAST_CONFIDENCE || is_sole);
     let mut chosen: Vec<usize> = if is_clear { (0..answers).collect() } else { Vec::new() };
     if let Some(n) = wanted.also.iter().find(|n| !(1..=markers.len()).contains(*n)) {
         return Err(Error::Argument(
@@ -359,7 +359,7 @@ fn pointed(film: &WorkFilm, search: &Search, places: &[Pointed]) -> Result<Found
         format!("({:.0}, {:.0}) px in frame {}", p.x_px, p.y_px, p.frame.unwrap_or(first))
     };
     let mut markers: Vec<Marker> = Vec::with_capacity(clicks.len());
-    let Survey { markers: known, answers, confidence } = survey(search)?;
+    let Survey { markers: known, answers, confidence, .. } = survey(search)?;
     for (k, followed) in follow_clicks(search, &clicks, &known)?.into_iter().enumerate() {
         match followed {
             Ok(marker) => {

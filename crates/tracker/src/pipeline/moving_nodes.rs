@@ -26,6 +26,9 @@ const NAMED_RADII: f64 = 1.0;
 /// From this part of the radius on it is said that a centre is not well known.
 const TELL_SIGMA_RADII: f64 = 0.1;
 
+/// Below this confidence what is followed is named, and whether it is what is meant is doubtful.
+const SURE_CONFIDENCE: f64 = 0.3;
+
 /// How what is followed was chosen.
 pub(super) enum Chosen {
     /// It is likeliest meant, with this confidence; so many other things move.
@@ -170,6 +173,17 @@ impl Moving {
                 .into(),
             );
             doubtful.push(name);
+        }
+        if let Chosen::Likeliest { confidence, .. } = self.chosen
+            && confidence < SURE_CONFIDENCE
+        {
+            warnings.push(
+                Message::from(format!(
+                    "whether this is what is meant is doubtful: it explains {:.0} % of what looks like it. If it is, say so with ",
+                    100.0 * confidence
+                )) + Setting::Also.set_to("1"),
+            );
+            doubtful = rig.nodes.iter().map(|n| n.name.clone()).collect();
         }
         let meta = TableMeta {
             schema_version: SCHEMA_VERSION,

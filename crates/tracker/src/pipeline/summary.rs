@@ -19,7 +19,7 @@ pub struct RunSummary {
     pub resumable: bool,
     /// Whether what moves was followed, because no markers stand out.
     pub moving: bool,
-    /// Names of nodes whose centres depend on what is taken for the marker; only of what moves.
+    /// Names of nodes of which it is doubtful whether they are what is meant, or where their centres are; notes say which.
     pub doubtful: Vec<String>,
     /// What became of each node.
     pub nodes: Vec<NodeSummary>,

@@ -8,3 +8,4 @@ pub mod index;
 pub mod joint;
 pub mod pose;
 pub mod search;
+pub mod work;

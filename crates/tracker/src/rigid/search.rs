@@ -14,6 +14,7 @@ use super::body::{LEAST_PART, Link};
 use super::forecast::{Forecast, hung_at};
 use super::index::DetectionIndex;
 use super::pose::{Pair, PoseFit, fit_pose, place, pose_at};
+use super::work::Work;
 
 /// Gate of a detection about its node, in standard uncertainties. With nine nodes and 1e5 frames a true one is lost to
 /// chance in one of 1e4 (Rayleigh: exp(-k^2 / 2) = 2.5e-6 at 5.1).
@@ -25,6 +26,8 @@ pub const PAIRS: usize = 60;
 pub const MOST_SEEDS: usize = 400;
 /// Poses that one search tests, at most: 0.1 s of work.
 pub const MOST_TRIALS: usize = 50_000;
+/// Detections or pairs of them that are glanced at in the time in which one place is looked up.
+const GLANCES: usize = 8;
 /// Hypotheses up to which each is compared with a new one; beyond, a table is quicker.
 const FEW_HYPOTHESES: usize = 32;
 /// Rounds of picking detections and fitting the pose, at most.
@@ -108,6 +111,8 @@ pub struct Search<'a> {
     pub floor_px: f64,
     /// Pairs of nodes from which a free pose is sought, the longest first: they turn least with noise.
     pub pairs: usize,
+    /// What may still be tried.
+    pub work: &'a Work,
 }
 
 /// An angle brought into -pi to pi, rad.
@@ -172,6 +177,7 @@ impl Search<'_> {
         let mut about = about;
         let mut result = None;
         for round in 0..REFINE_ROUNDS {
+            self.work.spend(n);
             let mut new: Vec<Option<usize>> = vec![None; n];
             let mut distance = vec![f64::INFINITY; n];
             for j in 0..n {
@@ -270,6 +276,7 @@ impl Search<'_> {
         let link = self.link;
         let n = link.nodes.len();
         let mut near = Vec::new();
+        self.work.spend(self.free.len() / GLANCES + 1);
         if let Some((a, b)) = self.far_anchors() {
             // Two anchors fix the pose.
             let pairs = [a, b].map(|a| Pair { local: a.local, place: a.place, sigma_px: a.sigma_px });
@@ -356,7 +363,13 @@ impl Search<'_> {
             stars.truncate(MOST_SEEDS);
             stars.sort_unstable();
         }
-        let mut gaps: Vec<(f64, usize, usize)> = Vec::new();
+        let pairs = stars.len() * stars.len().saturating_sub(1) / 2;
+        if pairs > 0 && self.work.is_spent() {
+            found.is_bounded = true;
+            return;
+        }
+        self.work.spend(pairs / GLANCES);
+        let mut gaps: Vec<(f64, usize, usize)> = Vec::with_capacity(pairs);
         for (k, &d) in stars.iter().enumerate() {
             for &e in &stars[k + 1..] {
                 gaps.push(((self.index.place(d) - self.index.place(e)).norm(), d, e));
@@ -372,7 +385,7 @@ impl Search<'_> {
             let first = gaps.partition_point(|g| g.0 < span - reach);
             for &(gap, d, e) in gaps[first..].iter().take_while(|g| g.0 <= span + reach) {
                 debug_assert!(gap >= span - reach);
-                if found.trials >= MOST_TRIALS {
+                if found.trials >= MOST_TRIALS || self.work.is_spent() {
                     found.is_bounded = true;
                     return;
                 }
@@ -398,6 +411,10 @@ impl Search<'_> {
             if off > w.angle_rad + self.reach_sigma * slack_rad {
                 return;
             }
+        }
+        if self.work.is_spent() {
+            found.is_bounded = true;
+            return;
         }
         found.trials += 1;
         if let Some(s) = self.refine(pose, about, slack_rad) {
@@ -447,6 +464,7 @@ mod tests {
 
     fn run(link: &Link, detections: &[Detection]) -> Found {
         let (index, free) = (DetectionIndex::new(detections), vec![true; detections.len()]);
+        let work = Work::of(u64::MAX);
         Search {
             link,
             anchors: &[],
@@ -456,6 +474,7 @@ mod tests {
             reach_sigma: REACH_SIGMA,
             floor_px: 0.05,
             pairs: PAIRS,
+            work: &work,
         }
         .run()
     }

@@ -10,6 +10,7 @@ use crate::rigid::forecast::{Forecast, Motion};
 use crate::rigid::index::DetectionIndex;
 use crate::rigid::pose::place;
 use crate::rigid::search::{Anchor, PAIRS, REACH_SIGMA, Search};
+use crate::rigid::work::Work;
 
 /// The bodies that are followed, at one moment.
 #[derive(Debug, Clone)]
@@ -20,6 +21,8 @@ pub struct Bodies {
     pub priors: MotionPriors,
     /// The last poses of each body.
     pub motions: Vec<Motion>,
+    /// What may still be tried to find them.
+    pub work: Work,
     /// For each body the least turn that maps it on itself as far as two nodes, rad.
     pub(super) self_symmetry_rad: Vec<f64>,
     /// For each body those that look the same.
@@ -33,7 +36,7 @@ impl Bodies {
         let self_symmetry_rad =
             (0..mechanism.links.len()).map(|b| self_symmetry_rad(&mechanism, &priors, b)).collect();
         let indistinguishable = indistinguishable(&mechanism, &priors);
-        Self { mechanism, priors, motions, self_symmetry_rad, indistinguishable }
+        Self { mechanism, priors, motions, work: Work::saved(), self_symmetry_rad, indistinguishable }
     }
 
     /// Points of a body known from the ground and from bodies whose pose is known.
@@ -77,6 +80,7 @@ impl Bodies {
             reach_sigma: REACH_SIGMA,
             floor_px: self.priors.floor_px,
             pairs: PAIRS,
+            work: &self.work,
         }
     }
 }

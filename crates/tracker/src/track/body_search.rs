@@ -210,11 +210,10 @@ impl Bodies {
                 s.picks.iter().flatten().for_each(|&d| only[d] = true);
                 let anchors = self.anchors(o, known);
                 let window = self.forecast(o, time, &anchors).filter(|w| w.angle_rad < PI);
-                self.search(o, index, &only, &anchors, window)
-                    .run()
-                    .hypotheses
-                    .iter()
-                    .any(|t| t.inliers >= s.inliers && self.hangs(o, t, known))
+                let found = self.search(o, index, &only, &anchors, window).run();
+                // What could not be tried through may be it.
+                found.is_bounded
+                    || found.hypotheses.iter().any(|t| t.inliers >= s.inliers && self.hangs(o, t, known))
             })
     }
 

@@ -11,6 +11,7 @@ use crate::detect::Detection;
 use crate::rigid::body::{Link, Mechanism};
 use crate::rigid::index::DetectionIndex;
 use crate::rigid::search::{Anchor, PAIRS, PoseHypothesis, REACH_SIGMA, Search};
+use crate::rigid::work::{MOST_OF_FRAME, Work};
 
 /// Greatest expected number of false matches for a body found anywhere in the frame.
 pub(super) const CHANCE_ANYWHERE: f64 = 1e-5;
@@ -87,9 +88,11 @@ fn anywhere<'a>(
     index: &'a DetectionIndex<'a>,
     free: &'a [bool],
     priors: &MotionPriors,
+    work: &'a Work,
 ) -> Search<'a> {
     let floor_px = priors.floor_px;
-    Search { link, anchors, index, free, window: None, reach_sigma: REACH_SIGMA, floor_px, pairs: PAIRS }
+    let reach_sigma = REACH_SIGMA;
+    Search { link, anchors, index, free, window: None, reach_sigma, floor_px, pairs: PAIRS, work }
 }
 
 /// The least turn of a body, about its first joint if it has one, that lays two of its nodes (three where it
@@ -106,7 +109,7 @@ pub fn self_symmetry_rad(mechanism: &Mechanism, priors: &MotionPriors, body: usi
         .collect();
     let least = if anchors.is_empty() { 3 } else { 2 };
     let free = vec![true; stars.len()];
-    anywhere(link, &anchors, &DetectionIndex::new(&stars), &free, priors)
+    anywhere(link, &anchors, &DetectionIndex::new(&stars), &free, priors, &Work::of(MOST_OF_FRAME))
         .run()
         .hypotheses
         .iter()
@@ -120,6 +123,7 @@ pub fn self_symmetry_rad(mechanism: &Mechanism, priors: &MotionPriors, body: usi
 /// nodes always do.
 pub fn indistinguishable(mechanism: &Mechanism, priors: &MotionPriors) -> Vec<Vec<usize>> {
     let links = &mechanism.links;
+    let work = Work::saved();
     let same = |a: usize, b: usize| {
         let (small, large) = if links[a].nodes.len() < links[b].nodes.len() { (a, b) } else { (b, a) };
         if links[small].nodes.len() == 1 {
@@ -127,8 +131,9 @@ pub fn indistinguishable(mechanism: &Mechanism, priors: &MotionPriors) -> Vec<Ve
         }
         let stars = drawn(&links[large]);
         let free = vec![true; stars.len()];
-        let found = anywhere(&links[small], &[], &DetectionIndex::new(&stars), &free, priors).run();
-        found.hypotheses.first().is_some_and(|s| s.inliers == links[small].nodes.len())
+        let found = anywhere(&links[small], &[], &DetectionIndex::new(&stars), &free, priors, &work).run();
+        // Where it could not be tried through they are not told apart.
+        found.is_bounded || found.hypotheses.first().is_some_and(|s| s.inliers == links[small].nodes.len())
     };
     (0..links.len()).map(|a| (0..links.len()).filter(|&b| b != a && same(a, b)).collect()).collect()
 }

@@ -47,6 +47,7 @@ impl FrameTracker {
         stop: &Stop,
     ) -> Result<Vec<BodySeen>> {
         let n = self.bodies.mechanism.links.len();
+        self.bodies.work.begin_frame();
         let mut seen: Vec<BodySeen> = match known {
             Some(k) => k.to_vec(),
             None => vec![BodySeen::default(); n],
@@ -133,6 +134,7 @@ impl FrameTracker {
         index: &DetectionIndex<'_>,
         known: &[BodySeen],
     ) -> BodySeen {
+        self.bodies.work.begin_frame();
         let mut free = vec![true; index.len()];
         for (o, s) in known.iter().enumerate() {
             if o != b && s.fit.is_some() {

@@ -309,6 +309,8 @@ impl<'a> Pass<'a> {
                 p.seen[b] = seen;
             }
         }
+        // What the gap took is taken from the frames to come.
+        self.tracker.bodies.work = tracker.bodies.work;
         Ok(())
     }
 

@@ -113,7 +113,7 @@ pub fn run(args: Args, front: &CommandLine) -> anyhow::Result<ExitCode> {
             1
         }
         RunEnding::Complete if !summary.doubtful.is_empty() => {
-            print::say(format!("the centres are doubtful: {}", summary.doubtful.join(", ")));
+            print::say(format!("doubtful, as the notes say: {}", summary.doubtful.join(", ")));
             1
         }
         RunEnding::Damaged => 1,

@@ -9,6 +9,7 @@ use crate::error::Error;
 use crate::rigid::body::Mechanism;
 use crate::rigid::index::DetectionIndex;
 use crate::rigid::search::MOST_SEEDS;
+use crate::rigid::work::{EACH_FRAME, MOST_OF_FRAME, MOST_SAVED};
 use crate::stop::Stop;
 use crate::store::{DetectionStore, FrameStamp};
 use crate::synth::{Film, preset};
@@ -47,6 +48,26 @@ fn a_rig_in_noise_is_sought_in_bounded_work_and_that_is_said() {
         assert_eq!(summary.bounded_frames, if is_bounded { 2 } else { 0 }, "{spots}");
         assert!(summary.seen.iter().all(|n| *n == 0), "{spots}: {:?}", summary.seen);
     }
+}
+
+#[test]
+fn three_hundred_spots_a_frame_take_bounded_work_in_each_frame_and_in_all() {
+    const FRAMES: u64 = 60;
+    let rig = Film::new(&preset("clean", 1).unwrap()).unwrap().rig(0);
+    let mechanism = Mechanism::new(&rig, 0.3);
+    let priors = MotionPriors::unknown(&mechanism, 0.05);
+    let mut tracker = FrameTracker::new(mechanism, priors);
+    let mut total = 0;
+    for (i, frame) in noise(FRAMES as usize, 300).iter().enumerate() {
+        let before = (tracker.bodies.work.left() + EACH_FRAME).min(MOST_SAVED);
+        tracker.step(i as f64, &DetectionIndex::new(frame), None, &Stop::default()).unwrap();
+        let spent = before - tracker.bodies.work.left();
+        // One search may have begun just before.
+        assert!(spent < MOST_OF_FRAME + MOST_OF_FRAME / 10, "frame {i}: {spent}");
+        total += spent;
+    }
+    assert!(total <= MOST_SAVED + FRAMES * EACH_FRAME, "{total}");
+    assert!(tracker.bounded_frames > 0, "{total}");
 }
 
 #[test]
