@@ -15,7 +15,7 @@ use crate::calibrate::{Calibration, words};
 use crate::camera::Plane;
 use crate::error::{Error, Result};
 use crate::link::link;
-use crate::message::Setting;
+use crate::message::{Message, Setting};
 use crate::rig::{CameraOrigin, RigCamera};
 use crate::rigid::pose::place;
 use crate::stop::Stop;
@@ -68,21 +68,7 @@ fn finish(
 ) -> Result<Discovery> {
     let mut warnings: Vec<_> = reading.left_out_words().into_iter().collect();
     let Reading { sample, found, .. } = reading;
-    let (background, found): (Vec<Found>, Vec<Found>) =
-        found.into_iter().partition(|f| f.is_background(f64::from(image_px[0].min(image_px[1]))));
-    let marks: usize = background.iter().map(|f| f.link.nodes.len()).sum();
-    if marks > 0 && found.is_empty() {
-        return Err(nothing_found(
-            format!(
-                "what stands out is {marks} marks of one body that neither turns nor goes anywhere, as a background does before a \
-                 camera that moves"
-            ),
-            "Point at what is meant with " + Setting::Marker + ", or film from a stand",
-        ));
-    }
-    if marks > 0 {
-        warnings.push(format!("the camera moves: {marks} marks of its background are left out").into());
-    }
+    let found = without_background(found, image_px, &mut warnings)?;
     let standing = sample.standing.clone();
     let plane = store.plane();
     let (reference, whole) = reference(&sample, &found, image_px, &plane, stop)?;
@@ -130,6 +116,31 @@ fn finish(
     }
     let standing = standing.iter().map(|p| plane.to_recorded(*p).into()).collect();
     Ok(Discovery { rig, standing, warnings })
+}
+
+/// The bodies that are not the background before a camera that moves, which is told.
+fn without_background(
+    found: Vec<Found>,
+    image_px: [u32; 2],
+    warnings: &mut Vec<Message>,
+) -> Result<Vec<Found>> {
+    let shorter_px = f64::from(image_px[0].min(image_px[1]));
+    let (background, found): (Vec<Found>, Vec<Found>) =
+        found.into_iter().partition(|f| f.is_background(shorter_px));
+    let marks: usize = background.iter().map(|f| f.link.nodes.len()).sum();
+    if marks > 0 && found.is_empty() {
+        return Err(nothing_found(
+            format!(
+                "what stands out is {marks} marks of one body that neither turns nor goes anywhere, as a background does before a \
+                 camera that moves"
+            ),
+            "Point at what is meant with " + Setting::Marker + ", or film from a stand",
+        ));
+    }
+    if marks > 0 {
+        warnings.push(format!("the camera moves: {marks} marks of its background are left out").into());
+    }
+    Ok(found)
 }
 
 /// The frame of the sample in which most nodes are seen, the first of those, and whether it shows all.

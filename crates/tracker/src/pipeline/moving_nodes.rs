@@ -162,29 +162,7 @@ impl Moving {
         warnings.extend(timing::notes(&timing));
         warnings.extend(damage.gaps.dropped_words().map(Message::from));
         warnings.extend(self.notes());
-        let mut doubtful = Vec::new();
-        for (node, usual) in self.doubtful() {
-            let name = rig.nodes[node].name.clone();
-            warnings.push(
-                format!(
-                    "the centre of {name} depends on what is taken for the marker: brightness, colour and outline have centres \
-                     that differ; its standard uncertainty is {usual:.1} px in half of the frames"
-                )
-                .into(),
-            );
-            doubtful.push(name);
-        }
-        if let Chosen::Likeliest { confidence, .. } = self.chosen
-            && confidence < SURE_CONFIDENCE
-        {
-            warnings.push(
-                Message::from(format!(
-                    "whether this is what is meant is doubtful: it explains {:.0} % of what looks like it. If it is, say so with ",
-                    100.0 * confidence
-                )) + Setting::Also.set_to("1"),
-            );
-            doubtful = rig.nodes.iter().map(|n| n.name.clone()).collect();
-        }
+        let doubtful = self.doubts(&rig, &mut warnings);
         let meta = TableMeta {
             schema_version: SCHEMA_VERSION,
             tool: TableMeta::this_tool(),
@@ -213,6 +191,34 @@ impl Moving {
             table: collected.map(|rows| NodeTable { meta: meta.clone(), rows }),
             meta,
         })
+    }
+
+    /// Names of the nodes of which it is doubtful where their centres are or whether they are what is meant; it is told why.
+    fn doubts(&self, rig: &Rig, warnings: &mut Vec<Message>) -> Vec<String> {
+        let mut doubtful = Vec::new();
+        for (node, usual) in self.doubtful() {
+            let name = rig.nodes[node].name.clone();
+            warnings.push(
+                format!(
+                    "the centre of {name} depends on what is taken for the marker: brightness, colour and outline have centres \
+                     that differ; its standard uncertainty is {usual:.1} px in half of the frames"
+                )
+                .into(),
+            );
+            doubtful.push(name);
+        }
+        if let Chosen::Likeliest { confidence, .. } = self.chosen
+            && confidence < SURE_CONFIDENCE
+        {
+            warnings.push(
+                Message::from(format!(
+                    "whether this is what is meant is doubtful: it explains {:.0} % of what looks like it. If it is, say so with ",
+                    100.0 * confidence
+                )) + Setting::Also.set_to("1"),
+            );
+            doubtful = rig.nodes.iter().map(|n| n.name.clone()).collect();
+        }
+        doubtful
     }
 
     fn settings_json(&self, settings: &RunSettings, wanted: &Wanted, facts: &SourceFacts) -> Value {
