@@ -147,3 +147,40 @@ def test_an_error_says_its_kind_as_data(film: Path, tmp_path: Path) -> None:
         with pytest.raises(TrackerError) as raised:
             call()
         assert raised.value.kind == kind, raised.value
+
+
+def photron(folder: Path, color_type: str) -> Path:
+    """A Photron recording of one frame whose header says how its pixels are coloured."""
+    values: dict[str, int | str] = {
+        "Image Width": 64,
+        "Image Height": 64,
+        "Record Rate(fps)": 500,
+        "Total Frame": 1,
+    }
+    values |= {"Color Type": color_type, "Color Bit": 8, "EffectiveBit Depth": 8}
+    header = folder / "film.cih"
+    lines = ["#Camera Information Header", *(f"{name} : {value}" for name, value in values.items())]
+    header.write_text("\n".join(lines) + "\n")
+    header.with_suffix(".mraw").write_bytes(bytes(64 * 64))
+    return header
+
+
+def test_a_fault_of_a_camera_s_file_says_its_kind(tmp_path: Path) -> None:
+    header_of_norpix = b"\xed\xfe\0\0N\0o\0r\0p\0i\0x\0" + bytes(100)
+    cut = {"cut.seq": header_of_norpix, "cut.tif": b"II*\0" + b"\xff" * 20}
+    for name, content in cut.items():
+        (tmp_path / name).write_bytes(content)
+    interlaced = tmp_path / "interlaced.mpg"
+    lines = "testsrc=size=64x64:rate=25:duration=0.4,tinterlace=4,fieldorder=tff"
+    coded = ["-flags", "+ilme+ildct", "-c:v", "mpeg2video"]
+    subprocess.run(["ffmpeg", "-v", "error", "-f", "lavfi", "-i", lines, *coded, interlaced], check=True)
+    calls: list[tuple[str, Callable[[], object]]] = [
+        *(("damaged", lambda name=name: dp.info(tmp_path / name)) for name in cut),
+        ("unsupported", lambda: dp.info(photron(tmp_path, "Color"))),
+        ("unsupported", lambda: dp.track(interlaced, progress=False)),
+    ]
+    assert dp.info(photron(tmp_path, "Mono"))["width"] == 64
+    for kind, call in calls:
+        with pytest.raises(TrackerError) as raised:
+            call()
+        assert raised.value.kind == kind, raised.value
