@@ -51,6 +51,8 @@ check: build
 	.venv/bin/mypy
 	MYPYPATH=python .venv/bin/stubtest pydpend._native
 	cargo check --release --locked -p tracker --lib --no-default-features
+	cargo check --release --locked -p tracker --lib --no-default-features --features ffmpeg
+	cargo check --release --locked -p tracker --lib --no-default-features --features opencv
 
 # Long: the eight scenes by twenty seeds, real motion filmed, then the estimators' sweeps.
 validate: build
