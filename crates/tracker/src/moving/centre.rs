@@ -36,6 +36,9 @@ const LEVEL_STEP: f64 = 0.2;
 const LEVEL_DOUBT: f64 = 0.12;
 /// The same part of the difference between the silhouette's centre and the region's.
 const SILHOUETTE_DOUBT: f64 = 0.5;
+/// The same part of the difference between the centre along the marker's own colour direction and along the one that it was found in:
+/// each is as good as the other, and the standard deviation of one of two values is their difference over sqrt(2).
+const COLOUR_DOUBT: f64 = std::f64::consts::FRAC_1_SQRT_2;
 /// Part of the difference between the outline's circle and the region which is not known of the centre.
 const CIRCLE_DOUBT: f64 = 0.25;
 /// Region and circle agree where their centres are nearer to each other than this, in radii: from there on it is said of a
@@ -93,6 +96,7 @@ impl Look<'_> {
             let Some(r) = w.region(place, radius, 0.0) else { break };
             (place, region) = ([r.x, r.y], Some(r));
         }
+        let by_filter = region;
         if let Some(own) = self.own {
             w.look(own, 1.0, self.backdrop, place, radius);
             for _ in 0..3 {
@@ -111,6 +115,8 @@ impl Look<'_> {
         };
         let silhouette = silhouette.filter(|(s, _)| SILHOUETTE_RATIO.contains(&(s.area / region.area)));
         let mut doubt = LEVEL_DOUBT * (high.x - low.x).hypot(high.y - low.y);
+        let filter = by_filter.unwrap_or(region);
+        doubt = doubt.hypot(COLOUR_DOUBT * (filter.x - region.x).hypot(filter.y - region.y));
         if let Some((s, _)) = &silhouette {
             // Which of the two is the marker is not known: strings belong to the silhouette, a net to the marker.
             doubt = doubt.hypot(SILHOUETTE_DOUBT * (s.x - region.x).hypot(s.y - region.y));

@@ -256,7 +256,7 @@ pub fn survey(search: &Search) -> Result<Survey> {
     for r in runs {
         for t in r.group.into_iter().chain(r.others).filter(|t| t.weight() >= OTHER_MODEL_PART * heaviest) {
             let within = SAME_RADII * r.model.radius_px().max(model.radius_px());
-            let new = Marker { track: t, model: r.model, radius_px: r.model.radius_px() };
+            let new = Marker { track: t, model: Some(r.model), radius_px: r.model.radius_px() };
             if !markers.iter().any(|o| o.is_same(&new, within)) {
                 markers.push(marker(new.track, r.model)?);
             }

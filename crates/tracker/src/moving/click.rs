@@ -1,16 +1,18 @@
 //! Follows what a user pointed at: of all ways of looking the one in which the track through that place holds best.
 //!
-//! Owns: [`Click`], [`follow_clicks`], [`Missed`]. Must not: follow anything else.
+//! Owns: [`Click`], [`follow_clicks`], [`Missed`], [`Unheld`]. Must not: follow anything else.
 
 use rayon::prelude::*;
 
 use super::marker::{Marker, compact};
 use super::model::Model;
+use super::patch::{Lost, Still, follow_picture};
+use super::picture::Film;
 use super::response::{response, responses};
 use super::search::{Against, Search};
 use super::spot::Spot;
 use super::track::{Track, join, join_lone};
-use super::tracklet::{End, link};
+use super::tracklet::{End, Tracklet, link};
 use crate::error::Result;
 
 /// Limit of a spot at the place that was pointed at, in units of the noise: what was pointed at need not stand out from all else.
@@ -36,6 +38,8 @@ const LOOK: [f64; 2] = [0.92, 1.1];
 const STREAK: f64 = 0.7;
 /// What a thing that does not move is worth beside one that does: one points at what moves.
 const STILL: f64 = 0.1;
+/// A spot has a middle of its own, a picture the place that was pointed at: a picture must be found so many times as often.
+const PREFER_SPOT: f64 = 1.5;
 /// A track of fewer pictures holds nothing.
 const LEAST_SPOTS: usize = 5;
 /// Smoothness from which on a track holds.
@@ -59,8 +63,19 @@ pub enum Missed {
     Nothing,
     /// What stands out there, in this way of looking, is seen in so few pictures in a row.
     Ends(Model, usize, End),
+    /// What stands out there is so much larger that its middle is not what was pointed at.
+    Beside(Model),
     /// It is seen in so many pictures, but jumps or changes its look.
     Restless(Model, usize),
+}
+
+/// Why what was pointed at is followed neither as a spot nor by its picture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Unheld {
+    /// Why not as a spot.
+    pub spot: Missed,
+    /// Why not by its picture.
+    pub picture: Lost,
 }
 
 /// A way of looking at what was pointed at.
@@ -132,7 +147,7 @@ pub fn follow_clicks(
     search: &Search,
     clicks: &[Click],
     known: &[Marker],
-) -> Result<Vec<Result<Marker, Missed>>> {
+) -> Result<Vec<Result<Marker, Unheld>>> {
     let film = search.film;
     let tried: Vec<(usize, Choice)> = clicks
         .iter()
@@ -171,23 +186,63 @@ pub fn follow_clicks(
     for (i, click) in clicks.iter().enumerate() {
         for marker in known {
             if let Some((_, spot)) = marker.track.spots().find(|(k, _)| *k == click.picture) {
-                let worth = worth(search, click, spot, &marker.track, marker.model)?;
+                let Some(model) = marker.model else { continue };
+                let worth = worth(search, click, spot, &marker.track, model)?;
                 if off(spot, click) < marker.radius_px + OFF_PX {
                     judged.push((i, Ok((worth.0, marker.clone()))));
                 }
             }
         }
     }
-    Ok((0..clicks.len())
-        .map(|i| {
-            let mine = || judged.iter().filter(|(j, _)| *j == i).map(|(_, r)| r);
-            let best = mine().flatten().max_by(|a, b| a.0.total_cmp(&b.0));
-            match (best, mine().find_map(|r| r.as_ref().err())) {
-                (Some((_, marker)), _) => Ok(marker.clone()),
-                (None, missed) => Err(missed.copied().unwrap_or(Missed::Nothing)),
-            }
+    let best = |i: usize| {
+        let mine = || judged.iter().filter(move |(j, _)| *j == i).map(|(_, r)| r);
+        let best = mine().flatten().max_by(|a, b| a.0.total_cmp(&b.0));
+        match (best, mine().find_map(|r| r.as_ref().err())) {
+            (Some((_, marker)), _) => Ok(marker.clone()),
+            (None, missed) => Err(missed.copied().unwrap_or(Missed::Nothing)),
+        }
+    };
+    let spots: Vec<Result<Marker, Missed>> = (0..clicks.len()).map(best).collect();
+    let held =
+        |(spot, click): (&Result<Marker, Missed>, &Click)| spot.as_ref().map_or(0.0, |m| held(m, click));
+    let held: Vec<f64> = spots.iter().zip(clicks).map(held).collect();
+    if held.iter().all(|h| *h >= film.count() as f64) {
+        return Ok(spots.into_iter().flatten().map(Ok).collect());
+    }
+    let still = Still::learn(film)?;
+    let chosen = |((spot, click), held): ((Result<Marker, Missed>, &Click), f64)| {
+        if held >= film.count() as f64 {
+            return Ok(spot.map_err(|spot| Unheld { spot, picture: Lost::Soon(0) }));
+        }
+        Ok(match (by_picture(film, &still, click)?, spot) {
+            (Ok(marker), _) if marker.track.count as f64 > held => Ok(marker),
+            (_, Ok(marker)) | (Ok(marker), _) => Ok(marker),
+            (Err(picture), Err(spot)) => Err(Unheld { spot, picture }),
         })
-        .collect())
+    };
+    spots.into_par_iter().zip(clicks).zip(held).map(chosen).collect()
+}
+
+/// In how many pictures a thing must be found by its picture to be held better than it is as this spot: fewer the farther the spot's
+/// middle is from what was pointed at.
+fn held(marker: &Marker, click: &Click) -> f64 {
+    let at_click = marker.track.spots().find(|(k, _)| *k == click.picture);
+    let near = at_click.map_or(1.0, |(_, spot)| nearness(off(spot, click), marker.radius_px));
+    PREFER_SPOT * marker.track.count as f64 * near
+}
+
+/// From 0 to 1: how likely a place so far, px, from the middle of a marker is pointed at for it.
+fn nearness(off_px: f64, radius_px: f64) -> f64 {
+    (-(off_px / (OFF_RADII * radius_px + OFF_PX)).powi(2)).exp()
+}
+
+/// What was pointed at, followed by its picture.
+fn by_picture(film: &dyn Film, still: &Still, click: &Click) -> Result<Result<Marker, Lost>> {
+    Ok(follow_picture(film, still, click.picture, [click.x, click.y])?.map(|(spots, radius_px)| Marker {
+        track: Track::of(Tracklet::runs(&spots), radius_px),
+        model: None,
+        radius_px,
+    }))
 }
 
 /// The track through a place in one way of looking, with what it is worth; else why it does not hold.
@@ -196,7 +251,7 @@ fn judge(search: &Search, click: &Click, choice: &Choice, pictures: &[Vec<Spot>]
     let radius = model.radius_px();
     let is_clicked = |s: &Spot| (s.x - choice.spot.x).hypot(s.y - choice.spot.y) < 0.5;
     let tracklets = link(pictures, radius, search.width, 0);
-    let at_click = |t: &&super::tracklet::Tracklet| {
+    let at_click = |t: &&Tracklet| {
         let nth = click.picture.checked_sub(t.first);
         nth.and_then(|n| t.spots.get(n)).is_some_and(is_clicked)
     };
@@ -213,14 +268,17 @@ fn judge(search: &Search, click: &Click, choice: &Choice, pictures: &[Vec<Spot>]
         return Ok(Err(Missed::Restless(model, track.count)));
     }
     let (worth, radius_px) = worth(search, click, &choice.spot, &track, model)?;
-    Ok(Ok((worth, Marker { track, model, radius_px })))
+    if off(&choice.spot, click) > radius_px + OFF_PX {
+        return Ok(Err(Missed::Beside(model)));
+    }
+    Ok(Ok((worth, Marker { track, model: Some(model), radius_px })))
 }
 
 /// What a track through a place is worth as what was pointed at, and its radius, px: how much of it is seen, how smoothly and far
 /// it moves, how compact it is and how near to the place.
 fn worth(search: &Search, click: &Click, spot: &Spot, track: &Track, model: Model) -> Result<(f64, f64)> {
     let (radius_px, compact) = compact(search.film, track, &model)?;
-    let near = (-(off(spot, click) / (OFF_RADII * radius_px + OFF_PX)).powi(2)).exp();
+    let near = nearness(off(spot, click), radius_px);
     let moves = STILL + (1.0 - STILL) * track.quality;
     Ok((track.count as f64 * moves * (0.2 + 0.8 * compact) * near, radius_px))
 }

@@ -25,8 +25,8 @@ const FAR_RADII: f64 = 6.0;
 pub struct Marker {
     /// Where it is.
     pub track: Track,
-    /// How it is looked at.
-    pub model: Model,
+    /// How it is looked at; `None` where it is followed by its picture.
+    pub model: Option<Model>,
     /// Its radius, px.
     pub radius_px: f64,
 }
@@ -35,7 +35,7 @@ impl Marker {
     /// A track, with the radius that its places show.
     pub fn of(film: &dyn Film, track: Track, model: Model) -> Result<Self> {
         let (radius_px, _) = compact(film, &track, &model)?;
-        Ok(Self { track, model, radius_px })
+        Ok(Self { track, model: Some(model), radius_px })
     }
 
     /// Whether it moves smoothly over three times its own size.
@@ -71,7 +71,7 @@ pub fn compact(film: &dyn Film, track: &Track, model: &Model) -> Result<(f64, f6
 }
 
 /// Takes the centres of markers from close by, follows those that come to rest, and leaves out places that jump aside. Those of
-/// one way of looking have one radius.
+/// one way of looking have one radius. Those that are followed by their picture stay as they are.
 ///
 /// # Errors
 /// Those of the film; [`crate::error::Error::Interrupted`] once the work is to stop.
@@ -80,6 +80,9 @@ pub fn finish(film: &dyn Film, markers: &mut [Marker]) -> Result<()> {
     while let Some(first) = done.iter().position(|d| !d) {
         let model = markers[first].model;
         let same: Vec<usize> = (first..markers.len()).filter(|&k| markers[k].model == model).collect();
+        same.iter().for_each(|&k| done[k] = true);
+        // The place of a picture is as good as it will be.
+        let Some(model) = model else { continue };
         let backdrop = Backdrop::learn(film, &model)?;
         let mut group: Vec<&mut Marker> =
             markers.iter_mut().enumerate().filter(|(k, _)| same.contains(k)).map(|(_, m)| m).collect();
@@ -93,7 +96,6 @@ pub fn finish(film: &dyn Film, markers: &mut [Marker]) -> Result<()> {
         group.par_iter_mut().try_for_each(|m| extend(film, &mut m.track, &model))?;
         refined(&mut group)?;
         group.iter_mut().for_each(|m| m.track.settle(m.radius_px));
-        same.into_iter().for_each(|k| done[k] = true);
     }
     Ok(())
 }

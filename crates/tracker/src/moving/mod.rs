@@ -6,7 +6,7 @@
 //! Every picture is looked at by one filter (`response`: centre minus surround) in octaves, colour directions and both signs;
 //! `ground` takes away what stands still, `spot` finds the maxima, `search` does both, `tracklet` links them, `track` joins over
 //! gaps, `choose` lets every way of looking compete by what it explains and `click` by how a track holds through a place that
-//! was pointed at; `centre` refines the places, `rest` follows what comes to rest, and `marker` does both.
+//! was pointed at; `patch` follows what is no spot by its picture; `centre` refines the places, `rest` follows what comes to rest, and `marker` does both.
 
 mod backdrop;
 mod centre;
@@ -18,6 +18,7 @@ mod marker;
 mod model;
 mod outline;
 mod own_colour;
+mod patch;
 mod picture;
 mod response;
 mod rest;
@@ -31,10 +32,11 @@ mod window;
 mod work;
 
 pub use choose::{Survey, strongest, survey};
-pub use click::{Click, Missed, follow_clicks};
+pub use click::{Click, Missed, Unheld, follow_clicks};
 pub use limits::Limits;
 pub use marker::{Marker, finish};
 pub use model::Model;
+pub use patch::Lost;
 pub use picture::{Film, Picture};
 pub use response::Direction;
 pub use search::Search;

@@ -101,7 +101,7 @@ fn follow(film: &Drawn) -> Result<Option<Followed>> {
     found.markers.truncate(found.answers);
     finish(film, &mut found.markers)?;
     Ok(found.markers.first().map(|m| Followed {
-        model: m.model,
+        model: m.model.unwrap(),
         tracks: found.markers.iter().map(|m| m.track.clone()).collect(),
         confidence: found.confidence,
     }))
@@ -231,7 +231,7 @@ fn a_wish_to_stop_ends_the_work() {
 }
 
 /// What is followed from places that are pointed at.
-fn pointed(film: &Drawn, limits: &Limits, clicks: &[Click]) -> Vec<Result<Marker, Missed>> {
+fn pointed(film: &Drawn, limits: &Limits, clicks: &[Click]) -> Vec<Result<Marker, Unheld>> {
     let search = Search::learn(film, limits).unwrap().unwrap();
     let mut followed = follow_clicks(&search, clicks, &survey(&search).unwrap().markers).unwrap();
     let mut markers: Vec<Marker> = followed.iter().flatten().cloned().collect();
@@ -288,7 +288,7 @@ fn a_place_where_nothing_is_and_one_that_only_flickers_are_refused() {
     let once =
         Drawn::new(35, 2.0, 60, |k| if k == 30 { vec![(100.0, 100.0, 6.0, 250.0)] } else { Vec::new() });
     let followed = pointed(&once, &Limits::default(), &[Click { picture: 30, x: 100.0, y: 100.0 }]);
-    assert!(matches!(followed[0], Err(Missed::Ends(..))), "{followed:?}");
+    assert!(matches!(followed[0], Err(Unheld { spot: Missed::Ends(..), .. })), "{followed:?}");
 }
 
 #[test]

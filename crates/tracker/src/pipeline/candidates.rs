@@ -68,6 +68,14 @@ pub(super) fn look(model: &Model, radius_px: f64, scale: f64) -> String {
     format!("{sign}, {:.0} px across", 2.0 * radius_px * scale)
 }
 
+/// How a marker looks, or that it is followed by its picture, in words.
+pub(super) fn words(marker: &Marker, scale: f64) -> String {
+    match &marker.model {
+        Some(model) => look(model, marker.radius_px, scale),
+        None => format!("by its picture, {:.0} px across", 2.0 * marker.radius_px * scale),
+    }
+}
+
 impl Candidates {
     /// Of markers in their order; `why` says of each, by its place in the order, why it is not followed; `None` where it is.
     pub(super) fn of_markers(
@@ -97,7 +105,7 @@ impl Candidates {
                     followed: why(i).is_none(),
                     words: format!(
                         "{}, seen in {} of {} frames, {} to {}; {}",
-                        look(&m.model, m.radius_px, scale),
+                        words(m, scale),
                         m.track.count,
                         film.pictures(),
                         film.frame_of(first),

@@ -4,7 +4,7 @@
 
 use std::sync::atomic::Ordering;
 
-use super::candidates::{Candidates, look};
+use super::candidates::{Candidates, look, words};
 use super::moving_nodes::{Chosen, Moving};
 use super::observer::{Observer, Stage};
 use super::opening::{Attended, on_threads, open};
@@ -16,7 +16,8 @@ use crate::error::{Error, Fault, Result};
 use crate::frame::SourceInfo;
 use crate::message::{Message, Setting};
 use crate::moving::{
-    Click, End, Limits, Marker, Missed, Search, Survey, WorkFilm, finish, follow_clicks, strongest, survey,
+    Click, End, Limits, Lost, Marker, Missed, Search, Survey, Unheld, WorkFilm, finish, follow_clicks,
+    strongest, survey,
 };
 use crate::rig::Rig;
 use crate::source::{self, OpenOptions};
@@ -329,7 +330,7 @@ fn unclear(
         Some(m) => format!(
             "of the {} that move the likeliest ({}) explains {:.0} % of what looks like it ({:.0} % are needed)",
             markers.len(),
-            look(&m.model, m.radius_px, film.shrink() as f64),
+            words(m, film.shrink() as f64),
             100.0 * if answers > 0 { confidence } else { 0.0 },
             100.0 * LEAST_CONFIDENCE,
         ),
@@ -376,13 +377,23 @@ fn pointed(film: &WorkFilm, search: &Search, places: &[Pointed]) -> Result<Found
             }
             Err(missed) => {
                 let candidates = candidates(film, search, &known, answers, confidence, &[])?;
-                let why = format!("at {} {}", shown(k), missed_words(missed, film.shrink() as f64));
+                let why = format!("at {} {}", shown(k), unheld_words(missed, film.shrink() as f64));
                 return Ok(Found::unclear(Unclear::new(why, point_at(&candidates)), candidates));
             }
         }
     }
     finish(film, &mut markers)?;
     Ok(Found { moving: Ok(Moving::of(film, markers, Chosen::Pointed)), candidates: None })
+}
+
+fn unheld_words(unheld: Unheld, scale: f64) -> String {
+    let picture = match unheld.picture {
+        Lost::Still => "what is there stands still all through the recording".into(),
+        Lost::Plain => "what is there has too little of a picture to be told from the noise".into(),
+        Lost::Soon(1) => "its picture is not found again with certainty in the frames beside it".into(),
+        Lost::Soon(count) => format!("its picture is found with certainty in {count} frames only"),
+    };
+    format!("{}; and {picture}", missed_words(unheld.spot, scale))
 }
 
 fn missed_words(missed: Missed, scale: f64) -> String {
@@ -396,6 +407,10 @@ fn missed_words(missed: Missed, scale: f64) -> String {
             };
             let look = look(&model, model.radius_px(), scale);
             format!("something stands out ({look}) and is followed through {count} frames only: then {why}")
+        }
+        Missed::Beside(model) => {
+            let look = look(&model, model.radius_px(), scale);
+            format!("the middle of what stands out ({look}) is not there but beside it")
         }
         Missed::Restless(model, count) => {
             let look = look(&model, model.radius_px(), scale);

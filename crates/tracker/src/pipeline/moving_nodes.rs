@@ -4,7 +4,7 @@
 
 use serde_json::{Value, json};
 
-use super::candidates::look;
+use super::candidates::words;
 use super::settings::RunSettings;
 use super::summary::{MOVING, RunSummary};
 use super::times::times;
@@ -207,6 +207,11 @@ impl Moving {
             );
             doubtful.push(name);
         }
+        for (node, said) in self.lost(rig.image_px) {
+            let name = rig.nodes[node].name.clone();
+            warnings.push(format!("{name} {said}: nothing there is certainly it").into());
+            doubtful.push(name);
+        }
         if let Chosen::Likeliest { confidence, .. } = self.chosen
             && confidence < SURE_CONFIDENCE
         {
@@ -225,13 +230,14 @@ impl Moving {
         let looks: Vec<Value> = self
             .markers
             .iter()
-            .map(|m| {
-                json!({
-                    "bright": m.model.sign > 0.0,
-                    "luma, blue, red": m.model.direction.0,
-                    "octave": m.model.octave,
+            .map(|m| match &m.model {
+                Some(model) => json!({
+                    "bright": model.sign > 0.0,
+                    "luma, blue, red": model.direction.0,
+                    "octave": model.octave,
                     "radius_px": m.radius_px * self.scale,
-                })
+                }),
+                None => json!({ "by": "picture", "radius_px": m.radius_px * self.scale }),
             })
             .collect();
         let (confidence, others) = match self.chosen {
@@ -329,11 +335,39 @@ impl Moving {
         columns.filter_map(|k| Some((k, usual(k).filter(|s| f64::from(*s) > limit(k))?))).collect()
     }
 
+    /// Columns of what is followed by its picture and is lost for good within a picture of that size, with a clause of where.
+    fn lost(&self, image_px: [u32; 2]) -> Vec<(usize, String)> {
+        let mut all = Vec::new();
+        for (node, marker) in self.markers.iter().enumerate().filter(|(_, m)| m.model.is_none()) {
+            let seen: Vec<usize> =
+                (0..self.rows.len()).filter(|&k| self.rows[k][node].status.is_seen()).collect();
+            let (Some(&first), Some(&last)) = (seen.first(), seen.last()) else { continue };
+            let margin = 2.0 * marker.radius_px * self.scale;
+            let within = |k: usize| {
+                let o = &self.rows[k][node];
+                let inside = |v: f64, n: f64| v > margin && v < n - margin;
+                inside(o.x_px, f64::from(image_px[0])) && inside(o.y_px, f64::from(image_px[1]))
+            };
+            let index = |k: usize| self.stamps[k].index;
+            let mut said = Vec::new();
+            if first > 0 && within(first) {
+                said.push(format!("is not seen before frame {}", index(first)));
+            }
+            if last + 1 < self.rows.len() && within(last) {
+                said.push(format!("is lost after frame {}", index(last)));
+            }
+            if !said.is_empty() {
+                all.push((node, said.join(" and ")));
+            }
+        }
+        all
+    }
+
     /// How it was found, in words.
     fn notes(&self) -> Vec<Message> {
         let count = self.markers.len();
         let markers = if count == 1 { "marker" } else { "markers" };
-        let looks = |m: &Marker| look(&m.model, m.radius_px, self.scale);
+        let looks = |m: &Marker| words(m, self.scale);
         let what = match &self.chosen {
             Chosen::Likeliest { confidence, others } => {
                 let others = match others {
@@ -406,7 +440,7 @@ mod tests {
     /// A column for each radius, in work pictures of half the size.
     fn moving(radii_px: &[f64], rows: Vec<Vec<Observation>>) -> Moving {
         let model = Model { direction: Direction::LUMA, sign: 1.0, octave: 1 };
-        let marker = |r: &f64| Marker { track: Track::of(Vec::new(), *r), model, radius_px: *r };
+        let marker = |r: &f64| Marker { track: Track::of(Vec::new(), *r), model: Some(model), radius_px: *r };
         Moving {
             names: (0..radii_px.len()).map(|k| format!("n{k}")).collect(),
             markers: radii_px.iter().map(marker).collect(),
