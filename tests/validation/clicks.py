@@ -92,7 +92,7 @@ def main() -> int:
     parser.add_argument("--films", type=Path, default=FILMS)
     parser.add_argument("--part", type=float, default=0.5)
     parser.add_argument("--set", type=int, default=0)
-    given = parser.parse_args()
+    given = parser.parse_intermixed_args()
     score = scorer(given.films)
     names = given.names or sorted(p.parent.name for p in given.films.glob("*/meta.json"))
     count: dict[str, int] = {}

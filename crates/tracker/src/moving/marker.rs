@@ -45,7 +45,9 @@ impl Marker {
 
     /// Part of its places at which a compact region is found.
     pub fn whole(&self, film: &dyn Film) -> Result<f64> {
-        Ok(refine(film, &mut self.track.clone(), &self.model, RADIUS_PLACES, None, None)?.found)
+        // A picture's places are certain, each of them.
+        let Some(model) = &self.model else { return Ok(1.0) };
+        Ok(refine(film, &mut self.track.clone(), model, RADIUS_PLACES, None, None)?.found)
     }
 
     /// Whether two are one: near each other where both are seen.

@@ -21,18 +21,12 @@ pub struct Match {
 }
 
 /// The values that a picture has at a template's points, of mean 0 and sum of squares 1; `None` beyond its border.
-pub fn seen(template: &Template, surface: &Surface, pose: &Pose) -> Option<Vec<f64>> {
+fn seen(template: &Template, surface: &Surface, pose: &Pose) -> Option<Vec<f64>> {
     let mut values = Vec::with_capacity(template.points.len());
     for &point in &template.points {
         values.push(surface.value(pose.place(point))?);
     }
     normalise(&mut values).map(|_| values)
-}
-
-/// Likeness of what a picture has at a pose.
-pub fn likeness(template: &Template, surface: &Surface, pose: &Pose) -> Option<f64> {
-    let values = seen(template, surface, pose)?;
-    Some(values.iter().zip(&template.values).map(|(a, b)| a * b).sum())
 }
 
 /// The place nearest to a start at which the picture is most like the template; `None` where there is none.
