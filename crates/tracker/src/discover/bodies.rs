@@ -14,9 +14,10 @@ use super::sample::Sample;
 use crate::detect::{Detection, Flags};
 use crate::error::Result;
 use crate::rigid::body::Link;
+use crate::rigid::hypothesis::PoseHypothesis;
 use crate::rigid::index::DetectionIndex;
 use crate::rigid::pose::place;
-use crate::rigid::search::{PoseHypothesis, Search};
+use crate::rigid::search::Search;
 use crate::rigid::work::{MOST_OF_FRAME, Work};
 use crate::stop::Stop;
 

@@ -4,6 +4,7 @@
 
 pub mod body;
 pub mod forecast;
+pub mod hypothesis;
 pub mod index;
 pub mod joint;
 pub mod pose;

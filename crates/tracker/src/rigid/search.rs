@@ -1,17 +1,17 @@
 //! Searches a frame's detections for a body: tests every pose under which its nodes would be seen.
 //!
-//! Owns: [`Anchor`], [`Search`], [`PoseHypothesis`]. Must not: choose between hypotheses (`track` does).
+//! Owns: [`Search`]. Must not: choose between hypotheses (`track` does).
 //!
 //! A pose follows from two joints, from a joint and one node, or from two nodes. Every pose that follows from
 //! the detections is tested on all nodes of the body and refitted on those that agree.
 
-use std::collections::HashSet;
 use std::f64::consts::PI;
 
 use nalgebra::{Isometry2, Vector2};
 
 use super::body::{LEAST_PART, Link};
 use super::forecast::{Forecast, hung_at};
+use super::hypothesis::{Anchor, Found, PoseHypothesis};
 use super::index::DetectionIndex;
 use super::pose::{Pair, PoseFit, fit_pose, place, pose_at};
 use super::work::Work;
@@ -28,8 +28,6 @@ pub const MOST_SEEDS: usize = 400;
 pub const MOST_TRIALS: usize = 50_000;
 /// Detections or pairs of them that are glanced at in the time in which one place is looked up.
 const GLANCES: usize = 8;
-/// Hypotheses up to which each is compared with a new one; beyond, a table is quicker.
-const FEW_HYPOTHESES: usize = 32;
 /// Rounds of picking detections and fitting the pose, at most.
 const REFINE_ROUNDS: usize = 6;
 /// Distance of two anchors that fix the pose alone, in their standard uncertainties: the angle is then known to 1/20 rad.
@@ -38,60 +36,6 @@ const LEAST_BASE_SIGMA: f64 = 20.0;
 const LEAST_SPAN_REACHES: f64 = 4.0;
 /// Half width of the angles, rad, below which an arc about the expected place is searched and not the whole circle.
 const NARROW_WINDOW_RAD: f64 = 1.5;
-
-/// A point of the body whose place in the image is known from elsewhere: the pivot, a neighbour's joint.
-#[derive(Debug, Clone, Copy)]
-pub struct Anchor {
-    /// In the body's coordinates, px.
-    pub local: Vector2<f64>,
-    /// In the image, px.
-    pub place: Vector2<f64>,
-    /// Standard uncertainty of each coordinate, px.
-    pub sigma_px: f64,
-}
-
-/// A pose hypothesis: a pose and the detections that agree with it.
-#[derive(Debug, Clone)]
-pub struct PoseHypothesis {
-    /// The pose, fitted on anchors and whole detections.
-    pub fit: PoseFit,
-    /// For each node of the body its detection.
-    pub picks: Vec<Option<usize>>,
-    /// Number of nodes whose whole detection agrees.
-    pub inliers: usize,
-    /// Sum of squared residuals of the nodes over their variances.
-    pub chi2: f64,
-}
-
-/// Outcome of a search.
-#[derive(Debug, Default)]
-pub struct Found {
-    /// Hypotheses with different detections, the best first.
-    pub hypotheses: Vec<PoseHypothesis>,
-    /// Poses that the detections allowed and that were tested.
-    pub trials: usize,
-    /// There were more detections or poses than are tried.
-    pub is_bounded: bool,
-    /// Detections of the hypotheses, once these are many.
-    known: HashSet<Vec<Option<usize>>>,
-}
-
-impl Found {
-    /// Keeps a hypothesis unless one with the same detections is known.
-    fn keep(&mut self, hypothesis: PoseHypothesis) {
-        let is_new = if self.hypotheses.len() < FEW_HYPOTHESES {
-            !self.hypotheses.iter().any(|other| other.picks == hypothesis.picks)
-        } else {
-            if self.known.is_empty() {
-                self.known.extend(self.hypotheses.iter().map(|other| other.picks.clone()));
-            }
-            self.known.insert(hypothesis.picks.clone())
-        };
-        if is_new {
-            self.hypotheses.push(hypothesis);
-        }
-    }
-}
 
 /// A search for one body in one frame.
 pub struct Search<'a> {
@@ -425,6 +369,8 @@ impl Search<'_> {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::HashSet;
+
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 

@@ -4,8 +4,8 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Places looked up that work is counted in: one detection that is sought near one place, some 0.1 us (docs/validation.md).
-/// What is saved up at most, and at the beginning.
+/// Work that is saved up at most, and at the beginning, in places looked up: one detection that is sought near one place, some
+/// 0.1 us (docs/validation/robustness.md).
 pub const MOST_SAVED: u64 = 10_000_000;
 /// What one frame may take of it: what the user says is heard between two frames.
 pub const MOST_OF_FRAME: u64 = 2_000_000;

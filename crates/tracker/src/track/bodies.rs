@@ -7,9 +7,10 @@ use super::motion_priors::MotionPriors;
 use super::seen::BodySeen;
 use crate::rigid::body::{Holder, Mechanism};
 use crate::rigid::forecast::{Forecast, Motion};
+use crate::rigid::hypothesis::Anchor;
 use crate::rigid::index::DetectionIndex;
 use crate::rigid::pose::place;
-use crate::rigid::search::{Anchor, PAIRS, REACH_SIGMA, Search};
+use crate::rigid::search::{PAIRS, REACH_SIGMA, Search};
 use crate::rigid::work::Work;
 
 /// The bodies that are followed, at one moment.

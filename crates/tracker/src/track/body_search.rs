@@ -11,9 +11,10 @@ use super::false_matches::{CHANCE_ANYWHERE, expected_false_matches};
 use super::seen::{BodySeen, accepted};
 use crate::rigid::body::Holder;
 use crate::rigid::forecast::{Forecast, hung_at};
+use crate::rigid::hypothesis::{Anchor, PoseHypothesis};
 use crate::rigid::index::DetectionIndex;
 use crate::rigid::pose::place;
-use crate::rigid::search::{Anchor, PoseHypothesis, REACH_SIGMA, Search};
+use crate::rigid::search::{REACH_SIGMA, Search};
 
 /// Greatest expected number of false matches for a body found at its predicted pose.
 const CHANCE_EXPECTED: f64 = 2e-3;

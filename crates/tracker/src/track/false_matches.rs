@@ -9,8 +9,9 @@ use nalgebra::Vector2;
 use super::motion_priors::MotionPriors;
 use crate::detect::Detection;
 use crate::rigid::body::{Link, Mechanism};
+use crate::rigid::hypothesis::{Anchor, PoseHypothesis};
 use crate::rigid::index::DetectionIndex;
-use crate::rigid::search::{Anchor, PAIRS, PoseHypothesis, REACH_SIGMA, Search};
+use crate::rigid::search::{PAIRS, REACH_SIGMA, Search};
 use crate::rigid::work::{MOST_OF_FRAME, Work};
 
 /// Greatest expected number of false matches for a body found anywhere in the frame.

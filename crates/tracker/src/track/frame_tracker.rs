@@ -12,8 +12,8 @@ use super::seen::{BodySeen, accepted};
 use super::tentative::{Tentative, follow};
 use crate::error::Result;
 use crate::rigid::body::Mechanism;
+use crate::rigid::hypothesis::PoseHypothesis;
 use crate::rigid::index::DetectionIndex;
-use crate::rigid::search::PoseHypothesis;
 use crate::stop::Stop;
 
 /// Follows bodies through frames in either direction of time.

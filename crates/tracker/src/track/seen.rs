@@ -4,8 +4,8 @@
 
 use nalgebra::Vector2;
 
+use crate::rigid::hypothesis::PoseHypothesis;
 use crate::rigid::pose::PoseFit;
-use crate::rigid::search::PoseHypothesis;
 
 /// The evidence of one frame about one body.
 #[derive(Debug, Clone, Default)]

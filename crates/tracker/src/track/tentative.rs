@@ -8,8 +8,8 @@ use super::bodies::Bodies;
 use super::body_search::Open;
 use super::false_matches::CHANCE_ANYWHERE;
 use crate::rigid::forecast::Motion;
+use crate::rigid::hypothesis::{Anchor, PoseHypothesis};
 use crate::rigid::index::DetectionIndex;
-use crate::rigid::search::{Anchor, PoseHypothesis};
 
 /// Number of undecided hypotheses followed at once.
 const TENTATIVE: usize = 8;
