@@ -21,7 +21,7 @@ const SIGMA_OVER_MAD: f64 = 1.4826;
 /// Least noise, grey levels: rounding to whole levels and what compression leaves.
 const LEAST_NOISE: f64 = 1.0;
 
-/// What each place of the picture shows while no marker is there, on one octave.
+/// The still background of each place of the picture while no marker is there, on one octave.
 pub struct Backdrop {
     planes: Planes,
     /// Standard deviation of each plane from picture to picture, grey levels.

@@ -49,7 +49,7 @@ const RADIUS_AROUND: usize = 10;
 /// What the filter's answer alone leaves open of a centre, in radii.
 const COARSE_DOUBT_RADII: f64 = 0.3;
 
-/// What refining a track's places gave.
+/// The refined centres of a track.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Centres {
     /// Radius of the marker, px.
@@ -71,7 +71,7 @@ struct Found {
     circle: Option<Circle>,
 }
 
-/// How the markers of one track are looked at closely.
+/// The close look at the markers of one track.
 struct Look<'a> {
     film: &'a dyn Film,
     model: Model,

@@ -52,7 +52,7 @@ const STRONGEST: usize = 9;
 /// Two tracks this near to each other, in radii, are one marker.
 const SAME_RADII: f64 = 1.2;
 
-/// What moves in a recording.
+/// The tracks of a recording, and the one that is likeliest meant.
 #[derive(Debug, Clone, Default)]
 pub struct Survey {
     /// All that moves smoothly, the likeliest markers first.
@@ -210,7 +210,8 @@ fn run(film: &dyn Film, model: Model, pictures: Vec<Vec<Spot>>, width: f64) -> R
     Ok(Run { model, pictures, group, others, purity, compact, score: score * (0.2 + 0.8 * compact) })
 }
 
-/// What moves in a recording, with what is likeliest meant. Places are those of the filter alone; [`super::finish`] refines them.
+/// The tracks of a recording, with those that are likeliest meant. Places are those of the filter alone; [`super::finish`]
+/// refines them.
 ///
 /// # Errors
 /// Those of the film; [`crate::error::Error::Interrupted`] once the work is to stop.
@@ -370,7 +371,7 @@ fn join_by_look(tracks: &mut Vec<Track>, radius_px: f64) {
     }
 }
 
-/// What stands out most in the picture in which most does, strongest first: for recordings in which nothing moves smoothly.
+/// The strongest spots of the picture in which most stands out, strongest first: for recordings in which nothing moves smoothly.
 ///
 /// # Errors
 /// Those of the film; [`crate::error::Error::Interrupted`] once the work is to stop.

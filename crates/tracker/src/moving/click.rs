@@ -56,7 +56,7 @@ pub struct Click {
     pub y: f64,
 }
 
-/// Why nothing is followed from a place that was pointed at.
+/// The reason for which nothing is followed from a place that was pointed at.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Missed {
     /// Nothing stands out there.
@@ -98,7 +98,7 @@ impl Choice {
     }
 }
 
-/// What a marker is worth, with it; or why it does not hold.
+/// The worth of a marker, with the marker; or the reason for which it does not hold.
 type Judged = Result<(f64, Marker), Missed>;
 
 /// Ways of looking in which something stands out at a place, the best first.

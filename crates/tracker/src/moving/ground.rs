@@ -69,7 +69,7 @@ impl Ground {
         }
     }
 
-    /// What stands out now and is new, in units of the noise: for bright markers (`sign` 1) or dark ones (-1).
+    /// The response that is new against the ground, in units of the noise: for bright markers (`sign` 1) or dark ones (-1).
     pub fn standing_out(&self, response: &[f32], sign: f32) -> Vec<f32> {
         let ground = if sign > 0.0 { &self.low } else { &self.high };
         response
@@ -80,7 +80,7 @@ impl Ground {
             .collect()
     }
 
-    /// What stands out now from what is around it, new or not, in units of the noise.
+    /// The response against its surroundings, new or not, in units of the noise.
     pub fn against_noise(&self, response: &[f32], sign: f32) -> Vec<f32> {
         response.iter().zip(&self.inverse_noise).map(|(&l, &i)| sign * l * i).collect()
     }

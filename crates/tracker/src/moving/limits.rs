@@ -1,4 +1,4 @@
-//! What a user said of where markers are and how they look.
+//! The user's limits of where markers are and how they look.
 //!
 //! Owns: [`Limits`]. Must not: find anything.
 
@@ -6,7 +6,7 @@ use super::picture::Picture;
 use super::spot::Spot;
 use crate::rig::Region;
 
-/// What spots must be. The default lets all pass.
+/// The limits of spots. By default all pass.
 #[derive(Debug, Clone, Default)]
 pub struct Limits {
     /// Where they may be, px of the recording.

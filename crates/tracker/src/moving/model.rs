@@ -2,7 +2,7 @@
 
 use super::response::Direction;
 
-/// How a marker is looked at: colour direction, bright (1) or dark (-1), octave.
+/// The look of a marker: colour direction, bright (1) or dark (-1), octave.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Model {
     /// Colour direction.

@@ -15,7 +15,7 @@ use crate::error::Result;
 /// A recording of fewer pictures has no tracklet that can be judged.
 const LEAST_PICTURES: usize = 6;
 
-/// What a spot must stand out from.
+/// The reference from which a spot must stand out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Against {
     /// From what is around it and from what was at its place before.

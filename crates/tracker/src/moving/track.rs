@@ -180,8 +180,8 @@ fn jumps(s: &[Spot], limit_px: f64) -> bool {
     size / 2.0 > limit_px && back(a) > BACK_PART && back(c) > BACK_PART
 }
 
-/// How far a place is from the path that most of the places around it lie on, px: where every other place lies aside, the fewer
-/// are wrong.
+/// The distance of a place from the path on which most of the places around it lie, px: where every other place lies aside, the
+/// fewer are wrong.
 fn off_path_px(s: &[Spot], i: usize) -> f64 {
     let window = i.saturating_sub(PATH_PLACES)..(i + PATH_PLACES + 1).min(s.len());
     let all: Vec<(f64, &Spot)> = window.map(|k| (k as f64 - i as f64, &s[k])).collect();

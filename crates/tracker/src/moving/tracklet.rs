@@ -4,7 +4,7 @@
 
 use super::spot::Spot;
 
-/// Why a tracklet ended.
+/// The reason for which a tracklet ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum End {
     /// The recording, or the stretch of it, ended.
@@ -74,8 +74,8 @@ impl Tracklet {
         }
     }
 
-    /// Where it is expected in the next picture: a line through two, half line half parabola through three, the
-    /// least-squares parabola through the last four or five.
+    /// The place at which the tracklet is expected in the next picture: a line through two, half line half parabola through
+    /// three, the least-squares parabola through the last four or five.
     fn expected(&self) -> [f64; 2] {
         let n = self.spots.len().min(MEMORY);
         let weights: &[f64] = match n {

@@ -157,7 +157,7 @@ impl<'a> WorkFilm<'a> {
         &self.stamps
     }
 
-    /// How the recording ended.
+    /// The end of the recording.
     pub fn ending(&self) -> &Ending {
         &self.ending
     }

@@ -38,7 +38,7 @@ pub(super) enum Outcome {
     Unclear(Unclear),
 }
 
-/// Why nothing is named.
+/// The reason for which nothing is named.
 #[derive(Debug, Clone)]
 pub(super) struct Unclear {
     /// A clause.
@@ -170,7 +170,7 @@ pub(super) fn run(settings: &RunSettings, observer: &mut dyn Observer) -> Result
     }
 }
 
-/// What was said of where markers are and how they look.
+/// The limits by the settings of where markers are and how they look.
 fn limits(settings: &RunSettings, info: &SourceInfo, shrink: usize) -> Limits {
     let of_rig = settings.rig.as_ref().and_then(|r| r.region.clone());
     Limits {
@@ -236,7 +236,7 @@ fn follow(film: &WorkFilm, limits: &Limits, wanted: &Wanted, rig: Option<&Rig>) 
     Ok(found)
 }
 
-/// What is likeliest meant, or was named by its number.
+/// The tracks that are likeliest meant, or were named by their numbers.
 fn surveyed(film: &WorkFilm, search: &Search, wanted: &Wanted) -> Result<Found> {
     let Survey { markers, answers, confidence, is_sole } = survey(search)?;
     let is_clear = answers > 0 && (confidence >= LEAST_CONFIDENCE || is_sole);
@@ -317,7 +317,7 @@ fn point_at(candidates: &Candidates) -> Message {
     }
 }
 
-/// Why what moves is not named.
+/// The reason for which what moves is not named.
 fn unclear(
     film: &WorkFilm,
     markers: &[Marker],
@@ -338,7 +338,7 @@ fn unclear(
     Unclear::new(why, point_at(candidates))
 }
 
-/// What was pointed at.
+/// The tracks through the places that were pointed at.
 fn pointed(film: &WorkFilm, search: &Search, places: &[Pointed]) -> Result<Found> {
     let first = film.stamps().first().map_or(0, |s| s.index);
     let clicks = places

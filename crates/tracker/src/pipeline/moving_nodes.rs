@@ -29,7 +29,7 @@ const TELL_SIGMA_RADII: f64 = 0.1;
 /// Below this confidence what is followed is named, and whether it is what is meant is doubtful.
 const SURE_CONFIDENCE: f64 = 0.3;
 
-/// How what is followed was chosen.
+/// The way in which what is followed was chosen.
 pub(super) enum Chosen {
     /// It is likeliest meant, with this confidence; so many other things move.
     Likeliest { confidence: f64, others: usize },
@@ -39,7 +39,7 @@ pub(super) enum Chosen {
     Numbered,
 }
 
-/// What was followed, in the recording's own pixels and frames.
+/// The nodes that were followed, in the recording's own pixels and frames.
 pub(super) struct Moving {
     /// A name for each column.
     names: Vec<String>,
@@ -363,7 +363,7 @@ impl Moving {
         all
     }
 
-    /// How it was found, in words.
+    /// The notes on how the nodes were found.
     fn notes(&self) -> Vec<Message> {
         let count = self.markers.len();
         let markers = if count == 1 { "marker" } else { "markers" };
