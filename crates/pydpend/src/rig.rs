@@ -62,7 +62,7 @@ pub fn plane_places<'py>(
     Ok(out.to_pyarray(py))
 }
 
-/// What the places (n, 2) in the plane of a rig's bodies change by with the camera's five numbers, px, (n, 2, 5).
+/// The derivatives of places (n, 2) in the plane of a rig's bodies by the camera's five numbers, px, (n, 2, 5).
 #[pyfunction]
 pub fn plane_slopes<'py>(
     py: Python<'py>,

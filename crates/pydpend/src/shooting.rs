@@ -26,7 +26,7 @@ struct Angles {
     camera: Option<(Vec<[[f64; CAMERA_NUMBERS]; 2]>, usize)>,
 }
 
-/// What a camera does to the angles, (T, L, 5), and which camera it is.
+/// The derivatives of the angles by a camera's numbers, (T, L, 5), and the camera's index.
 type CameraIn<'py> = (PyReadonlyArray3<'py, f64>, usize);
 
 type AnglesIn<'py> = (PyReadonlyArray1<'py, f64>, PyReadonlyArray2<'py, f64>, PyReadonlyArray2<'py, f64>);
@@ -272,7 +272,7 @@ impl ShootingFit {
     }
 }
 
-/// Where a fit starts besides the model and the segments: the attributes of `pydpend.damping.shooting.Start`.
+/// The start of a fit besides the model and the segments: the attributes of `pydpend.damping.shooting.Start`.
 #[derive(FromPyObject)]
 pub struct Start {
     zeros_rad: Vec<[f64; 2]>,

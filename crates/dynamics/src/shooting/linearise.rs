@@ -35,7 +35,7 @@ impl Point {
     }
 }
 
-/// What the camera adds to an angle.
+/// The camera's part of an angle.
 #[inline]
 fn added(slopes: &[f64; CAMERA_NUMBERS], numbers: &[f64; CAMERA_NUMBERS]) -> f64 {
     slopes.iter().zip(numbers).map(|(s, n)| s * n).sum()

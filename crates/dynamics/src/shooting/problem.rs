@@ -5,7 +5,7 @@ use crate::parameters::Field;
 /// Numbers of a camera that angles depend on.
 pub const CAMERA_NUMBERS: usize = 5;
 
-/// What a camera that is not known exactly does to a recording's angles.
+/// The part of a recording's angles that a camera adds which is not known exactly.
 #[derive(Clone, Copy, Debug)]
 pub struct CameraPart<'a> {
     /// What each sample's angles change by with the camera's numbers, each in units of its prior standard deviation, rad:
@@ -38,7 +38,7 @@ impl Recording<'_> {
         self.phi_rad[j][i].is_finite() && self.sigma_rad[j][i] > 0.0
     }
 
-    /// What the camera's numbers do to link `j` in sample `i`.
+    /// The derivatives of the angle of link `j` in sample `i` by the camera's numbers.
     #[must_use]
     pub fn camera_slopes(&self, i: usize, j: usize) -> [f64; CAMERA_NUMBERS] {
         self.camera.map_or([0.0; CAMERA_NUMBERS], |c| c.slopes_rad[i][j])

@@ -69,7 +69,7 @@ pub enum Missed {
     Restless(Model, usize),
 }
 
-/// Why what was pointed at is followed neither as a spot nor by its picture.
+/// The reasons for which a place that was pointed at is followed neither as a spot nor by its picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Unheld {
     /// Why not as a spot.
@@ -236,7 +236,7 @@ fn nearness(off_px: f64, radius_px: f64) -> f64 {
     (-(off_px / (OFF_RADII * radius_px + OFF_PX)).powi(2)).exp()
 }
 
-/// What was pointed at, followed by its picture.
+/// The marker at the place that was pointed at, followed by its picture.
 fn by_picture(film: &dyn Film, still: &Still, click: &Click) -> Result<Result<Marker, Lost>> {
     Ok(follow_picture(film, still, click.picture, [click.x, click.y])?.map(|(spots, radius_px)| Marker {
         track: Track::of(Tracklet::runs(&spots), radius_px),

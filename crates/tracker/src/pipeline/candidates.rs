@@ -68,7 +68,7 @@ pub(super) fn look(model: &Model, radius_px: f64, scale: f64) -> String {
     format!("{sign}, {:.0} px across", 2.0 * radius_px * scale)
 }
 
-/// How a marker looks, or that it is followed by its picture, in words.
+/// The look of a marker, or that it is followed by its picture, in words.
 pub(super) fn words(marker: &Marker, scale: f64) -> String {
     match &marker.model {
         Some(model) => look(model, marker.radius_px, scale),

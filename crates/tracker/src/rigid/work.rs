@@ -45,7 +45,7 @@ impl Work {
         self.floor.store(left.saturating_sub(MOST_OF_FRAME), Ordering::Relaxed);
     }
 
-    /// What is left.
+    /// The work that is left.
     pub fn left(&self) -> u64 {
         self.left.load(Ordering::Relaxed)
     }

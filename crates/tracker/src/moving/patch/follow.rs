@@ -50,7 +50,7 @@ const YOUNG: usize = 3;
 /// In fewer pictures nothing is followed.
 const LEAST_PICTURES: usize = 5;
 
-/// Why nothing is followed.
+/// The reason for which nothing is followed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Lost {
     /// What is there stands still all through the recording.
@@ -61,7 +61,7 @@ pub enum Lost {
     Soon(usize),
 }
 
-/// What the thing looked like in one picture.
+/// The look of the thing in one picture.
 struct Look {
     template: Template,
     /// The thing's pose there, in terms of the first picture.
@@ -280,7 +280,7 @@ impl<'a> Follower<'a> {
         (steady * (first + GATE_GROWTH * missed as f64)).min(MOST_GATE_PX)
     }
 
-    /// Where it is expected in a picture: on a line through its last two places, or half a parabola through three.
+    /// The pose that is expected in a picture: on a line through its last two places, or half a parabola through three.
     fn expected(&self, picture: usize) -> Pose {
         let n = self.past.len();
         let (at, last) = self.past[n - 1];

@@ -1,4 +1,4 @@
-//! What stands still: pictures from all over the recording, by which a thing is told from the wall behind it.
+//! The still background: pictures from all over the recording, by which a thing is told from the wall behind it.
 //!
 //! Owns: [`Still`], [`Cover`]. Must not: know how a thing moves.
 
@@ -46,7 +46,7 @@ pub struct Still {
     pub noise: f64,
 }
 
-/// Which pixels about a place a thing covers.
+/// The pixels about a place that a thing covers.
 pub struct Cover {
     at: [f64; 2],
     middle: [i64; 2],

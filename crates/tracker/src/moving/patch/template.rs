@@ -1,4 +1,4 @@
-//! What a thing looks like: values of its pixels, and how they change as it moves.
+//! The template of a thing: values of its pixels, and how they change as it moves.
 //!
 //! Owns: [`Pose`], [`Template`]. Must not: search.
 //!
@@ -24,7 +24,7 @@ pub const FREE: usize = 4;
 pub type Square = SMatrix<f64, FREE, FREE>;
 pub type Line = SVector<f64, FREE>;
 
-/// Where, how turned and how large a template is seen.
+/// The place, turn and size at which a template is seen.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pose {
     /// The place that was pointed at, px.
@@ -38,7 +38,7 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// Where a point of the template is, px.
+    /// The place of a point of the template, px.
     pub fn place(&self, [u, v]: [f64; 2]) -> [f64; 2] {
         let [c, s] = self.columns();
         [self.x + c * u - s * v, self.y + s * u + c * v]
@@ -66,13 +66,13 @@ impl Pose {
         [(c * dx + s * dy) / square, (c * dy - s * dx) / square]
     }
 
-    /// How far the place is from another one's, px.
+    /// The distance of the place from another pose's, px.
     pub fn off(&self, other: &Self) -> f64 {
         (self.x - other.x).hypot(self.y - other.y)
     }
 }
 
-/// What a thing looks like in one picture.
+/// The template of a thing in one picture.
 #[derive(Clone)]
 pub struct Template {
     /// Its pixels, px from the place that was pointed at.
