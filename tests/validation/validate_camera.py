@@ -112,7 +112,7 @@ def show_damping(method: str, count: int) -> None:
             held[name].append(scores(fit))
             wide[name].append(np.array([e.sigma for e in fit.coefficients.values()]))
             if name == "with":
-                parts.append([fit.camera_sigma[n] / e.sigma for n, e in fit.coefficients.items()])
+                parts.append([fit.camera_sigma.get(n, 0.0) / e.sigma for n, e in fit.coefficients.items()])
             words = ", ".join(f"{n} {z:+.2f}" for n, z in zip(fit.coefficients, held[name][-1], strict=True))
             print(f"{seed} {name} camera: {fit.status}, chi2 {fit.chi2:.3f}; {words}", flush=True)
     for name, found in held.items():
