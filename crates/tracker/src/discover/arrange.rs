@@ -329,3 +329,26 @@ fn longest(link: &Link) -> Vector2<f64> {
     }
     if best.y < 0.0 { -best } else { best }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::discover::bodies::link_of;
+
+    /// A grid of 4 x 4 marks over 300 px, with a pose for each angle and shift.
+    fn grid(poses: impl Iterator<Item = (f64, f64)>) -> Found {
+        let points = (0..16).map(|k| Vector2::new(f64::from(k % 4) * 100.0, f64::from(k / 4) * 100.0));
+        let poses = poses.map(|(angle, x)| Some(Isometry2::new(Vector2::new(300.0 + x, 200.0), angle)));
+        Found { link: link_of(points.collect(), 0.1), poses: poses.collect() }
+    }
+
+    #[test]
+    fn a_background_neither_turns_nor_goes_far_and_a_link_or_a_cart_does() {
+        let wave = |size: f64| (0..50).map(move |k| size * (0.3 * f64::from(k)).sin());
+        assert!(grid(wave(7.0).map(|x| (0.001 * x, x))).is_background(480.0));
+        // A link of as many markers, a cart, and a body that is small in its picture.
+        assert!(!grid(wave(0.3).map(|a| (a, 0.0))).is_background(480.0));
+        assert!(!grid(wave(60.0).map(|x| (0.0, x))).is_background(480.0));
+        assert!(!grid(wave(7.0).map(|x| (0.0, x))).is_background(1080.0));
+    }
+}

@@ -44,8 +44,10 @@ const CIRCLE_DOUBT: f64 = 0.25;
 /// Region and circle agree where their centres are nearer to each other than this, in radii: from there on it is said of a
 /// centre that it is doubtful.
 const DIFFER_RADII: f64 = 0.1;
-/// Places before and after one whose circles tell its radius.
-const RADIUS_AROUND: usize = 10;
+/// Places before and after one whose circles tell its radius and about where it is.
+const PLACES_AROUND: usize = 10;
+/// A circle so many radii from where those around are is of another arc of the outline.
+const OTHER_CIRCLE_RADII: f64 = 0.15;
 /// What the filter's answer alone leaves open of a centre, in radii.
 const COARSE_DOUBT_RADII: f64 = 0.3;
 
@@ -208,7 +210,7 @@ pub fn refine(
 
 /// From each region to the middle of its outline's circle, px of the octave; 0 where they agree or most have none. Where they do not
 /// agree, the marker is a disc of which something covers a part: a net, a stripe, a highlight, fingers. Its radius is the usual one
-/// of the pictures around, and a picture that shows no circle has the usual offset.
+/// of the pictures around, and a picture that shows no circle, or another one, has their usual offset.
 fn to_circles(results: &[Option<Found>], radius: f64) -> Vec<[f64; 2]> {
     let circles: Vec<Option<Circle>> = results.iter().map(|f| f.as_ref().and_then(|f| f.circle)).collect();
     let all: Vec<Circle> = circles.iter().flatten().copied().collect();
@@ -217,16 +219,28 @@ fn to_circles(results: &[Option<Found>], radius: f64) -> Vec<[f64; 2]> {
     if !most || median(&mut apart) <= DIFFER_RADII * radius {
         return vec![[0.0; 2]; results.len()];
     }
-    let usual = [0, 1].map(|k| median(&mut all.iter().map(|c| c.middle[k]).collect::<Vec<_>>()));
+    let usual = middle_of(&all.iter().map(|c| c.middle).collect::<Vec<_>>());
+    let around = |i: usize| i.saturating_sub(PLACES_AROUND)..(i + PLACES_AROUND + 1).min(results.len());
+    let found: Vec<Option<[f64; 2]>> = (0..results.len())
+        .map(|i| {
+            let mut radii: Vec<f64> = circles[around(i)].iter().flatten().map(|c| c.radius).collect();
+            let known = median(&mut radii);
+            results[i].as_ref().and_then(|f| circle_of_radius(&f.outline, known)).map(|c| c.middle)
+        })
+        .collect();
     (0..results.len())
         .map(|i| {
-            let around = i.saturating_sub(RADIUS_AROUND)..(i + RADIUS_AROUND + 1).min(results.len());
-            let mut radii: Vec<f64> = circles[around].iter().flatten().map(|c| c.radius).collect();
-            let known = median(&mut radii);
-            let circle = results[i].as_ref().and_then(|f| circle_of_radius(&f.outline, known));
-            circle.map_or(usual, |c| c.middle)
+            let near: Vec<[f64; 2]> = found[around(i)].iter().flatten().copied().collect();
+            let there = if near.is_empty() { usual } else { middle_of(&near) };
+            let is_other =
+                |o: &[f64; 2]| (o[0] - there[0]).hypot(o[1] - there[1]) > OTHER_CIRCLE_RADII * radius;
+            found[i].filter(|o| !is_other(o)).unwrap_or(there)
         })
         .collect()
+}
+
+fn middle_of(places: &[[f64; 2]]) -> [f64; 2] {
+    [0, 1].map(|k| median(&mut places.iter().map(|p| p[k]).collect::<Vec<_>>()))
 }
 
 type Place = (usize, usize);

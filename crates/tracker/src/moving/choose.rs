@@ -418,3 +418,39 @@ fn heaviest_group(all: Vec<Track>) -> (Vec<Track>, Vec<Track>) {
     };
     all.into_iter().partition(|t| alike(&t.look, &seed, LOOK))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::tracklet::Tracklet;
+    use super::*;
+
+    /// A stretch of a marker of a peak and an area that goes to and fro.
+    fn stretch(pictures: std::ops::Range<usize>, peak: f64, area: f64) -> Track {
+        let spot = |k: usize| {
+            let x = 100.0 + 40.0 * (0.2 * k as f64).sin();
+            let (y, elongation, direction) = (80.0, 1.0, 0.0);
+            let (length, snr, doubt_px) = (8.0, 30.0, 0.0);
+            (k, Spot { x, y, peak, area, elongation, direction, length, snr, doubt_px })
+        };
+        Track::of(Tracklet::runs(&pictures.map(spot).collect::<Vec<_>>()), 8.0)
+    }
+
+    fn joined(mut tracks: Vec<Track>) -> Vec<usize> {
+        join_by_look(&mut tracks, 8.0);
+        let mut counts: Vec<usize> = tracks.iter().map(|t| t.count).collect();
+        counts.sort_unstable();
+        counts
+    }
+
+    #[test]
+    fn stretches_are_joined_by_their_area_though_their_contrast_changes() {
+        // The first and the last are the smaller one of two that are seen meanwhile.
+        let small = |p: std::ops::Range<usize>, peak: f64| stretch(p, peak, 600.0);
+        let three = vec![small(0..50, 42.0), small(60..200, 51.0), small(230..300, 38.0)];
+        let other = stretch(70..190, 35.0, 900.0);
+        assert_eq!(joined([three.clone(), vec![other]].concat()), [120, 260]);
+        // Of two that are alike nothing tells which it is.
+        let twin = small(70..190, 47.0);
+        assert_eq!(joined([three, vec![twin]].concat()), [50, 70, 120, 140]);
+    }
+}

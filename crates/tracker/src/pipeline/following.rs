@@ -183,7 +183,7 @@ impl Run<'_> {
                     ),
             ));
         }
-        let doubtful: Vec<String> = sizes.uneven().map(|k| nodes[k].node.clone()).collect();
+        let mut doubtful: Vec<String> = sizes.uneven().map(|k| nodes[k].node.clone()).collect();
         if !doubtful.is_empty()
             && doubtful.len() == nodes.len()
             && self.settings.rig.is_none()
@@ -206,6 +206,22 @@ impl Run<'_> {
                 "{} changes size by more than a factor {MOST_SIZES}, as no disc does: an arm, a hand or several things may be taken \
                  for a marker", doubtful.join(", ")
             ).into());
+        }
+        // Where the rig or the look of markers was given, it is known what is seldom seen.
+        if self.settings.rig.is_none() && moving::applies(self.settings) {
+            for node in nodes.iter().filter(|n| moving::is_seldom(n)) {
+                let rows = (node.seen + node.missing + node.ambiguous).max(1);
+                let part = 100.0 * node.seen as f64 / rows as f64;
+                self.warnings.push(
+                    Message::from(format!(
+                        "{} is seen in {part:.0} % of the frames. If it is there in more of them, point at it with ",
+                        node.node
+                    )) + Setting::Marker,
+                );
+                if !doubtful.contains(&node.node) {
+                    doubtful.push(node.node.clone());
+                }
+            }
         }
         Ok(doubtful)
     }

@@ -116,15 +116,17 @@ pub(super) fn check(settings: &RunSettings) -> Result<()> {
 pub(super) fn is_wanted(markers: &Result<RunSummary>) -> bool {
     match markers {
         Ok(summary) => {
-            let seldom = |n: &NodeSummary| {
-                let rows = n.seen + n.missing + n.ambiguous;
-                rows == 0 || (n.seen as f64) < LEAST_SEEN * rows as f64
-            };
-            let doubtful = |n: &NodeSummary| seldom(n) || summary.doubtful.contains(&n.node);
+            let doubtful = |n: &NodeSummary| is_seldom(n) || summary.doubtful.contains(&n.node);
             summary.meta.ending != RunEnding::Interrupted && summary.nodes.iter().all(doubtful)
         }
         Err(error) => matches!(error, Error::Detect(_) | Error::Rig(_)),
     }
+}
+
+/// Whether a node is seen in so few of the decoded frames that it may be no marker, or not all of one.
+pub(super) fn is_seldom(n: &NodeSummary) -> bool {
+    let rows = n.seen + n.missing + n.ambiguous;
+    rows == 0 || (n.seen as f64) < LEAST_SEEN * rows as f64
 }
 
 /// Follows what moves in a recording and writes the table, if it is clear what is meant. The observer is told what else was
