@@ -137,7 +137,7 @@ fn kind_of_text(path: &Path, bytes: &[u8]) -> Kind {
 fn kind_of_json(text: &str) -> Kind {
     // The beginning of a long file is not whole JSON: the keys at its outermost level are looked for by name.
     let has = |key: &str| text.contains(&format!("\"{key}\":"));
-    if has("slope_v_per_rad") {
+    if has("slope_v_per_rad") && has("offset_v") && has("holds") {
         Kind::Calibration
     } else if has("coefficients") && has("method") {
         Kind::Fit

@@ -9,7 +9,8 @@ use super::kinds::Kind;
 use super::next_step::part_of;
 use crate::error::{Error, Fault, FaultKind, Result};
 
-/// The fault of a file that is of none of the kinds that are wanted; `None` if it is of one, or if nobody can tell.
+/// The fault of a file that is of none of the kinds that are wanted, a command where there are none; `None` if it is of one, or if
+/// nobody can tell.
 pub fn misplaced(path: &Path, wanted: &[Kind]) -> Option<Fault> {
     let kind = kind_of(path);
     if kind == Kind::Unknown || wanted.contains(&kind) {
@@ -17,9 +18,11 @@ pub fn misplaced(path: &Path, wanted: &[Kind]) -> Option<Fault> {
     }
     // Pictures are as good as a film, and need no mention.
     let nouns: Vec<&str> = wanted.iter().filter(|k| **k != Kind::Pictures).map(|k| k.noun()).collect();
-    let (last, before) = nouns.split_last()?;
-    let expected =
-        if before.is_empty() { (*last).to_owned() } else { format!("{} or {last}", before.join(", ")) };
+    let expected = match &nouns[..] {
+        [] => "a command".to_owned(),
+        [only] => (*only).to_owned(),
+        [before @ .., last] => format!("{} or {last}", before.join(", ")),
+    };
     let fault = Fault::new(path.display(), format!("it is {}, not {expected}", kind.noun()))
         .of_kind(FaultKind::Unsupported);
     let inside = if kind == Kind::RunFolder { wanted.iter().find_map(|w| part_of(path, *w)) } else { None };

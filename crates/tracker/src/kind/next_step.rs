@@ -38,6 +38,16 @@ impl Kind {
                 };
                 Some(self.next(path) + ", then " + Message::from(then) + ", and give what that makes")
             }
+            // No film leads to a calibration.
+            Self::Film | Self::Pictures | Self::NodeTable | Self::Truth | Self::Angles
+                if wanted.contains(&Self::Tables) =>
+            {
+                let holds = step(
+                    "pydpend calibrate HOLDS -o encoder.json".to_owned(),
+                    "dp.calibrate(dp.read_holds(paths))".to_owned(),
+                );
+                holds.map(|next| next + ", with recordings of the encoder held still at known angles")
+            }
             Self::Encoder if wanted.contains(&Self::Calibration) => step(
                 format!("pydpend calibrate {file} -o encoder.json"),
                 format!("dp.calibrate(dp.read_holds([{name:?}]))"),

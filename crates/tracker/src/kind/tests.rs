@@ -23,7 +23,7 @@ fn a_file_is_known_by_what_is_in_it_and_not_by_its_name() {
         ("j.toml", b"frames = 4\n[camera]\ndepth_bits = 8\n", Kind::Scene),
         ("j.toml", b"[[marker]]\nradius_px = 3\n", Kind::Scene),
         ("j.toml", b"inputs = []\nmarker = ['3,4@5']\n", Kind::Config),
-        ("k.json", b"{\"schema\": 1, \"slope_v_per_rad\": 0.1}", Kind::Calibration),
+        ("k.json", b"{\"slope_v_per_rad\": 0.1, \"offset_v\": 0, \"holds\": []}", Kind::Calibration),
         ("l.xlsx", &zip("[Content_Types].xml"), Kind::Spreadsheet),
         ("l.npz", &zip("phi.npy"), Kind::NumpyArchive),
         ("l.zip", &zip("arrays/phi.npy"), Kind::NumpyArchive),

@@ -275,3 +275,67 @@ fn several_sequences_in_a_folder_or_several_pictures_in_a_file_are_refused() {
     let frames = read_all(&mut *open(path.to_str().unwrap(), &with_fps(100.0)).unwrap());
     assert_eq!((frames.len(), samples(&frames[0]).unwrap()[0]), (1, 77));
 }
+
+#[test]
+fn pictures_of_which_no_size_is_that_of_most_are_refused_by_name() {
+    if !have_ffmpeg() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    encode(folder.path(), "f%03d.png", 4, &["-start_number", "0"]);
+    encode(folder.path(), "f%03d.png", 4, &["-start_number", "4", "-vf", "scale=64:48"]);
+    let refused = open(folder.path().to_str().unwrap(), &with_fps(250.0)).err().unwrap().to_string();
+    let words = "its pictures are of several sizes, none of which most have: 196 x 116 px as f000.png, f001.png, ...; \
+                 64 x 48 px as f004.png, f005.png, ...";
+    assert!(refused.contains(words) && refused.contains("as a pattern"), "{refused}");
+    // One more, and it is the size of most.
+    encode(folder.path(), "f%03d.png", 1, &["-start_number", "8"]);
+    assert_eq!(read_all(&mut *open(folder.path().to_str().unwrap(), &with_fps(250.0)).unwrap()).len(), 9);
+}
+
+#[test]
+fn jpeg_pictures_of_every_kind_are_read_and_damage_to_their_data_is_told() {
+    if !have_ffmpeg() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let mut files: Vec<Vec<u8>> = Vec::new();
+    for format in ["yuvj420p", "yuvj422p", "yuvj440p", "yuvj444p", "gray"] {
+        for codes in ["default", "optimal"] {
+            let options = ["-pix_fmt", format, "-huffman", codes, "-frames:v", "1", "-q:v", "2"];
+            files.push(std::fs::read(encode(folder.path(), "one.jpg", 1, &options)).unwrap());
+        }
+    }
+    let pixels = picture(0);
+    let mat = opencv::core::Mat::from_slice(&pixels).unwrap();
+    let mat = opencv::prelude::MatTraitConst::reshape(&mat, 1, HEIGHT as i32).unwrap();
+    // Parts of 7 blocks, optimal codes, several scans.
+    for (option, value) in [(opencv::imgcodecs::IMWRITE_JPEG_RST_INTERVAL, 7), (3, 1), (2, 1)] {
+        let mut bytes = opencv::core::Vector::<u8>::new();
+        let options = opencv::core::Vector::<i32>::from_slice(&[option, value]);
+        assert!(opencv::imgcodecs::imencode(".jpg", &mat, &mut bytes, &options).unwrap());
+        files.push(bytes.iter().collect());
+    }
+    let path = folder.path().join("seen/f000.jpg");
+    std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+    let is_read = |bytes: &[u8]| {
+        std::fs::write(&path, bytes).unwrap();
+        let mut source = open(path.parent().unwrap().to_str().unwrap(), &with_fps(250.0));
+        source.as_mut().is_ok_and(|s| read_all(&mut **s).iter().all(|f| f.plane.is_some()))
+    };
+    for (i, whole) in files.iter().enumerate() {
+        assert!(is_read(whole), "file {i}");
+        let is_progressive = i + 1 == files.len();
+        for (from, to) in [(2, 3), (1, 2), (1, 3)] {
+            let n = whole.len();
+            let mut bytes = whole.clone();
+            // Up to the end, and inside, with the marker of the end kept.
+            bytes[n * from / 4..(n * to / 4).min(n - 2)].fill(0);
+            assert!(is_progressive || !is_read(&bytes), "file {i}: zeros from {from} to {to} quarters");
+        }
+        // The same picture, filled up with ones as far as a camera may.
+        let mut bytes = whole.clone();
+        bytes.splice(whole.len() - 2..whole.len() - 2, [0xff; 5]);
+        assert!(is_read(&bytes), "file {i}: fill bytes");
+    }
+}

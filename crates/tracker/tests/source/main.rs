@@ -5,6 +5,7 @@ mod film;
 
 mod aspect;
 mod cine;
+mod codecs;
 mod coded_damage;
 mod cut;
 mod cut_out;

@@ -294,9 +294,13 @@ fn a_film_s_picture_that_is_to_be_turned_otherwise_is_not_believed() {
     let untagged = coded(".jpg");
     let pictures = [jpeg(6, false), untagged, jpeg(8, false), jpeg(6, true)];
     let path = film_of(folder.path(), "jpg", "a.avi", &pictures);
-    let frames = read_all(&mut *source(&path));
+    let mut film = source(&path);
+    let frames = read_all(&mut *film);
     let whole: Vec<bool> = frames.iter().map(|f| f.plane.is_some()).collect();
     assert_eq!(whole, [true, true, false, true]);
+    let reasons: Vec<(u64, String)> = film.reasons().into_iter().map(|r| (r.frame, r.words)).collect();
+    let words = "it is to be turned otherwise than the first: 90 degrees counter-clockwise, that 90 degrees clockwise";
+    assert_eq!(reasons, [(2, words.to_owned())]);
 }
 
 #[test]

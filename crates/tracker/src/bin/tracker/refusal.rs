@@ -2,11 +2,15 @@
 
 use std::error::Error;
 use std::num::{IntErrorKind, ParseFloatError, ParseIntError};
+use std::path::Path;
 
 use clap::CommandFactory;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 
+use tracker::kind::misplaced;
+
 use crate::args::Cli;
+use crate::words::CommandLine;
 
 /// Commands of the other program, and American spellings of them.
 const PYDPEND: [(&str, &str); 11] = [
@@ -82,6 +86,9 @@ fn unknown_option(option: &str, near: &[String]) -> String {
 }
 
 fn unknown_command(word: &str, near: &[String]) -> String {
+    if let Some(fault) = misplaced(Path::new(word), &[]) {
+        return CommandLine::new(Cli::command(), "track").say(&fault.message());
+    }
     if let Some((_, command)) = PYDPEND.iter().find(|(known, _)| *known == word.to_lowercase()) {
         return format!("{word:?} is not a command of tracker but of pydpend. Type `pydpend {command}`");
     }

@@ -22,6 +22,16 @@ const STRICT: [ffi::AVCodecID; 5] = [
     ffi::AVCodecID::AV_CODEC_ID_GIF,
 ];
 
+/// Codecs whose decoder bends coefficients beyond a block's end back into it, unless it is told that bits matter: then it fills
+/// in the block, which [`Watch`] hears. What Microsoft's own encoder writes there is not doubted.
+const BENT: [ffi::AVCodecID; 5] = [
+    ffi::AVCodecID::AV_CODEC_ID_MSMPEG4V1,
+    ffi::AVCodecID::AV_CODEC_ID_MSMPEG4V2,
+    ffi::AVCodecID::AV_CODEC_ID_MSMPEG4V3,
+    ffi::AVCodecID::AV_CODEC_ID_WMV1,
+    ffi::AVCodecID::AV_CODEC_ID_WMV2,
+];
+
 /// An open decoder of one stream.
 pub(super) struct Decoder {
     context: *mut ffi::AVCodecContext,
@@ -73,6 +83,9 @@ impl Decoder {
             // picture that it is damaged, and stop at trifles if they are told so.
             if STRICT.contains(&parameters.codec_id) {
                 (*context).err_recognition |= ffi::AV_EF_EXPLODE | ffi::AV_EF_CRCCHECK;
+            }
+            if BENT.contains(&parameters.codec_id) {
+                (*context).err_recognition |= ffi::AV_EF_BITSTREAM;
             }
             // Cropping is exact to the pixel only with unaligned planes; we read bytes, so any place will do.
             (*context).flags |= ffi::AV_CODEC_FLAG_UNALIGNED as i32;

@@ -11,6 +11,7 @@ use super::decode::{Decoder, Received};
 use super::demux::{Demuxer, Packet, Read};
 use super::fields::{FieldOrder, Fields};
 use super::frame_numbers::FrameNumbers;
+use super::inside::Inside;
 use super::slice_sums::SliceSums;
 use super::slots::Slots;
 use super::structure::{Fit, Structure};
@@ -51,6 +52,8 @@ pub(super) struct Given {
     pub goes_on: bool,
     /// It is itself damaged, as far as the file around it tells.
     pub is_damaged: bool,
+    /// What is wrong inside it, a clause.
+    pub problem: Option<String>,
     /// It is the last one and less than there should be.
     pub is_cut: bool,
     /// It belongs to the picture of the packet before it.
@@ -68,6 +71,7 @@ pub(super) struct Feed {
     fields: Option<Fields>,
     numbers_in_film: Option<FrameNumbers>,
     sums: Option<SliceSums>,
+    inside: Option<Inside>,
     tags: Option<Tags>,
     has_single_fields: bool,
     /// Time and duration of the packet read last, ticks.
@@ -101,6 +105,7 @@ impl Feed {
             fields,
             numbers_in_film,
             sums: SliceSums::of(codec),
+            inside: Inside::of(codec),
             tags: Tags::of(codec),
             has_single_fields: false,
             last: None,
@@ -185,6 +190,7 @@ impl Feed {
             is_late: arrived.is_late,
             goes_on: arrived.goes_on == Some(true),
             is_damaged: arrived.packet.has(ffi::AV_PKT_FLAG_CORRUPT),
+            problem: None,
             is_cut: arrived.packet.has(ffi::AV_PKT_FLAG_CORRUPT),
             is_second_field: arrived.is_second_field,
             packet: arrived.packet,
@@ -212,7 +218,10 @@ impl Feed {
                 given.packet.set_corrupt();
             }
         }
-        given.is_damaged |= self.tags.as_mut().is_some_and(|tags| tags.differs(given.packet.bytes()));
+        let bytes = given.packet.bytes();
+        let problem = self.inside.as_mut().and_then(|inside| inside.problem(bytes));
+        given.problem = problem.or_else(|| self.tags.as_mut().and_then(|tags| tags.problem(bytes)));
+        given.is_damaged |= given.problem.is_some();
         Ok(Some(given))
     }
 

@@ -23,12 +23,18 @@ pub(super) struct Arrival {
     pub lost: Vec<Sent>,
     /// The picture's own packet; `None` if no packet of its key is waiting.
     pub own: Option<Sent>,
+    /// A picture of a later time is out: decoders of damaged film hand some out late, when their frames count as lost already.
+    pub is_late: bool,
+    /// Times of those lost, or of the late picture, of which it was not known before that they would be lost.
+    pub untold: Vec<i64>,
 }
 
 /// Packets whose pictures have not come yet.
 #[derive(Debug, Default)]
 pub(super) struct Order {
     waiting: BTreeMap<(i64, u64), Sent>,
+    /// Greatest key of a picture that came out.
+    latest: Option<i64>,
     count: u64,
     /// Keys by which a picture may come later than a following one; 0 where keys are display times.
     delay: i64,
@@ -52,12 +58,23 @@ impl Order {
         let mut arrival = Arrival::default();
         let own = self.waiting.range((key, 0)..=(key, u64::MAX)).next().map(|(k, _)| *k);
         arrival.own = own.and_then(|k| self.waiting.remove(&k));
+        let before = self.latest.filter(|_| self.delay == 0);
+        arrival.is_late = before.is_some_and(|latest| key < latest);
+        if arrival.is_late {
+            arrival.untold.extend(arrival.own.map(|own| own.key));
+            return arrival;
+        }
+        self.latest = Some(key);
         let limit = (key.saturating_sub(self.delay), 0);
         while let Some(entry) = self.waiting.first_entry() {
             if *entry.key() >= limit {
                 break;
             }
-            arrival.lost.push(entry.remove());
+            let lost = entry.remove();
+            match before {
+                Some(latest) if lost.key < latest => arrival.untold.push(lost.key),
+                _ => arrival.lost.push(lost),
+            }
         }
         arrival
     }
@@ -88,11 +105,28 @@ mod tests {
         for key in [0, 3, 1, 2, 4] {
             order.sent(packet(key));
         }
-        assert_eq!(order.arrived(0), Arrival { lost: vec![], own: Some(packet(0)) });
-        assert_eq!(order.arrived(2), Arrival { lost: vec![packet(1)], own: Some(packet(2)) });
-        assert_eq!(order.arrived(3), Arrival { lost: vec![], own: Some(packet(3)) });
+        assert_eq!(order.arrived(0), Arrival { own: Some(packet(0)), ..Arrival::default() });
+        assert_eq!(
+            order.arrived(2),
+            Arrival { lost: vec![packet(1)], own: Some(packet(2)), ..Arrival::default() }
+        );
+        assert_eq!(order.arrived(3), Arrival { own: Some(packet(3)), ..Arrival::default() });
         assert_eq!(order.rest(), vec![packet(4)]);
         assert_eq!(order.waiting(), 0);
+    }
+
+    #[test]
+    fn a_picture_that_comes_behind_a_later_one_has_no_place_any_more() {
+        let mut order = Order::new(0);
+        [0, 1, 2].into_iter().for_each(|key| order.sent(packet(key)));
+        assert_eq!(order.arrived(2).lost, vec![packet(0), packet(1)]);
+        assert_eq!(order.arrived(1), Arrival { is_late: true, ..Arrival::default() });
+        // Packets of earlier times that are read later: one gives a late picture, one none.
+        [1, 0, 3].into_iter().for_each(|key| order.sent(packet(key)));
+        let late = Arrival { own: Some(packet(1)), is_late: true, untold: vec![1], ..Arrival::default() };
+        assert_eq!(order.arrived(1), late);
+        let next = Arrival { own: Some(packet(3)), untold: vec![0], ..Arrival::default() };
+        assert_eq!(order.arrived(3), next);
     }
 
     #[test]

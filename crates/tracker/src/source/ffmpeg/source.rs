@@ -16,11 +16,12 @@ use super::layout::Layout;
 use super::lost::Lost;
 use super::order::{Order, Sent};
 use super::reach::{Reach, References};
+use super::reasons::Reasons;
 use super::stamps::{Stamps, Survey, display_times};
 use super::watch::Fate;
 use crate::error::{Error, Fault, FaultKind, Place, Result};
 use crate::frame::{Bytes, Ending, Frame, FrameSource, SourceInfo};
-use crate::gaps::Gaps;
+use crate::gaps::{Gaps, Reason};
 use crate::message::Setting;
 use crate::pixel_aspect::PixelAspect;
 use crate::source::orientation::Orientation;
@@ -32,6 +33,7 @@ pub(super) struct Ready {
     pub(super) plane: Option<(Box<dyn Bytes>, usize)>,
     pub(super) colour: Option<[Vec<u8>; 2]>,
     pub(super) byte: Option<u64>,
+    number: u64,
 }
 
 /// A recording read through FFmpeg.
@@ -57,6 +59,7 @@ pub struct FfmpegSource {
     pub(super) intra_only: bool,
     references: References,
     dependence: Dependence,
+    reasons: Reasons,
     /// Number of the packet given last, in decoding order.
     number: u64,
     /// Packets, in decoding order, of which it is known what became of them.
@@ -91,10 +94,6 @@ pub struct FfmpegSource {
 
 /// How far decoding order and display order can differ (H.264's and HEVC's limit of 16 frames).
 const REORDER: i64 = 16;
-
-/// Packets, and bytes of them, whose time stamps are looked at without decoding.
-const SURVEYED_FRAMES: usize = 20_000;
-const SURVEYED_BYTES: u64 = 256 << 20;
 
 impl FfmpegSource {
     /// Opens what `input` stands for; `name` is the user's, for messages.
@@ -162,6 +161,7 @@ impl FfmpegSource {
             intra_only,
             references,
             dependence: Dependence::new(intra_only),
+            reasons: Reasons::default(),
             number: 0,
             settled: 0,
             draining: false,
@@ -238,6 +238,7 @@ impl FfmpegSource {
             if given.is_damaged {
                 self.dependence.damaged(self.number);
             }
+            self.reasons.of_packet(self.number, given.problem.take());
             // What an edit list hides is decoded, because others are predicted from it, but gives no picture.
             if !given.packet.has(ffi::AV_PKT_FLAG_DISCARD) {
                 self.order.sent(Sent { key, byte, number: self.number });
@@ -359,6 +360,10 @@ impl FfmpegSource {
     pub(super) fn take(&mut self, picture: Picture) {
         let key = picture.get().pts;
         let arrival = self.order.arrived(key);
+        arrival.untold.iter().for_each(|at| self.lost.broken(*at));
+        if arrival.is_late {
+            return;
+        }
         for lost in arrival.lost {
             self.dependence.damaged(lost.number);
             self.hold(lost);
@@ -368,7 +373,7 @@ impl FfmpegSource {
         if picture.is_damaged() || !self.decoder.is_written(number, &picture) {
             self.dependence.damaged(number);
         }
-        // The decoder is through with all packets up to this picture's.
+        // It is through with all packets up to this picture's.
         for number in self.settled + 1..=number {
             if self.decoder.fate(number) != Fate::Whole {
                 self.dependence.damaged(number);
@@ -376,7 +381,6 @@ impl FfmpegSource {
         }
         self.settled = self.settled.max(number);
         let is_whole = self.dependence.is_whole(number, key);
-        let byte = arrival.own.and_then(|p| p.byte);
         let fits = self.layout.is_of(&picture) && {
             let (w, h) = (picture.get().width.unsigned_abs(), picture.get().height.unsigned_abs());
             self.orientation.size(w, h) == (self.info.width, self.info.height)
@@ -387,15 +391,15 @@ impl FfmpegSource {
             let colour = if self.colour { self.layout.colour(&picture, self.orientation) } else { None };
             (colour, self.layout.plane(picture, self.orientation))
         };
-        let usual = self.stamps.last();
-        let ticks = self.stamps.ticks(key);
+        let (usual, ticks) = (self.stamps.last(), self.stamps.ticks(key));
         // In a file that is cut, the last pictures in display order may be there and one before them not.
         let after_hole = self.draining
             && !self.intra_only
             && usual
                 .is_some_and(|(last, longest)| ticks.saturating_sub(last) > longest.saturating_mul(3) / 2);
         let plane = if after_hole && self.is_cut() { None } else { plane };
-        let ready = Ready { ticks, plane, colour, byte };
+        let byte = arrival.own.and_then(|p| p.byte);
+        let ready = Ready { ticks, plane, colour, byte, number };
         if ready.plane.is_some() {
             self.ready.append(&mut self.held);
             self.ready.push_back(ready);
@@ -406,17 +410,18 @@ impl FfmpegSource {
 
     pub(super) fn hold(&mut self, lost: Sent) {
         let ticks = self.stamps.ticks(lost.key);
-        self.held.push_back(Ready { ticks, plane: None, colour: None, byte: lost.byte });
+        self.held.push_back(Ready { ticks, plane: None, colour: None, byte: lost.byte, number: lost.number });
     }
 
     pub(super) fn make(&mut self, ready: Ready) -> Frame {
         let index = self.next_index;
         self.next_index += 1;
         self.lost.frame(index, ready.ticks);
-        let (plane, stride) = match ready.plane {
-            Some((plane, stride)) => (Some(plane), stride),
-            None => (None, 0),
-        };
+        if ready.plane.is_none() {
+            self.reasons.left_out(index, ready.number);
+        }
+        let (plane, stride) = ready.plane.unzip();
+        let stride = stride.unwrap_or(0);
         let ticks = if self.counts_frames { index as i64 } else { ready.ticks };
         Frame { stride, plane, colour: ready.colour, ..self.info.frame(index, ticks) }
     }
@@ -466,19 +471,17 @@ impl FrameSource for FfmpegSource {
         if !self.can_reopen || self.counts_frames || self.feed.has_single_fields() {
             return Ok(None);
         }
-        let input = Input::File(self.url.clone());
-        let (frames, bytes) = if self.feed.demuxer.has_display_times() {
-            (SURVEYED_FRAMES, SURVEYED_BYTES)
-        } else {
-            // A time is known by those that come after it.
-            (usize::MAX, u64::MAX)
-        };
-        let found = display_times(&self.info.name, &input, frames, bytes)?;
+        let have_times = self.feed.demuxer.has_display_times();
+        let found = display_times(&self.info.name, &Input::File(self.url.clone()), have_times)?;
         Ok(Some(found).filter(|(times, _)| !times.is_empty()))
     }
 
     fn gaps(&self) -> Gaps {
         self.lost.gaps()
+    }
+
+    fn reasons(&self) -> Vec<Reason> {
+        self.reasons.told()
     }
 
     fn sample(&mut self, count: usize) -> Result<Vec<Frame>> {

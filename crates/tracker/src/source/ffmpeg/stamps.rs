@@ -258,17 +258,19 @@ fn count_back(times: &mut [i64], step: f64) {
     }
 }
 
-/// Display times of the frames of a file in ticks, in order, without decoding, and whether these are all. Reading ends
-/// after `most` packets or `most_bytes` of them. Empty if the stream has no times.
+/// Packets, and bytes of them, whose time stamps are looked at without decoding.
+const SURVEYED_FRAMES: usize = 20_000;
+const SURVEYED_BYTES: u64 = 256 << 20;
+
+/// Display times of the frames of a file in ticks, in order, without decoding, and whether these are all. Of a stream whose packets
+/// have such times only the first are read. Empty if the stream has no times.
 ///
 /// # Errors
 /// [`Error::Source`] if the file cannot be read.
-pub(super) fn display_times(
-    name: &str,
-    input: &Input,
-    most: usize,
-    most_bytes: u64,
-) -> Result<(Vec<i64>, bool)> {
+pub(super) fn display_times(name: &str, input: &Input, have_times: bool) -> Result<(Vec<i64>, bool)> {
+    // A time that is not there is known by those that come after it.
+    let (most, most_bytes) =
+        if have_times { (SURVEYED_FRAMES, SURVEYED_BYTES) } else { (usize::MAX, u64::MAX) };
     let survey = Survey::of(name, input, most, most_bytes)?;
     if survey.is_untimed() {
         return Ok((Vec::new(), false));

@@ -28,12 +28,14 @@ impl Tags {
         PICTURES.contains(&codec).then_some(Self { first: None })
     }
 
-    /// Whether a picture says otherwise than the first one, as none does that is whole. One that says nothing is like the
+    /// What a picture says otherwise than the first one, a clause; none that is whole does. One that says nothing is like the
     /// first: some cameras tag the first picture alone.
-    pub(super) fn differs(&mut self, packet: &[u8]) -> bool {
+    pub(super) fn problem(&mut self, packet: &[u8]) -> Option<String> {
         let own = orientation_told(packet);
         let first = *self.first.get_or_insert(own.unwrap_or_default());
-        own.is_some_and(|own| own != first)
+        let [words, first_words] = [own?, first].map(Orientation::words_or_none);
+        (own != Some(first))
+            .then(|| format!("it is to be turned otherwise than the first: {words}, that {first_words}"))
     }
 }
 
@@ -51,8 +53,9 @@ mod tests {
             if orientation == 0 { b"\xff\xd8\xff\xda".to_vec() } else { bytes }
         };
         let mut tags = Tags::of(ffi::AVCodecID::AV_CODEC_ID_MJPEG).unwrap();
-        let told: Vec<bool> = [6, 0, 6, 8, 6].map(|tag| tags.differs(&jpeg(tag))).to_vec();
-        assert_eq!(told, [false, false, false, true, false]);
+        let told = [6, 0, 6, 8, 6].map(|tag| tags.problem(&jpeg(tag)));
+        let words = "it is to be turned otherwise than the first: 90 degrees counter-clockwise, that 90 degrees clockwise";
+        assert_eq!(told.each_ref().map(Option::as_deref), [None, None, None, Some(words), None]);
         assert!(Tags::of(ffi::AVCodecID::AV_CODEC_ID_H264).is_none());
     }
 }

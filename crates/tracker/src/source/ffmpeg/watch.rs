@@ -18,8 +18,9 @@ use ffmpeg_next::ffi;
 const REMEMBERED: usize = 4096;
 
 /// How messages begin that say of the picture under way that a part of it could not be decoded (libavcodec's
-/// `error_resilience.c`, `h264_slice.c` for fields, and `hevcdec.c`). They are FFmpeg's own, the same in versions 4 to 7.
-const DAMAGE: [&[u8]; 3] = [b"concealing ", b"error while decoding MB ", b"Error parsing NAL unit "];
+/// `error_resilience.c`, `h264_slice.c` for fields, `hevcdec.c`, and `dvdec.c`). They are FFmpeg's own, the same in versions 4 to 7.
+const DAMAGE: [&[u8]; 4] =
+    [b"concealing ", b"error while decoding MB ", b"Error parsing NAL unit ", b"Concealing bitstream errors"];
 
 /// A packet that is being decoded.
 #[derive(Debug, Default)]

@@ -11,7 +11,7 @@ use tiff::decoder::Decoder;
 use super::picture::Picture;
 use super::planes::are_behind;
 use super::tiff_layout::is_reduced;
-use super::{coded_picture, orientation_tag, pixel_size, tiff_page};
+use super::{coded_picture, jpeg_scan, orientation_tag, pixel_size, png_sums, tiff_page};
 
 /// Reads a picture file; an error is a clause without a full stop.
 pub fn read(path: &Path) -> Result<Picture, String> {
@@ -44,6 +44,11 @@ pub fn read(path: &Path) -> Result<Picture, String> {
     believable(head, &mut file)?;
     // From memory: a name for OpenCV would have to be UTF-8.
     let bytes = std::fs::read(path).map_err(|e| format!("it cannot be read ({e})"))?;
+    // OpenCV would fill up what is damaged, or complain on standard error.
+    match bytes.starts_with(b"\xff\xd8") {
+        true => jpeg_scan::check(&bytes)?,
+        false => png_sums::check(&bytes)?,
+    }
     let (orientation, size_of_pixel) = (orientation_tag::of_file(&bytes), pixel_size::of_png(&bytes));
     Ok(coded_picture::decode(&bytes)?.shown(orientation, size_of_pixel))
 }
@@ -55,6 +60,7 @@ pub fn decode(jpeg: &[u8]) -> Result<Picture, String> {
     {
         return Err("it is no whole JPEG picture".to_owned());
     }
+    jpeg_scan::check(jpeg)?;
     coded_picture::decode(jpeg)
 }
 

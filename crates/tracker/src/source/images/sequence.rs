@@ -38,8 +38,36 @@ pub struct SequenceSource {
     ending: Ending,
 }
 
+/// Width and height in px, and depth in bits.
+fn kind(picture: &Picture) -> (u32, u32, u32) {
+    (picture.width, picture.height, picture.depth_bits)
+}
+
+/// Of pictures that were looked at no kind is that of most: which kinds there are, and which files are of each.
+fn several_sizes(folder: &str, pictures: &[(usize, &PathBuf, Picture)]) -> Error {
+    let mut kinds: Vec<((u32, u32, u32), Vec<String>)> = Vec::new();
+    for (_, path, picture) in pictures {
+        match kinds.iter_mut().find(|(known, _)| *known == kind(picture)) {
+            Some((_, names)) => names.push(file_name(path)),
+            None => kinds.push((kind(picture), vec![file_name(path)])),
+        }
+    }
+    let depths = kinds.iter().any(|(k, _)| k.2 != kinds[0].0.2);
+    let words = kinds.iter().map(|((width, height, bits), names)| {
+        let depth = if depths { format!(" of {bits} bits") } else { String::new() };
+        let more = if names.len() > 2 { ", ..." } else { "" };
+        format!("{width} x {height} px{depth} as {}{more}", names[..names.len().min(2)].join(", "))
+    });
+    let words: Vec<String> = words.collect();
+    Error::Source(
+        Fault::new(folder, format!("its pictures are of several sizes, none of which most have: {}", words.join("; ")))
+            .advice("Give those of one size as a pattern, such as 'frames/img_%05d.png', or move them to a folder of their own"),
+    )
+}
+
 /// A picture of the size and depth that most pictures have, and its file. The first one may be a small copy, which is said.
 fn size_of_most<'a>(
+    name: &str,
     there: &[(usize, &'a PathBuf)],
     warnings: &mut Vec<Message>,
 ) -> Result<(Picture, &'a PathBuf)> {
@@ -58,7 +86,6 @@ fn size_of_most<'a>(
     if pictures.is_empty() {
         pictures.extend(there.iter().copied().take(LOOKED_FOR).find_map(readable));
     }
-    let kind = |p: &Picture| (p.width, p.height, p.depth_bits);
     let like = |p: &Picture| pictures.iter().filter(|(.., other)| kind(other) == kind(p)).count();
     // Of several as many, the first.
     let Some(best) = (0..pictures.len()).rev().max_by_key(|i| like(&pictures[*i].2)) else {
@@ -68,6 +95,9 @@ fn size_of_most<'a>(
         )));
     };
     let usual = &pictures[best].2;
+    if 2 * like(usual) <= pictures.len() {
+        return Err(several_sizes(name, &pictures));
+    }
     for (index, path, odd) in pictures.iter().filter(|(.., p)| kind(p) != kind(usual)) {
         let size = other_size(&file_name(path), kind(odd), kind(usual));
         warnings.push(format!("frame {index}: {size}: such a frame stays empty").into());
@@ -99,7 +129,7 @@ impl SequenceSource {
         let files = numbered.files;
         let there: Vec<(usize, &PathBuf)> =
             files.iter().enumerate().filter_map(|(i, f)| f.as_ref().map(|p| (i, p))).collect();
-        let (first, path) = size_of_most(&there, &mut warnings)?;
+        let (first, path) = size_of_most(name, &there, &mut warnings)?;
         let (time_base, rate_hz, rate_origin) = rate(options, &mut warnings)?;
         let ending = path.extension().map_or(String::new(), |e| e.to_string_lossy().to_lowercase());
         let size_bytes = files.iter().flatten().map(|f| std::fs::metadata(f).map_or(0, |m| m.len())).sum();
