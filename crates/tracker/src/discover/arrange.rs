@@ -143,6 +143,9 @@ fn joint(a: &Found, b: Option<&Found>) -> Option<Turning> {
     (t.rms_px < JOINT_PX.max(JOINT_PART * reach)).then_some(t)
 }
 
+/// A rig, and which marker each of its nodes is: the body among those found, and the node of its link.
+pub type Arranged = (Rig, Vec<(usize, usize)>);
+
 /// The rig of the bodies: joints found, bodies ordered and named, nodes ordered along them, placed as in frame
 /// `reference` of the sample and in recorded pixels, while those of the bodies are in the plane.
 ///
@@ -156,7 +159,7 @@ pub fn arrange(
     image_px: [u32; 2],
     plane: &Plane,
     stop: &Stop,
-) -> Result<Rig> {
+) -> Result<Arranged> {
     let n = found.len();
     let mut found = found.to_vec();
     // What each body hangs on: the ground first, then bodies already hung.
@@ -238,6 +241,7 @@ pub fn arrange(
         nodes: Vec::new(),
         joints: Vec::new(),
     };
+    let mut markers = Vec::new();
     for (k, &b) in order.iter().enumerate() {
         let link = &found[b].link;
         // Along the link: from its inner joint to what hangs on it, else to the middle of its nodes.
@@ -249,11 +253,11 @@ pub fn arrange(
             (Some(i), _) if (middle - i).norm() > 1.0 => middle - i,
             _ => longest(link),
         };
-        let mut along: Vec<(f64, Vector2<f64>)> =
-            link.template.iter().map(|&t| (axis.dot(&t), place(&pose(b), t))).collect();
-        along.sort_by(|a, b| a.0.total_cmp(&b.0));
-        for (_, p) in along {
-            let p = plane.to_recorded(p);
+        let mut along: Vec<usize> = (0..link.template.len()).collect();
+        along.sort_by(|&p, &q| axis.dot(&link.template[p]).total_cmp(&axis.dot(&link.template[q])));
+        for q in along {
+            let p = plane.to_recorded(place(&pose(b), link.template[q]));
+            markers.push((b, q));
             rig.nodes.push(Node {
                 name: format!("n{}", rig.nodes.len()),
                 body: names[k].clone(),
@@ -294,7 +298,7 @@ pub fn arrange(
             y_px: p.y,
         });
     }
-    Ok(rig)
+    Ok((rig, markers))
 }
 
 /// Points that two bodies share beside the joints on which they hang: where the chain closes.

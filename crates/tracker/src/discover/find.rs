@@ -58,6 +58,12 @@ pub fn discover(store: &DetectionStore, image_px: [u32; 2], stop: &Stop) -> Resu
     choose(store, &tracklets, readings, stop)
 }
 
+/// A camera that was found, as a rig has it.
+pub(super) fn camera_of(found: &Calibration) -> RigCamera {
+    let covariance = std::array::from_fn(|i| std::array::from_fn(|j| found.covariance[(i, j)]));
+    RigCamera::of(&found.camera, Some(covariance), CameraOrigin::Found)
+}
+
 /// The rig of a reading, and what a user should know of it.
 fn finish(
     store: &PlaneView<'_>,
@@ -77,11 +83,8 @@ fn finish(
             .push("no frame shows every marker: their places are put together from several frames".into());
     }
     let index = store.stamp(sample.frames[reference]).index;
-    let mut rig = arrange::arrange(&found, reference, Some(index), image_px, &plane, stop)?;
-    rig.camera = camera.map(|c| {
-        let covariance = std::array::from_fn(|i| std::array::from_fn(|j| c.covariance[(i, j)]));
-        RigCamera::of(&c.camera, Some(covariance), CameraOrigin::Found)
-    });
+    let (mut rig, _) = arrange::arrange(&found, reference, Some(index), image_px, &plane, stop)?;
+    rig.camera = camera.map(camera_of);
     if let Some(camera) = camera {
         let width_px = f64::from(image_px[0]) * plane.pixel_aspect.ratio();
         warnings.push(words(camera, width_px).into());

@@ -1,6 +1,6 @@
 //! Finds the rig of a recording in its detections: nodes, bodies, joints, reference picture.
 //!
-//! Owns: [`discover`], [`Discovery`]. Must not: name markers frame by frame (`track` does), or look at pixels.
+//! Owns: [`discover`], [`Discovery`], [`rig_of_paths`]. Must not: name markers frame by frame (`track` does), or look at pixels.
 
 pub(crate) mod advice;
 mod arrange;
@@ -9,6 +9,7 @@ mod circle;
 mod continuity;
 mod discovery;
 mod find;
+mod followed;
 mod lone;
 mod median;
 mod reading;
@@ -18,3 +19,4 @@ mod trial;
 
 pub use discovery::Discovery;
 pub use find::discover;
+pub(crate) use followed::{PathRig, rig_of_paths};

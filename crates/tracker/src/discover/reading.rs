@@ -133,7 +133,7 @@ pub(super) fn by_shape(store: &PlaneView<'_>, stop: &Stop) -> Result<Reading> {
 
 /// Bodies of tracklets.
 pub(super) fn by_continuity(store: &PlaneView<'_>, evidence: &Evidence<'_>, stop: &Stop) -> Result<Reading> {
-    let found = continuity::bodies(evidence, stop)?;
+    let found: Vec<Found> = continuity::bodies(evidence, stop)?.into_iter().map(|f| f.found).collect();
     if found.is_empty() {
         return Err(nothing_found(
             "no marker can be followed",

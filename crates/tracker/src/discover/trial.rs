@@ -19,6 +19,8 @@ const FRAMES: usize = 300;
 const COST: f64 = 5.0;
 /// A reading that comes earlier stands unless a later one is better by this part of what is seen.
 const BETTER: f64 = 0.01;
+/// Or names as many nodes in fewer bodies and is worse by no more than this: bodies that always move as one are one.
+const AS_GOOD: f64 = 0.002;
 
 /// Of the readings, the likelier first, the one that names most; the first one's error where none names anything.
 ///
@@ -40,7 +42,12 @@ pub(super) fn choose(
             }
             Ok(found) => {
                 let worth = worth(store, tracklets, &found.rig, stop)?;
-                if best.as_ref().is_none_or(|b| worth > b.0 + BETTER) {
+                let simpler = |rig: &Rig| {
+                    found.rig.nodes.len() >= rig.nodes.len() && found.rig.bodies.len() < rig.bodies.len()
+                };
+                if best.as_ref().is_none_or(|(most, b)| {
+                    worth > most + BETTER || worth > most - AS_GOOD && simpler(&b.rig)
+                }) {
                     best = Some((worth, found));
                 }
             }

@@ -89,7 +89,7 @@ impl Look<'_> {
     fn centre(&self, picture: usize, at: [f64; 2], radius: f64) -> Result<Option<Found>> {
         self.film.heed()?;
         let reach = 2.3 * radius.max(self.half_length) + 3.0;
-        let mut w = Window::cut(&self.film.read(picture)?, self.model.fine_octave(), at, reach);
+        let mut w = Window::cut(self.film, picture, self.model.fine_octave(), at, reach)?;
         let (x0, y0) = (w.x0 as f64, w.y0 as f64);
         let mut place = [at[0] - x0, at[1] - y0];
         w.look(self.model.direction, self.model.sign, self.backdrop, place, radius);

@@ -8,7 +8,7 @@ use super::ground::spread;
 use super::marker::{Marker, compact};
 use super::model::Model;
 use super::picture::Film;
-use super::response::{response, responses};
+use super::response::{Response, response, responses};
 use super::search::{Against, Search};
 use super::spot::Spot;
 use super::track::{Track, extent, linked, quality};
@@ -226,9 +226,12 @@ pub fn survey(search: &Search) -> Result<Survey> {
         .map(|i| {
             film.heed()?;
             let picture = film.read(i)?;
+            // Bright and dark things of one size, and of any colour, have one response.
+            let mut known: Vec<Option<Response>> = vec![None; search.count];
             let spots = |c: &&Candidate| {
-                let response = response(&picture, c.model.octave);
-                search.spots(&picture, &response, &c.model, Against::Ground, (c.limit, MOST_SPOTS))
+                let octave = c.model.octave;
+                let response = known[octave].get_or_insert_with(|| response(&picture, octave));
+                search.spots(&picture, response, &c.model, Against::Ground, (c.limit, MOST_SPOTS))
             };
             Ok(finalists.iter().map(spots).collect())
         })

@@ -2,6 +2,8 @@
 //!
 //! Owns: [`Picture`], [`Film`]. Must not: decode.
 
+use std::ops::Range;
+
 use crate::error::Result;
 
 /// A frame at work size. Colour differences are stored about 128, as in YCbCr with full range.
@@ -26,6 +28,15 @@ pub trait Film: Sync {
     /// # Errors
     /// That of the medium.
     fn read(&self, index: usize) -> Result<Picture>;
+    /// Reads a part of one of them: its columns `x` and rows `y`, as far as they are there.
+    ///
+    /// # Errors
+    /// That of the medium.
+    fn read_part(&self, index: usize, x: Range<usize>, y: Range<usize>) -> Result<Picture> {
+        let whole = self.read(index)?;
+        let within = |r: Range<usize>, n: usize| (r.start.min(n), r.end.min(n));
+        Ok(whole.part(within(x, whole.width), within(y, whole.height)))
+    }
     /// Goes on, or not; asked at every picture.
     ///
     /// # Errors

@@ -19,18 +19,19 @@ const EMPTY_PICTURES: usize = 25;
 
 /// Spots about a place without the ground, px of the full octave.
 fn around(film: &dyn Film, picture: usize, model: &Model, at: [f64; 2], radius_px: f64) -> Result<Vec<Spot>> {
-    let whole = film.read(picture)?;
     let step = 1usize << model.octave;
     let margin = (8 * step) as f64 + 2.0 * radius_px;
-    let range = |c: f64, n: usize| {
+    let range = |c: f64| {
         let from = (c - margin).max(0.0) as usize;
-        (from - from % step, ((c + margin).max(0.0) as usize + 1).min(n))
+        from - from % step..(c + margin).max(0.0) as usize + 1
     };
-    let ((x0, x1), (y0, y1)) = (range(at[0], whole.width), range(at[1], whole.height));
-    if x1 < x0 + 6 * step || y1 < y0 + 6 * step {
+    let (x, y) = (range(at[0]), range(at[1]));
+    let (x0, y0) = (x.start, y.start);
+    let part = film.read_part(picture, x, y)?;
+    if part.width < 6 * step || part.height < 6 * step {
         return Ok(Vec::new());
     }
-    let r = response(&whole.part((x0, x1), (y0, y1)), model.octave);
+    let r = response(&part, model.octave);
     let mut along = r.along(model.direction);
     along.iter_mut().for_each(|v| *v *= model.sign);
     let mut found = spots(&along, &along, None, (r.width, r.height), model.octave, (1.0, 20));

@@ -3,9 +3,10 @@
 //! Owns: [`Window`], [`Region`]. Must not: know of other pictures.
 
 use super::backdrop::Backdrop;
-use super::picture::Picture;
+use super::picture::Film;
 use super::response::{Direction, Planes};
 use super::tracklet::median;
+use crate::error::Result;
 
 /// Part of the contrast between marker and surroundings that a pixel's own backdrop must leave for the pixel to tell how much of
 /// it is covered.
@@ -52,18 +53,20 @@ pub struct Window {
 
 impl Window {
     /// Around a place of the octave.
-    pub fn cut(picture: &Picture, octave: usize, at: [f64; 2], reach: f64) -> Self {
+    ///
+    /// # Errors
+    /// Those of the film.
+    pub fn cut(film: &dyn Film, picture: usize, octave: usize, at: [f64; 2], reach: f64) -> Result<Self> {
         let scale = 1usize << octave;
-        let range = |c: f64, n: usize| {
+        let range = |c: f64| {
             let from = ((c - reach - 2.0) * scale as f64).max(0.0) as usize;
-            let to = (((c + reach + 3.0) * scale as f64).max(0.0) as usize).min(n);
-            (from - from % scale, to)
+            from - from % scale..((c + reach + 3.0) * scale as f64).max(0.0) as usize
         };
-        let (x0, x1) = range(at[0], picture.width);
-        let (y0, y1) = range(at[1], picture.height);
-        let planes = Planes::of_octave(&picture.part((x0, x1), (y0, y1)), octave);
+        let (x, y) = (range(at[0]), range(at[1]));
+        let (x0, y0) = (x.start / scale, y.start / scale);
+        let planes = Planes::of_octave(&film.read_part(picture, x, y)?, octave);
         let (width, height) = (planes.width, planes.height);
-        Self { planes, values: Vec::new(), width, height, x0: x0 / scale, y0: y0 / scale }
+        Ok(Self { planes, values: Vec::new(), width, height, x0, y0 })
     }
 
     /// Looks along a direction, bright (1) or dark (-1). With a backdrop each pixel becomes what it would be before an even

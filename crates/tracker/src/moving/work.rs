@@ -152,6 +152,25 @@ impl<'a> WorkFilm<'a> {
         (self.width / 2) * (self.height / 2)
     }
 
+    /// Rows of a plane that begins at a byte of the file.
+    fn rows(&self, start: u64, width: usize, rows: Range<usize>) -> Result<Vec<u8>> {
+        let mut bytes = vec![0; rows.len() * width];
+        let start = start + (rows.start * width) as u64;
+        self.file.read_exact_at(&mut bytes, start).map_err(|e| unusable(&e))?;
+        Ok(bytes)
+    }
+
+    /// A part of a plane of half the size, at full size: each of its pixels twice along both sides.
+    fn colour(&self, start: u64, x: &Range<usize>, y: &Range<usize>) -> Result<Vec<u8>> {
+        let (w, h) = (self.width / 2, self.height / 2);
+        let last = |n: usize| n.saturating_sub(1);
+        let half = |r: &Range<usize>, n: usize| (r.start / 2).min(last(n))..(r.end.div_ceil(2)).min(n);
+        let (columns, rows) = (half(x, w), half(y, h));
+        let plane = self.rows(start, w, rows.clone())?;
+        let part: Vec<u8> = plane.chunks(w.max(1)).flat_map(|r| r[columns.clone()].iter().copied()).collect();
+        Ok(doubled(&part, (columns.start, columns.len()), (rows.start, rows.len()), x, y))
+    }
+
     /// Stamps of all frames read.
     pub fn stamps(&self) -> &[FrameStamp] {
         &self.stamps
@@ -222,16 +241,27 @@ impl Film for WorkFilm<'_> {
     }
 
     fn read(&self, index: usize) -> Result<Picture> {
-        let (width, height) = (self.width, self.height);
-        let mut bytes = vec![0; self.picture_bytes()];
-        let start = self.kept[index] as u64 * bytes.len() as u64;
-        self.file.read_exact_at(&mut bytes, start).map_err(|e| unusable(&e))?;
-        let colour = bytes.split_off(width * height);
-        let chroma = self.has_colour.then(|| {
-            let (blue, red) = colour.split_at(self.colour_size());
-            [blue, red].map(|plane| doubled(plane, width, height))
-        });
-        Ok(Picture { width, height, luma: bytes, chroma })
+        self.read_part(index, 0..self.width, 0..self.height)
+    }
+
+    fn read_part(&self, index: usize, x: Range<usize>, y: Range<usize>) -> Result<Picture> {
+        let x = x.start.min(self.width)..x.end.min(self.width);
+        let y = y.start.min(self.height)..y.end.min(self.height);
+        let (width, height) = (x.len(), y.len());
+        let start = self.kept[index] as u64 * self.picture_bytes() as u64;
+        let luma = self.rows(start, self.width, y.clone())?;
+        let luma = if width == self.width {
+            luma
+        } else {
+            luma.chunks(self.width.max(1)).flat_map(|row| row[x.clone()].iter().copied()).collect()
+        };
+        let chroma = if self.has_colour {
+            let start = start + (self.width * self.height) as u64;
+            Some([self.colour(start, &x, &y)?, self.colour(start + self.colour_size() as u64, &x, &y)?])
+        } else {
+            None
+        };
+        Ok(Picture { width, height, luma, chroma })
     }
 
     fn heed(&self) -> Result<()> {
@@ -265,13 +295,20 @@ fn shrunk(plane: &[u8], width: usize, height: usize, by: usize) -> Vec<u8> {
     out
 }
 
-/// A plane of half of `width` and `height` at full size, each pixel twice along both sides.
-fn doubled(half: &[u8], width: usize, height: usize) -> Vec<u8> {
-    let (w, h) = (width / 2, height / 2);
-    let mut out = Vec::with_capacity(width * height);
-    for y in 0..height {
-        let row = &half[(y / 2).min(h.saturating_sub(1)) * w..][..w];
-        out.extend((0..width).map(|x| row[(x / 2).min(w.saturating_sub(1))]));
+/// The part `x`, `y` at full size of a plane of half the size, of which the columns and rows from one on are given, so many. Each pixel
+/// is there twice along both sides; an odd last one is the last pixel once more.
+fn doubled(
+    part: &[u8],
+    (first_column, w): (usize, usize),
+    (first_row, h): (usize, usize),
+    x: &Range<usize>,
+    y: &Range<usize>,
+) -> Vec<u8> {
+    let at = |k: usize, first: usize, n: usize| (k / 2).saturating_sub(first).min(n.saturating_sub(1));
+    let mut out = Vec::with_capacity(x.len() * y.len());
+    for row in y.clone() {
+        let row = &part[at(row, first_row, h) * w..][..w];
+        out.extend(x.clone().map(|x| row[at(x, first_column, w)]));
     }
     out
 }
@@ -311,6 +348,9 @@ mod tests {
         let plane = [10, 10, 20, 20, 30, 10, 10, 20, 20, 30];
         let half = shrunk(&plane, 5, 2, 2);
         assert_eq!(half, [10, 20]);
-        assert_eq!(doubled(&half, 5, 2), [10, 10, 20, 20, 20, 10, 10, 20, 20, 20]);
+        let whole = doubled(&half, (0, 2), (0, 1), &(0..5), &(0..2));
+        assert_eq!(whole, [10, 10, 20, 20, 20, 10, 10, 20, 20, 20]);
+        // The second of the two columns alone, and the odd last place.
+        assert_eq!(doubled(&[20], (1, 1), (0, 1), &(3..5), &(1..2)), [20, 20]);
     }
 }

@@ -1,9 +1,12 @@
 //! Decides whether most of what stands out in a recording is its background.
 //!
-//! Owns: [`is_cluttered`]. Must not: find bodies.
+//! Owns: [`is_cluttered`], [`is_cluttered_sample`]. Must not: find bodies.
 
-use crate::detect::Detection;
+use std::sync::Arc;
+
+use crate::detect::{DetectSettings, Detection, Detector, Levels};
 use crate::error::Result;
+use crate::frame::Frame;
 use crate::store::DetectionStore;
 
 /// Number of frames that are looked at.
@@ -31,25 +34,52 @@ const UNLIKE: f64 = 3.0;
 /// That of the store.
 pub(super) fn is_cluttered(store: &DetectionStore) -> Result<bool> {
     let n = store.len();
-    let mut areas = Vec::new();
-    let frames: Vec<Vec<[f64; 2]>> = (0..n)
+    let frames: Vec<Vec<Detection>> = (0..n)
         .step_by(n.div_ceil(FRAMES).max(1))
         .map(|i| {
-            let mut found: Vec<Detection> = Vec::new();
+            let mut found = Vec::new();
             store.read(i, &mut found);
-            areas.extend(found.iter().map(|d| f64::from(d.area_px)));
-            found.iter().take(MOST_DETECTIONS).map(|d| [d.x_px, d.y_px]).collect()
+            found
         })
         .collect();
     store.check()?;
+    Ok(shows_clutter(&frames))
+}
+
+/// The same of frames that were only looked at.
+///
+/// # Errors
+/// Those of detection.
+pub(super) fn is_cluttered_sample(
+    frames: &[Frame],
+    levels: &Arc<Levels>,
+    settings: &DetectSettings,
+) -> Result<bool> {
+    let mut detector = Detector::new(Arc::clone(levels), settings)?;
+    let mut all: Vec<Vec<Detection>> = Vec::with_capacity(frames.len());
+    for frame in frames.iter().filter(|f| f.plane.is_some()) {
+        let mut found = Vec::new();
+        detector.detect(frame, &mut found)?;
+        if all.is_empty() && found.len() < LEAST_STANDING {
+            return Ok(false);
+        }
+        all.push(found);
+    }
+    Ok(shows_clutter(&all))
+}
+
+fn shows_clutter(found: &[Vec<Detection>]) -> bool {
+    let mut areas: Vec<f64> = found.iter().flatten().map(|d| f64::from(d.area_px)).collect();
+    let places = |f: &Vec<Detection>| f.iter().take(MOST_DETECTIONS).map(|d| [d.x_px, d.y_px]).collect();
+    let frames: Vec<Vec<[f64; 2]>> = found.iter().map(places).collect();
     let mut counts: Vec<[usize; 2]> =
         (0..frames.len()).map(|i| [frames[i].len(), standing(&frames, i)]).collect();
     counts.sort_unstable();
-    let Some(&[all, standing]) = counts.get(counts.len() / 2) else { return Ok(false) };
+    let Some(&[all, standing]) = counts.get(counts.len() / 2) else { return false };
     let stands = standing >= LEAST_STANDING && standing as f64 >= CLUTTER_PART * all as f64;
     areas.sort_unstable_by(f64::total_cmp);
     let quartile = |part: usize| areas.get(areas.len() * part / 4).copied().unwrap_or(0.0);
-    Ok(stands || all >= MANY && quartile(3) > UNLIKE * quartile(1))
+    stands || all >= MANY && quartile(3) > UNLIKE * quartile(1)
 }
 
 /// Detections of a frame that stand still.

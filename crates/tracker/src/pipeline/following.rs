@@ -43,8 +43,9 @@ impl Run<'_> {
         }
         let stopped = end.is_none();
         let settings = self.settings;
-        if !stopped && settings.rig.is_none() && moving::applies(settings) && is_cluttered(&self.store)? {
-            match moving::run(settings, observer)? {
+        let open = !stopped && unclear.is_none() && moving::comes_first(settings);
+        if open && is_cluttered(&self.store)? {
+            match moving::run_first(settings, observer)? {
                 Outcome::Followed(summary) => {
                     settings.output.as_ref().map_or(Ok(()), |output| state::remove(output))?;
                     return Ok(*summary);

@@ -6,6 +6,7 @@ mod clutter;
 mod detecting;
 mod following;
 mod moving;
+mod moving_bodies;
 mod moving_nodes;
 mod observer;
 mod opening;

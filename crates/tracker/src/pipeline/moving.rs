@@ -1,6 +1,6 @@
 //! Follows what moves where no markers stand out, or what a user pointed at.
 //!
-//! Owns: [`applies`], [`is_wanted`], [`check`], [`run`]. Must not: find anything itself; `moving` does.
+//! Owns: [`applies`], [`comes_first`], [`is_wanted`], [`check`], [`run`], [`run_first`]. Must not: find anything itself; `moving` does.
 
 use std::sync::atomic::Ordering;
 
@@ -54,16 +54,30 @@ impl Unclear {
 }
 
 /// Whether what moves may be followed in place of markers: only where no more was said of how markers look than where they are
-/// and whether they are bright, and a rig that was given is one of single nodes.
+/// and whether they are bright, and a rig that was given has no lens.
 pub(super) fn applies(settings: &RunSettings) -> bool {
     is_understood(&settings.detect)
         && settings.detect.threshold == Threshold::Auto
-        && settings.rig.as_ref().is_none_or(is_single)
+        && settings.rig.as_ref().is_none_or(|r| r.lens.is_none())
         && !source::is_read_once(&settings.input)
 }
 
-fn is_single(rig: &Rig) -> bool {
-    rig.joints.is_empty() && rig.bodies.len() == rig.nodes.len() && rig.lens.is_none()
+/// Whether what moves is looked at first where there is clutter.
+pub(super) fn comes_first(settings: &RunSettings) -> bool {
+    settings.rig.is_none() && applies(settings)
+}
+
+/// Looks at what moves in a recording that can be read; where it is too long for that, that is why it is unclear.
+///
+/// # Errors
+/// Those of [`run`] but for the source's.
+pub(super) fn run_first(settings: &RunSettings, observer: &mut dyn Observer) -> Result<Outcome> {
+    match run(settings, observer) {
+        Err(Error::Source(fault)) => {
+            Ok(Outcome::Unclear(Unclear::new(fault.problem.to_string(), fault.advice)))
+        }
+        outcome => outcome,
+    }
 }
 
 /// Whether no more was said of detection than region, polarity and threshold.
@@ -102,9 +116,9 @@ pub(super) fn check(settings: &RunSettings) -> Result<()> {
             "Leave one of them out",
         );
     }
-    if !settings.rig.as_ref().is_none_or(is_single) {
+    if settings.rig.as_ref().is_some_and(|r| r.lens.is_some()) {
         return refuse(
-            "the rig has bodies of several nodes, joints or a lens, and what moves is followed by single nodes",
+            "the rig has a lens, and what moves is followed as the picture shows it",
             "Leave one of them out",
         );
     }
@@ -157,7 +171,13 @@ pub(super) fn run(settings: &RunSettings, observer: &mut dyn Observer) -> Result
                 |index: u64| attended.done.store(index.saturating_sub(frames.start), Ordering::Relaxed);
             let film = WorkFilm::read(source.as_mut(), frames.clone(), &attended.stop, &mut tell)?;
             let limits = limits(settings, &info, film.shrink());
-            on_threads(settings.threads, || follow(&film, &limits, &wanted, settings.rig.as_ref()))
+            on_threads(settings.threads, || {
+                let mut found = follow(&film, &limits, &wanted, settings.rig.as_ref())?;
+                if let (Ok(moving), None) = (&mut found.moving, &settings.rig) {
+                    moving.find_bodies(&facts, &attended.stop)?;
+                }
+                Ok(found)
+            })
         },
     )?;
     if let Some(candidates) = found.candidates {

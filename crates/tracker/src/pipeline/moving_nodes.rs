@@ -9,6 +9,7 @@ use super::settings::RunSettings;
 use super::summary::{MOVING, RunSummary};
 use super::times::times;
 use crate::detect::DetectSettings;
+use crate::discover::PathRig;
 use crate::error::{Error, Fault, Place, Result};
 use crate::frame::{Ending, SourceInfo};
 use crate::gaps::Damage;
@@ -42,17 +43,19 @@ pub(super) enum Chosen {
 /// The nodes that were followed, in the recording's own pixels and frames.
 pub(super) struct Moving {
     /// A name for each column.
-    names: Vec<String>,
-    markers: Vec<Marker>,
+    pub(super) names: Vec<String>,
+    pub(super) markers: Vec<Marker>,
     chosen: Chosen,
     scale: f64,
     copies: usize,
     decoded: usize,
-    stamps: Vec<FrameStamp>,
+    pub(super) stamps: Vec<FrameStamp>,
     /// By frame, then track.
-    rows: Vec<Vec<Observation>>,
+    pub(super) rows: Vec<Vec<Observation>>,
     ending: Ending,
     damage: Damage,
+    /// Bodies of the columns, where there are any.
+    pub(super) bodies: Option<PathRig>,
 }
 
 impl Moving {
@@ -70,6 +73,7 @@ impl Moving {
             ending: film.ending().clone(),
             damage: film.damage().clone(),
             rows,
+            bodies: None,
         }
     }
 
@@ -291,7 +295,7 @@ impl Moving {
     }
 
     /// One body for each node; the reference frame is the first in which all are seen, if there is one.
-    fn rig(&self, facts: &SourceFacts, settings: &RunSettings, wanted: &Wanted) -> Rig {
+    pub(super) fn single_rig(&self, facts: &SourceFacts, settings: &RunSettings, wanted: &Wanted) -> Rig {
         let image = |o: &Observation| [o.x_px, o.y_px];
         let whole = self.rows.iter().position(|r| r.iter().all(|o| o.status.is_seen()));
         let place = |node: usize| match whole {
@@ -389,9 +393,9 @@ impl Moving {
             }
         };
         let mut notes: Vec<Message> = vec![
-            format!("{what}. No bodies are made of them. Look at the overlay before you use the table")
-                .into(),
+            format!("{what}. {}. Look at the overlay before you use the table", self.bodies_words()).into(),
         ];
+        notes.extend(self.bodies.iter().flat_map(|b| b.warnings.clone()));
         if self.copies > 0 {
             notes.push(
                 format!(
@@ -454,6 +458,7 @@ mod tests {
             rows,
             ending: Ending::Complete,
             damage: Damage::default(),
+            bodies: None,
         }
     }
 

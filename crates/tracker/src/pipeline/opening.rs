@@ -44,8 +44,25 @@ pub(crate) fn learn(
     threads: usize,
     observer: &mut dyn Observer,
 ) -> Result<Levels> {
+    learn_and(samples, detect, threads, observer, |_, _| Ok(())).map(|(levels, ())| levels)
+}
+
+/// Learns from samples, and looks at them once more with what was learned.
+pub(super) fn learn_and<T: Send + 'static>(
+    samples: Vec<Frame>,
+    detect: &DetectSettings,
+    threads: usize,
+    observer: &mut dyn Observer,
+    look: impl FnOnce(&[Frame], &Levels) -> Result<T> + Send + 'static,
+) -> Result<(Levels, T)> {
     let detect = detect.clone();
-    watched(observer, move || on_threads(threads, || Levels::learn(&samples, &detect)))
+    watched(observer, move || {
+        on_threads(threads, || {
+            let levels = Levels::learn(&samples, &detect)?;
+            let seen = look(&samples, &levels)?;
+            Ok((levels, seen))
+        })
+    })
 }
 
 /// Work done on a thread of its own, so that this one hears the user.

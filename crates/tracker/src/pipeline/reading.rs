@@ -6,15 +6,17 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::ahead::End;
+use super::clutter::is_cluttered_sample;
 use super::detecting;
+use super::moving;
 use super::observer::{Observer, Stage};
-use super::opening::{learn, sample};
+use super::opening::{learn_and, sample};
 use super::request::Request;
 use super::settings::{Existing, RunSettings};
 use super::state;
 use crate::detect::{DetectSettings, Levels};
 use crate::error::{Error, Result};
-use crate::frame::{Ending, FrameSource, SourceInfo};
+use crate::frame::{Ending, Frame, FrameSource, SourceInfo};
 use crate::message::Message;
 use crate::source::threads_note;
 use crate::store::DetectionStore;
@@ -38,23 +40,29 @@ pub(super) struct Run<'a> {
     pub resumed: u64,
     /// How reading ended, if an earlier run read all of the recording.
     finished: Option<End>,
+    /// Whether the frames that were looked at before detection show more background than markers.
+    pub cluttered: bool,
     pub warnings: Vec<Message>,
 }
 
-/// The source after some of its frames were looked at, and what they teach.
+/// The source after some of its frames were looked at, what they teach, and whether they are cluttered.
 fn learned(
     settings: &RunSettings,
     detect: &DetectSettings,
     source: Box<dyn FrameSource>,
     observer: &mut dyn Observer,
-) -> Result<(Box<dyn FrameSource>, Levels)> {
+) -> Result<(Box<dyn FrameSource>, Levels, bool)> {
     observer.stage(Stage::Learn, None);
     let (source, samples) = sample(source, SAMPLES, observer)?;
-    let levels = learn(samples, detect, settings.threads, observer)?;
+    let (matters, how) = (moving::comes_first(settings), detect.clone());
+    let look = move |frames: &[Frame], levels: &Levels| {
+        Ok(matters && is_cluttered_sample(frames, &Arc::new(levels.clone()), &how)?)
+    };
+    let (levels, cluttered) = learn_and(samples, detect, settings.threads, observer, look)?;
     if observer.interrupted() {
         return Err(Error::Interrupted);
     }
-    Ok((source, levels))
+    Ok((source, levels, cluttered))
 }
 
 impl<'a> Run<'a> {
@@ -77,10 +85,13 @@ impl<'a> Run<'a> {
             Some(output) if settings.existing == Existing::Resume => state.resume(output)?,
             _ => None,
         };
-        let (source, store, levels, finished) = match earlier {
-            Some(earlier) => (source, DetectionStore::on_spool(earlier.spool)?, earlier.levels, earlier.end),
+        let (source, store, levels, finished, cluttered) = match earlier {
+            Some(earlier) => {
+                let store = DetectionStore::on_spool(earlier.spool)?;
+                (source, store, earlier.levels, earlier.end, false)
+            }
             None => {
-                let (source, levels) = learned(settings, &detect, source, observer)?;
+                let (source, levels, cluttered) = learned(settings, &detect, source, observer)?;
                 let store = match &settings.output {
                     Some(output) if files.is_empty() => {
                         // Nothing could go on from a state of this run; one of an earlier run is not this run's.
@@ -90,7 +101,7 @@ impl<'a> Run<'a> {
                     Some(output) => DetectionStore::on_spool(state.create(output, &levels)?)?,
                     None => DetectionStore::new(),
                 };
-                (source, store, levels, None)
+                (source, store, levels, None, cluttered)
             }
         };
         let store = store.of_pixels(aspect);
@@ -106,6 +117,7 @@ impl<'a> Run<'a> {
             resumed: store.len() as u64,
             store,
             finished,
+            cluttered,
             warnings,
         };
         Ok((run, source))

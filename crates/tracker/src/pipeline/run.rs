@@ -104,6 +104,15 @@ fn run_markers(
         Begun::Open(source, request) => (source, *request),
     };
     let (mut run, source) = Run::begin(settings, request, source, observer)?;
+    if run.cluttered {
+        match moving::run_first(settings, observer)? {
+            Outcome::Followed(summary) => {
+                settings.output.as_ref().map_or(Ok(()), |output| state::remove(output))?;
+                return Ok(*summary);
+            }
+            Outcome::Unclear(why) => *unclear = Some(why),
+        }
+    }
     let fresh = run.resumed == 0;
     let outcome = run.detect(source, observer).and_then(|end| run.finish(end, observer, unclear));
     // Only a run that was stopped or ran out of disk can go on; any other would fail again.

@@ -38,6 +38,7 @@ const LEAST_SPAN_REACHES: f64 = 4.0;
 const NARROW_WINDOW_RAD: f64 = 1.5;
 
 /// A search for one body in one frame.
+#[derive(Clone, Copy)]
 pub struct Search<'a> {
     /// The body.
     pub link: &'a Link,

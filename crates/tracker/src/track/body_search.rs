@@ -32,6 +32,12 @@ const STANDING_PX: f64 = 6.0;
 /// pose by less.
 const SAME_POSE_PX: f64 = 5.0;
 
+/// Two markers that come nearer than this to where they are expected are not expected any better, px: what a step of a body that
+/// starts to move is off by.
+const LEAST_MISS_PX: f64 = 1.0;
+/// Number of doublings of a distance from there on up to the widest gate: so many chances has a pair to be near.
+const NEARER: f64 = 7.0;
+
 /// Ratio of distances: a body is accepted over an indistinguishable one if it is 3 times closer to its own prediction.
 const TWIN_RATIO: f64 = 3.0;
 
@@ -303,7 +309,18 @@ impl Bodies {
     }
 
     fn chance(&self, search: &Search<'_>, s: &PoseHypothesis, trials: usize) -> f64 {
-        expected_false_matches(search, s, trials, &self.priors, self.mechanism.image_px)
+        let within = |search: &Search<'_>| {
+            expected_false_matches(search, s, trials, &self.priors, self.mechanism.image_px)
+        };
+        let anywhere = within(search);
+        let pair = search.link.nodes.len() == 2 && s.inliers == 2 && search.anchors.is_empty();
+        let Some(w) = search.window.filter(|_| pair) else { return anywhere };
+        // Two nodes that hang on nothing have nothing but where they are expected: how near to it counts, not how far it might be.
+        let link = search.link;
+        let far = |&t: &Vector2<f64>| (place(&s.fit.pose, t) - place(&w.pose, t)).norm();
+        let off_px = link.template.iter().map(far).fold(LEAST_MISS_PX, f64::max);
+        let near = Forecast { angle_rad: off_px / link.reach_px(Vector2::zeros()), origin_px: off_px, ..w };
+        anywhere.min(NEARER * within(&Search { window: Some(near), ..*search }))
     }
 }
 

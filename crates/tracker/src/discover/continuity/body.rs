@@ -16,6 +16,15 @@ const ROUNDS: usize = 12;
 const SOFT_PX: f64 = 0.15;
 const SOFT_SIGMA: f64 = 5.0;
 
+/// A body with its poses, and which tracklets its markers are.
+#[derive(Debug, Clone)]
+pub struct FoundBody {
+    /// The body.
+    pub found: Found,
+    /// For each node of its link the tracklets of the evidence.
+    pub markers: Vec<Vec<usize>>,
+}
+
 /// A body whose markers are tracklets.
 #[derive(Debug, Clone)]
 pub(super) struct TrackletBody {
@@ -126,9 +135,10 @@ impl TrackletBody {
     }
 
     /// As a rig is arranged from.
-    pub(super) fn found(&self) -> Found {
+    pub(super) fn found(&self) -> FoundBody {
         let home = self.poses.iter().flatten().next().map_or(Vector2::zeros(), |p| p.translation.vector);
         let link = link_of(self.shape.iter().map(|t| t + home).collect(), FLOOR_PX);
-        Found { link, poses: self.poses.clone() }
+        let found = Found { link, poses: self.poses.clone() };
+        FoundBody { found, markers: self.markers.clone() }
     }
 }

@@ -3,14 +3,13 @@
 //! Owns: [`bodies`], [`camera`].
 
 use super::absorb::absorb;
-use super::body::TrackletBody;
+use super::body::{FoundBody, TrackletBody};
 use super::evidence::Evidence;
 use super::hanging::hanging;
 use super::pairs::PairFacts;
 use super::stitch::{merge, stitch};
 use crate::calibrate::{Calibration, Pair, PairPlace, RigidSet, calibrate, refine};
 use crate::camera::Camera;
-use crate::discover::arrange::Found;
 use crate::error::Result;
 use crate::stop::Stop;
 
@@ -124,9 +123,9 @@ fn of_pairs(evidence: &Evidence<'_>, size_px: [f64; 2], stop: &Stop) -> Result<O
 ///
 /// # Errors
 /// [`crate::error::Error::Interrupted`] once `stop` was asked for.
-pub fn bodies(evidence: &Evidence<'_>, stop: &Stop) -> Result<Vec<Found>> {
+pub fn bodies(evidence: &Evidence<'_>, stop: &Stop) -> Result<Vec<FoundBody>> {
     let (bodies, free) = tracklet_bodies(evidence, stop)?;
-    let mut found: Vec<Found> = bodies.iter().map(TrackletBody::found).collect();
+    let mut found: Vec<FoundBody> = bodies.iter().map(TrackletBody::found).collect();
     found.extend(hanging(evidence, &bodies, &free));
     Ok(found)
 }

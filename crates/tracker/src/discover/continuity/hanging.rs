@@ -4,7 +4,7 @@
 
 use nalgebra::{Isometry2, Vector2};
 
-use super::body::TrackletBody;
+use super::body::{FoundBody, TrackletBody};
 use super::evidence::Evidence;
 use crate::discover::arrange::Found;
 use crate::discover::bodies::{FLOOR_PX, link_of};
@@ -28,7 +28,7 @@ struct Hanging {
 }
 
 /// Single markers, with their places as poses.
-pub(super) fn hanging(evidence: &Evidence<'_>, bodies: &[TrackletBody], free: &[bool]) -> Vec<Found> {
+pub(super) fn hanging(evidence: &Evidence<'_>, bodies: &[TrackletBody], free: &[bool]) -> Vec<FoundBody> {
     let mut all: Vec<Hanging> = Vec::new();
     for t in (0..evidence.tracklets.len()).filter(|&t| free[t]) {
         let ground: Vec<(usize, Vector2<f64>)> =
@@ -66,7 +66,7 @@ pub(super) fn hanging(evidence: &Evidence<'_>, bodies: &[TrackletBody], free: &[
 }
 
 /// A body of one marker.
-fn single(evidence: &Evidence<'_>, tracklets: &[usize]) -> Option<Found> {
+fn single(evidence: &Evidence<'_>, tracklets: &[usize]) -> Option<FoundBody> {
     let mut poses: Vec<Option<Isometry2<f64>>> = vec![None; evidence.frames.len()];
     for &t in tracklets {
         for k in evidence.spans[t].clone() {
@@ -76,5 +76,6 @@ fn single(evidence: &Evidence<'_>, tracklets: &[usize]) -> Option<Found> {
         }
     }
     let first = place(&poses.iter().flatten().next().copied()?, Vector2::zeros());
-    Some(Found { link: link_of(vec![first], FLOOR_PX), poses })
+    let found = Found { link: link_of(vec![first], FLOOR_PX), poses };
+    Some(FoundBody { found, markers: vec![tracklets.to_vec()] })
 }

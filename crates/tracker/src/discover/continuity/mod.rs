@@ -10,5 +10,6 @@ mod hanging;
 mod pairs;
 mod stitch;
 
+pub use body::FoundBody;
 pub use evidence::Evidence;
 pub use find::{bodies, camera};
