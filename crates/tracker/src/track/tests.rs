@@ -3,6 +3,7 @@
 
 pub(crate) mod bed;
 mod cameras;
+mod mechanisms;
 mod noise;
 mod swing;
 mod worst;
