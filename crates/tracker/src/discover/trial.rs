@@ -43,7 +43,9 @@ pub(super) fn choose(
             Ok(found) => {
                 let worth = worth(store, tracklets, &found.rig, stop)?;
                 let simpler = |rig: &Rig| {
-                    found.rig.nodes.len() >= rig.nodes.len() && found.rig.bodies.len() < rig.bodies.len()
+                    found.rig.nodes.len() >= rig.nodes.len()
+                        && found.rig.bodies.len() < rig.bodies.len()
+                        && loose(&found.rig) <= loose(rig)
                 };
                 if best.as_ref().is_none_or(|(most, b)| {
                     worth > most + BETTER || worth > most - AS_GOOD && simpler(&b.rig)
@@ -60,6 +62,12 @@ pub(super) fn choose(
             Err(Error::Rig(crate::error::Fault::new("recording", Message::from("nothing was read"))))
         }
     }
+}
+
+/// Bodies without a joint.
+fn loose(rig: &Rig) -> usize {
+    let hangs = |name: &String| rig.joints.iter().any(|j| j.bodies.contains(name));
+    rig.bodies.iter().filter(|b| !hangs(&b.name)).count()
 }
 
 /// Rows that are named less those that contradict a tracklet, as a part of the tracklets' points.

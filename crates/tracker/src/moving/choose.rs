@@ -46,6 +46,8 @@ const SAME_LOOK: f64 = 2.0;
 const CLEAR_LOOK: f64 = 2.0;
 /// Part of what looks like the only thing that moves which it must explain.
 const SOLE_PART: f64 = 0.2;
+/// Pieces that are kept at most, the longest.
+const MOST_PIECES: usize = 40;
 /// Pictures of which the one that shows most is taken, and places in it.
 const STRONGEST_PICTURES: usize = 15;
 const STRONGEST: usize = 9;
@@ -59,6 +61,8 @@ pub struct Survey {
     pub markers: Vec<Marker>,
     /// How many of them, from the first on, are of the likeliest look: they answer.
     pub answers: usize,
+    /// Shorter tracks of the same look, which may be pieces of the answers.
+    pub pieces: Vec<Marker>,
     /// Part of what looks like them that the answers explain, times how compact they are: 0 to 1.
     pub confidence: f64,
     /// Whether there is nothing but one thing that moves, whole, smoothly and far, though it is seldom of the size that it was
@@ -245,7 +249,7 @@ pub fn survey(search: &Search) -> Result<Survey> {
     let mut runs = runs.into_iter();
     let Some(winner) = runs.next() else { return Ok(Survey::default()) };
     let (model, purity, confidence) = (winner.model, winner.purity, winner.purity * winner.compact);
-    let (keep, others, heaviest) = answers(winner, search.width);
+    let Answers { keep, others, pieces, heaviest } = answers(winner, search.width);
     let marker = |t: Track, model: Model| Marker::of(film, t, model);
     let mut markers: Vec<Marker> = keep.into_iter().map(|t| marker(t, model)).collect::<Result<_>>()?;
     let answers = markers.len();
@@ -271,11 +275,19 @@ pub fn survey(search: &Search) -> Result<Survey> {
         [only] if answers == 1 => only.goes_far() && purity * only.whole(film)? >= SOLE_PART,
         _ => false,
     };
-    Ok(Survey { markers, answers, confidence, is_sole })
+    let pieces = pieces.into_iter().map(|track| Marker { track, model, radius_px }).collect();
+    Ok(Survey { markers, answers, pieces, confidence, is_sole })
 }
 
-/// Of a run the tracks that answer, others that move, and the weight of the heaviest of all.
-fn answers(winner: Run, width: f64) -> (Vec<Track>, Vec<Track>, f64) {
+/// Of a run the tracks that answer, others that move, shorter ones of the answers' look, and the weight of the heaviest of all.
+struct Answers {
+    keep: Vec<Track>,
+    others: Vec<Track>,
+    pieces: Vec<Track>,
+    heaviest: f64,
+}
+
+fn answers(winner: Run, width: f64) -> Answers {
     let radius = winner.model.radius_px();
     let heaviest = winner.group.iter().map(Track::weight).fold(0.0, f64::max);
     let mut keep: Vec<Track> =
@@ -283,7 +295,7 @@ fn answers(winner: Run, width: f64) -> (Vec<Track>, Vec<Track>, f64) {
     let mut others: Vec<Track> =
         winner.others.into_iter().filter(|t| t.weight() > OTHER_LOOK_PART * heaviest).collect();
     if keep.is_empty() {
-        return (keep, others, heaviest);
+        return Answers { keep, others, pieces: Vec::new(), heaviest };
     }
     // Once more with nothing but spots of the look that was learned.
     let look = [0, 1].map(|c| median(&mut keep.iter().map(|t| t.look[c]).collect::<Vec<_>>()));
@@ -292,10 +304,9 @@ fn answers(winner: Run, width: f64) -> (Vec<Track>, Vec<Track>, f64) {
         .iter()
         .map(|p| p.iter().filter(|s| alike(&s.look(), &look, [0.9, 1.1])).copied().collect())
         .collect();
-    let again: Vec<Track> = linked(&alone, radius, width)
-        .into_iter()
-        .filter(|t| t.moving && t.quality > LEAST_QUALITY && t.weight() > ANSWER_PART * heaviest)
-        .collect();
+    let smooth = linked(&alone, radius, width).into_iter().filter(|t| t.smoothness > LEAST_QUALITY);
+    let (again, mut pieces): (Vec<Track>, Vec<Track>) =
+        smooth.partition(|t| t.moving && t.quality > LEAST_QUALITY && t.weight() > ANSWER_PART * heaviest);
     let (group, rest) = heaviest_group(again);
     let sum = |t: &[Track]| t.iter().map(Track::weight).sum::<f64>();
     if sum(&group) > sum(&keep) {
@@ -308,7 +319,17 @@ fn answers(winner: Run, width: f64) -> (Vec<Track>, Vec<Track>, f64) {
     };
     others.extend(companions);
     join_by_look(&mut keep, radius);
-    (keep, others, heaviest)
+    pieces.extend(others.iter().cloned());
+    pieces.retain(|t| alike(&t.look, &look, LOOK) && !keep.iter().any(|k| overlap(k, t, radius)));
+    pieces.sort_by_key(|t| std::cmp::Reverse(t.count));
+    pieces.truncate(MOST_PIECES);
+    Answers { keep, others, pieces, heaviest }
+}
+
+/// Whether two tracks are in one place in some picture.
+fn overlap(a: &Track, b: &Track, radius_px: f64) -> bool {
+    let places: std::collections::HashMap<usize, &Spot> = a.spots().collect();
+    b.spots().any(|(k, s)| places.get(&k).is_some_and(|o| (o.x - s.x).hypot(o.y - s.y) < radius_px))
 }
 
 /// Whether a track goes beside a longer one and nowhere else, as a shadow or a reflection does: it is offered and not named.

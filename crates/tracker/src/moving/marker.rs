@@ -8,7 +8,7 @@ use super::backdrop::Backdrop;
 use super::centre::refine;
 use super::model::Model;
 use super::picture::Film;
-use super::rest::extend;
+use super::rest::{Places, extend};
 use super::track::Track;
 use super::tracklet::median;
 use crate::error::Result;
@@ -95,7 +95,11 @@ pub fn finish(film: &dyn Film, markers: &mut [Marker]) -> Result<()> {
         };
         // Twice: what comes to rest is looked for from places that the ground does not pull.
         refined(&mut group)?;
-        group.par_iter_mut().try_for_each(|m| extend(film, &mut m.track, &model))?;
+        let mut taken = Places::new();
+        for (k, s) in group.iter().flat_map(|m| m.track.spots()) {
+            taken.entry(k).or_default().push([s.x, s.y]);
+        }
+        group.par_iter_mut().try_for_each(|m| extend(film, &mut m.track, &model, &taken))?;
         refined(&mut group)?;
         group.iter_mut().for_each(|m| m.track.settle(m.radius_px));
     }

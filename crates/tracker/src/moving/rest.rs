@@ -2,7 +2,7 @@
 //!
 //! Owns: [`extend`]. Must not: continue onto what was there before.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 
 use super::model::Model;
 use super::picture::Film;
@@ -42,8 +42,11 @@ fn around(film: &dyn Film, picture: usize, model: &Model, at: [f64; 2], radius_p
     Ok(found)
 }
 
-/// Continues a track at both ends of each piece.
-pub fn extend(film: &dyn Film, track: &mut Track, model: &Model) -> Result<()> {
+/// Places by picture.
+pub type Places = HashMap<usize, Vec<[f64; 2]>>;
+
+/// Continues a track at both ends of each piece, but not onto places that are `taken` by other tracks.
+pub fn extend(film: &dyn Film, track: &mut Track, model: &Model, taken: &Places) -> Result<()> {
     let radius = model.radius_px();
     let mut occupied: HashSet<usize> = track.spots().map(|(k, _)| k).collect();
     let mut strengths = Vec::new();
@@ -59,7 +62,7 @@ pub fn extend(film: &dyn Film, track: &mut Track, model: &Model) -> Result<()> {
     let mut added = Vec::new();
     for k in 0..track.pieces.len() {
         for forwards in [true, false] {
-            let mut new = continued(film, &track.pieces[k], forwards, model, peak, &occupied)?;
+            let mut new = continued(film, &track.pieces[k], forwards, model, peak, (&occupied, taken))?;
             if new.len() < 2 || !was_empty_once(film, &new, model, peak)? {
                 continue;
             }
@@ -81,7 +84,7 @@ fn continued(
     forwards: bool,
     model: &Model,
     peak: f64,
-    occupied: &HashSet<usize>,
+    (occupied, taken): (&HashSet<usize>, &Places),
 ) -> Result<Vec<(usize, Spot)>> {
     let radius = model.radius_px();
     let reach = 0.15 * radius + 0.3;
@@ -110,7 +113,8 @@ fn continued(
         let looks = |s: &Spot| {
             (s.peak / peak).ln().abs() < 0.5 && area.is_none_or(|a: f64| (s.area / a).ln().abs() < 0.6)
         };
-        let mut good = found.iter().filter(|s| looks(s) && error(s) < 4.0 * reach + 0.5);
+        let free = |s: &Spot| taken.get(&k).is_none_or(|all| all.iter().all(|&p| off(s, p) > radius));
+        let mut good = found.iter().filter(|s| looks(s) && error(s) < 4.0 * reach + 0.5 && free(s));
         let near = found.iter().filter(|s| error(s) < 10.0 * reach + 0.5 && s.peak > 0.5 * peak).count();
         match (good.next(), good.next()) {
             (Some(s), None) if near == 1 => {

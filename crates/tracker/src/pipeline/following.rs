@@ -10,6 +10,7 @@ use super::moving::{self, Outcome, Unclear};
 use super::observer::{Observer, Stage};
 use super::opening::{Attended, on_threads};
 use super::reading::Run;
+use super::repeats::Repeats;
 use super::sizes::{MOST_SIZES, Sizes};
 use super::state;
 use super::summary::RunSummary;
@@ -92,6 +93,7 @@ impl Run<'_> {
         };
         let mut rows = self.settings.collect.then(Rows::default);
         let mut tally = Tally::new(&rig);
+        let mut repeats = Repeats::default();
         let mut sizes = Sizes::of(self.settings.rig.as_ref(), &rig);
         // A run that was stopped while it read is only stopped here if the user does not want to wait.
         let mut stop = end.is_none();
@@ -112,6 +114,7 @@ impl Run<'_> {
                 }
                 tally.push(observations);
                 sizes.push(observations);
+                repeats.push(observations);
                 if !stamp.decoded {
                     damage.undecoded.push(stamp.index);
                 }
@@ -130,6 +133,7 @@ impl Run<'_> {
             Err(error) => return Err(error),
         }
         self.store.check()?;
+        self.warnings.extend(repeats.words());
         let nodes = tally.summary();
         let doubtful = if stop { Vec::new() } else { self.judge(&nodes, &mut sizes)? };
         let ending = end.map(|e| e.ending).filter(|_| !stop);

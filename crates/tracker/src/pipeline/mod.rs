@@ -11,6 +11,7 @@ mod moving_nodes;
 mod observer;
 mod opening;
 mod reading;
+mod repeats;
 mod request;
 mod run;
 mod settings;

@@ -225,7 +225,7 @@ fn follow(film: &WorkFilm, limits: &Limits, wanted: &Wanted, rig: Option<&Rig>) 
         return Ok(Found::unclear(why, Candidates::default()));
     };
     let mut found = if wanted.marker.is_empty() {
-        surveyed(film, &search, wanted)?
+        surveyed(film, &search, wanted, rig)?
     } else {
         pointed(film, &search, &wanted.marker)?
     };
@@ -259,8 +259,8 @@ fn follow(film: &WorkFilm, limits: &Limits, wanted: &Wanted, rig: Option<&Rig>) 
 }
 
 /// The tracks that are likeliest meant, or were named by their numbers.
-fn surveyed(film: &WorkFilm, search: &Search, wanted: &Wanted) -> Result<Found> {
-    let Survey { markers, answers, confidence, is_sole } = survey(search)?;
+fn surveyed(film: &WorkFilm, search: &Search, wanted: &Wanted, rig: Option<&Rig>) -> Result<Found> {
+    let Survey { markers, answers, pieces, confidence, is_sole } = survey(search)?;
     let is_clear = answers > 0 && (confidence >= LEAST_CONFIDENCE || is_sole);
     let mut chosen: Vec<usize> = if is_clear { (0..answers).collect() } else { Vec::new() };
     if let Some(n) = wanted.also.iter().find(|n| !(1..=markers.len()).contains(*n)) {
@@ -297,10 +297,15 @@ fn surveyed(film: &WorkFilm, search: &Search, wanted: &Wanted) -> Result<Found> 
     }
     let others = markers.len() - chosen.len();
     let mut taken: Vec<Marker> = chosen.into_iter().map(|k| markers[k].clone()).collect();
+    let count = taken.len();
+    // Pieces belong to what was found by itself: what was named is followed as far as it can be.
+    taken.extend(pieces.into_iter().filter(|_| wanted.is_default() && rig.is_none()));
     finish(film, &mut taken)?;
+    let pieces = taken.split_off(count);
     let how =
         if wanted.also.is_empty() { Chosen::Likeliest { confidence, others } } else { Chosen::Numbered };
-    Ok(Found { moving: Ok(Moving::of(film, taken, how)), candidates: Some(candidates) })
+    let moving = Moving::of(film, taken, how).and_pieces(film, pieces);
+    Ok(Found { moving: Ok(moving), candidates: Some(candidates) })
 }
 
 /// All that moves, or what stands out where nothing does.

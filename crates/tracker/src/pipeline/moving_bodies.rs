@@ -22,10 +22,23 @@ impl Moving {
     /// # Errors
     /// [`Error::Interrupted`] once `stop` was asked for.
     pub fn find_bodies(&mut self, facts: &SourceFacts, stop: &Stop) -> Result<()> {
-        let (paths, frames) = paths(&self.rows, facts.pixel_aspect);
-        let frame = |k: usize| self.stamps[frames[k]].index;
-        let image_px = [facts.width, facts.height];
-        self.bodies = rig_of_paths(&paths, image_px, facts.pixel_aspect, &frame, stop)?;
+        let columns = self.names.len();
+        let found = |rows: &[Vec<Observation>]| {
+            let (paths, frames) = paths(rows, facts.pixel_aspect);
+            let frame = |k: usize| self.stamps[frames[k]].index;
+            rig_of_paths(&paths, [facts.width, facts.height], facts.pixel_aspect, &frame, stop)
+        };
+        self.bodies = found(&self.rows)?;
+        if self.bodies.is_some() && self.pieces.iter().any(|row| !row.is_empty()) {
+            let both = self.rows.iter().zip(&self.pieces).map(|(a, b)| [a.as_slice(), b].concat());
+            let both: Vec<Vec<Observation>> = both.collect();
+            if let (Some(whole), Some(alone)) = (found(&both)?, &mut self.bodies)
+                && let Some(paths) = extended(&alone.paths, &whole.paths)
+            {
+                self.rows = both;
+                alone.paths = paths;
+            }
+        }
         let pieces: Vec<Vec<usize>> = self.bodies.iter().flat_map(|b| b.paths.clone()).collect();
         let mut gone: Vec<usize> = Vec::new();
         for mut one in pieces.into_iter().filter(|p| p.len() > 1) {
@@ -34,8 +47,10 @@ impl Moving {
                 let seen = one.iter().copied().find(|&k| row[k].status.is_seen());
                 row[one[0]] = row[seen.unwrap_or(one[0])];
             }
-            gone.extend(&one[1..]);
+            gone.extend(one[1..].iter().filter(|k| **k < columns));
         }
+        self.rows.iter_mut().for_each(|row| row.truncate(columns));
+        self.bodies.iter_mut().flat_map(|b| &mut b.paths).for_each(|p| p.retain(|&k| k < columns));
         gone.sort_unstable_by(|a, b| b.cmp(a));
         for k in gone {
             self.rows.iter_mut().for_each(|row| {
@@ -88,6 +103,14 @@ impl Moving {
     }
 }
 
+/// Nodes' paths with those that more paths add to them; `None` where these make one node of two.
+fn extended(alone: &[Vec<usize>], whole: &[Vec<usize>]) -> Option<Vec<Vec<usize>>> {
+    let node = |paths: &Vec<usize>| whole.iter().position(|w| paths.iter().all(|p| w.contains(p)));
+    let nodes: Vec<usize> = alone.iter().map(node).collect::<Option<_>>()?;
+    let distinct = nodes.iter().all(|n| nodes.iter().filter(|m| *m == n).count() == 1);
+    distinct.then(|| nodes.into_iter().map(|n| whole[n].clone()).collect())
+}
+
 /// The columns as paths in square pixels, and which rows their frames are: those that differ from the row before. Between the first
 /// and the last frame in which a marker is seen it stays, not whole, where it was seen last.
 fn paths(rows: &[Vec<Observation>], aspect: PixelAspect) -> (Vec<Tracklet>, Vec<usize>) {
@@ -118,4 +141,34 @@ fn paths(rows: &[Vec<Observation>], aspect: PixelAspect) -> (Vec<Tracklet>, Vec<
     let nowhere = Point { place: Vector2::zeros(), area_px: 1.0, whole: false };
     let known = |t: Tracklet| if t.points.is_empty() { Tracklet { points: vec![nowhere], ..t } } else { t };
     (columns.map(path).map(known).collect(), frames)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::observation::Status;
+
+    #[test]
+    fn pieces_go_to_one_node_each_and_never_make_one_of_two() {
+        let alone = [vec![0], vec![1]];
+        assert_eq!(
+            extended(&alone, &[vec![3], vec![1, 4], vec![0, 2, 5]]),
+            Some(vec![vec![0, 2, 5], vec![1, 4]])
+        );
+        assert_eq!(extended(&alone, &[vec![0, 1]]), None);
+        assert_eq!(extended(&alone, &[vec![0, 2]]), None);
+    }
+
+    #[test]
+    fn a_path_stays_where_it_was_seen_last_and_rows_that_repeat_are_left_out() {
+        let at = |x_px: f64| Observation { x_px, y_px: 1.0, status: Status::Seen, ..Observation::MISSING };
+        let none = Observation::MISSING;
+        let rows: Vec<Vec<Observation>> =
+            [none, at(1.0), at(1.0), none, at(3.0), none].into_iter().map(|o| vec![o, none]).collect();
+        let (paths, frames) = paths(&rows, PixelAspect::SQUARE);
+        assert_eq!(frames, [0, 1, 3, 4, 5]);
+        let x: Vec<(f64, bool)> = paths[0].points.iter().map(|p| (p.place.x, p.whole)).collect();
+        assert_eq!((paths[0].first, x), (1, vec![(1.0, true), (1.0, false), (3.0, true)]));
+        assert!(paths[1].points.iter().all(|p| !p.whole));
+    }
 }

@@ -5,7 +5,7 @@
 use super::absorb::absorb;
 use super::body::{FoundBody, TrackletBody};
 use super::evidence::Evidence;
-use super::hanging::hanging;
+use super::hanging::{hanging, levels};
 use super::pairs::PairFacts;
 use super::stitch::{merge, stitch};
 use crate::calibrate::{Calibration, Pair, PairPlace, RigidSet, calibrate, refine};
@@ -135,7 +135,8 @@ fn tracklet_bodies(evidence: &Evidence<'_>, stop: &Stop) -> Result<(Vec<Tracklet
     let table = Table::of(evidence, stop)?;
     let mut free = vec![true; evidence.tracklets.len()];
     let mut bodies: Vec<TrackletBody> = Vec::new();
-    while let Some(group) = next_group(&table, &free) {
+    let levels = levels(evidence, &|a, b| table.rigid(a, b).is_some());
+    while let Some(group) = next_group(&table, &free, &levels) {
         stop.heed()?;
         for &t in &group {
             free[t] = false;
@@ -154,8 +155,9 @@ fn tracklet_bodies(evidence: &Evidence<'_>, stop: &Stop) -> Result<(Vec<Tracklet
     Ok((bodies, free))
 }
 
-/// The tracklets that are most surely one body: three or more that all keep their distances, else two.
-fn next_group(table: &Table, free: &[bool]) -> Option<Vec<usize>> {
+/// The tracklets that are most surely one body: three or more that all keep their distances, else two of which none hangs on the
+/// other.
+fn next_group(table: &Table, free: &[bool], levels: &[Option<usize>]) -> Option<Vec<usize>> {
     let n = table.n.min(SEEDS);
     let there: Vec<usize> = (0..n).filter(|&t| free[t]).collect();
     let mut best: Option<((bool, usize, f64), Vec<usize>)> = None;
@@ -197,8 +199,10 @@ fn next_group(table: &Table, free: &[bool]) -> Option<Vec<usize>> {
         return Some(group);
     }
     // Among pairs that share about as many frames the one whose distance is steadiest.
-    let pairs: Vec<(usize, usize, &PairFacts)> =
-        table.pairs().filter(|&(a, b, f)| a < n && b < n && free[a] && free[b] && f.rigid()).collect();
+    let pairs: Vec<(usize, usize, &PairFacts)> = table
+        .pairs()
+        .filter(|&(a, b, f)| a < n && b < n && free[a] && free[b] && f.rigid() && levels[a] == levels[b])
+        .collect();
     let most = pairs.iter().map(|p| p.2.frames).max()?;
     let steady = |f: &PairFacts| f.part / (f.rms_px + 1e-3);
     pairs
