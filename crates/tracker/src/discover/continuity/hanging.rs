@@ -15,6 +15,8 @@ use crate::rigid::pose::place;
 /// Circles whose middles and radii differ by less are one, px, and the same as a part of the radius.
 const SAME_PX: f64 = 1.5;
 const SAME_PART: f64 = 0.03;
+/// A marker that goes about a point by less than 5 px, the least radius of a circle that is found, stays within this, px.
+const NEAR_PIVOT_PX: f64 = 12.0;
 /// Part of the frames that a marker must be seen in.
 const LEAST_PART: f64 = 0.1;
 /// The same of one that goes about nothing.
@@ -60,7 +62,9 @@ pub(super) fn levels(evidence: &Evidence<'_>, rigid: &dyn Fn(usize, usize) -> bo
         };
         circles.iter().any(near)
     };
-    let mut out: Vec<Option<usize>> = (0..n).map(|t| on_circle(t).then_some(0)).collect();
+    // So near to its pivot a marker shows no circle, and hangs on no other.
+    let at_pivot = |t: usize| evidence.tracklets[t].extent_px() < NEAR_PIVOT_PX;
+    let mut out: Vec<Option<usize>> = (0..n).map(|t| (on_circle(t) || at_pivot(t)).then_some(0)).collect();
     for level in 0..n {
         let mut again = false;
         for t in 0..n {
