@@ -119,31 +119,3 @@ fn bodies_that_move_as_one_are_one() {
         assert!(named(&store, &rig) > 0.99, "{seed}");
     }
 }
-
-/// A chain of links with one marker each, at the joint to the next or at the tip.
-fn chain_of_single_markers(seed: u64, lengths: &[f64]) -> DetectionStore {
-    filmed(seed, |t| {
-        let mut at = [320.0, 200.0];
-        let mut seen = Vec::new();
-        for (k, length) in lengths.iter().enumerate() {
-            let k = k as f64;
-            let angle = (1.2 + 0.4 * k) * ((4.0 + 1.7 * k) * t + seed as f64 + k).sin() + 1.57;
-            at = [at[0] + length * angle.cos(), at[1] + length * angle.sin()];
-            seen.push(at);
-        }
-        seen
-    })
-}
-
-#[test]
-fn links_of_one_marker_hang_on_each_other() {
-    for seed in 1..4 {
-        for lengths in [vec![140.0, 110.0], vec![95.0, 80.0, 65.0]] {
-            let n = lengths.len();
-            let store = chain_of_single_markers(seed, &lengths);
-            let rig = discover(&store, [640, 512], &Stop::default()).unwrap().rig;
-            assert_eq!((sizes(&rig), rig.joints.len()), (vec![1; n], n), "{seed} {:?}", rig.joints);
-            assert!(named(&store, &rig) > 0.99, "{seed} {n}");
-        }
-    }
-}
