@@ -275,7 +275,7 @@ pub fn survey(search: &Search) -> Result<Survey> {
         [only] if answers == 1 => only.goes_far() && purity * only.whole(film)? >= SOLE_PART,
         _ => false,
     };
-    let pieces = pieces.into_iter().map(|track| Marker { track, model, radius_px }).collect();
+    let pieces = pieces.into_iter().map(|track| Marker { track, model: Some(model), radius_px }).collect();
     Ok(Survey { markers, answers, pieces, confidence, is_sole })
 }
 

@@ -9,6 +9,7 @@ mod moving;
 mod moving_bodies;
 mod moving_nodes;
 mod observer;
+mod one_place;
 mod opening;
 mod reading;
 mod repeats;

@@ -5,6 +5,7 @@
 use serde_json::{Value, json};
 
 use super::candidates::words;
+use super::one_place::leave_open;
 use super::repeats::copies_words;
 use super::settings::RunSettings;
 use super::summary::{MOVING, RunSummary};
@@ -25,10 +26,6 @@ use crate::wanted::Wanted;
 
 /// A marker this near to the place that a given rig has for a node is that node, in radii.
 const NAMED_RADII: f64 = 1.0;
-/// Two markers of one size are not nearer to each other than this, in radii: they are one, or one hides the other.
-const APART_RADII: f64 = 0.25;
-/// Radii of markers of one size are within this ratio.
-const ONE_SIZE: f64 = 1.5;
 /// From this part of the radius on it is said that a centre is not well known.
 const TELL_SIGMA_RADII: f64 = 0.1;
 
@@ -443,19 +440,6 @@ fn rows(film: &WorkFilm, markers: &[Marker]) -> Vec<Vec<Observation>> {
     let radius: Vec<f64> = markers.iter().map(|m| m.radius_px * scale).collect();
     rows.iter_mut().for_each(|row| leave_open(row, &radius));
     rows
-}
-
-/// Leaves open which of two markers of one size is at a place where both are said to be.
-fn leave_open(row: &mut [Observation], radius_px: &[f64]) {
-    let one = |a: usize, b: usize| {
-        let (small, large) = (radius_px[a].min(radius_px[b]), radius_px[a].max(radius_px[b]));
-        let apart = (row[a].x_px - row[b].x_px).hypot(row[a].y_px - row[b].y_px);
-        large < ONE_SIZE * small && apart < APART_RADII * small
-    };
-    let open: Vec<usize> = (0..row.len()).filter(|&a| (0..row.len()).any(|b| b != a && one(a, b))).collect();
-    for k in open {
-        row[k] = Observation { status: Status::Ambiguous, ..Observation::MISSING };
-    }
 }
 
 #[cfg(test)]
