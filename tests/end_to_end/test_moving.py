@@ -130,6 +130,23 @@ def test_a_real_film_is_right_without_settings(name: str, tmp_path: Path) -> Non
     assert any("what moves" in str(w) for w in nodes.meta["warnings"])
 
 
+@pytest.mark.skipif(not FILMS.is_dir(), reason="the films with truth are not here")
+def test_one_click_on_a_toy_car_follows_its_picture_and_says_where_it_is_lost() -> None:
+    """No row is wrong, and what is not seen in 90 % of the frames has not exit status 0."""
+    done = subprocess.run(
+        [sys.executable, "-m", "tests.validation.clicks", TRACKER, "carloop", "--films", FILMS],
+        cwd=TRACKER.parent.parent.parent,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    row = done.stdout.splitlines()[0]
+    assert row.split()[:4] == ["carloop", "said", "exit", "1"], row
+    judged = json.loads(row[row.index("{") :])
+    assert judged["coverage"]["masaA"] > 50
+    assert judged["swap_pct"] + judged["false_pct"] == 0
+
+
 def two(path: Path, frames: int = 150, seed: int = 5) -> None:
     """A large bright disc that circles, which is likeliest meant, and a small dark one beside it."""
     rng = np.random.default_rng(seed)
