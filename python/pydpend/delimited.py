@@ -112,7 +112,8 @@ class Cells:
             )
             if row is None and left in wanted and right in wanted:
                 row = self._row_of_time_decimals(fields, left, wanted)
-            if row is not None and not self._has_points():
+            # Points elsewhere may be the time's alone; a table has no leading zeros whatever stands elsewhere.
+            if row is not None and (_LEADING_ZERO.fullmatch(fields[right][row]) or not self._has_points()):
                 self.refuse(
                     f"the commas may be decimal marks: {fields[left][row]},{fields[right][row]} may be one number, or "
                     f"{fields[left][row]} in column {self.header[left]} and {fields[right][row]} in column "

@@ -95,11 +95,15 @@ def test_files_that_are_something_else(tmp_path: Path) -> None:
     for name, message in (("x.parquet", "damaged"), ("y.csv", "neither"), ("absent.csv", "cannot be read")):
         with pytest.raises(AnglesError, match=message):
             read_angles(tmp_path / name)
+    with pytest.raises(AnglesError, match=r"a folder of tables, not an angles table.*dp\.read_holds"):
+        read_angles(tmp_path)
+    folder = tmp_path / "trial"
+    folder.mkdir()
     with pytest.raises(AnglesError, match="no DPmean_data_RB0"):
-        read_angles(tmp_path)
-    np.save(tmp_path / "DPmean_data_RB0.npy", np.zeros((3, 4)))
+        read_angles(folder)
+    np.save(folder / "DPmean_data_RB0.npy", np.zeros((3, 4)))
     with pytest.raises(AnglesError, match=r"shape \(2, T\)"):
-        read_angles(tmp_path)
+        read_angles(folder)
     with pytest.raises(AnglesError, match="ending"):
         write_angles(sample(), tmp_path / "a.txt")
     with pytest.raises(AnglesError, match="cannot be written"):

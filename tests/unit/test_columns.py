@@ -151,6 +151,7 @@ CUT = {
     "whole seconds cut": "time_s,voltage_v,flag\n0,125,5\n1,125,5\n",
     "seconds cut that rise within": "time_s,voltage_v,x\n0,125,5\n0,250,6\n0,375,5\n",
     "times cut": "time_s,voltage_v,note\n0,002,5\n1,004,5\n",
+    "leading zeros behind times with points": "time_s,voltage_v,note\n0.001,5,0025\n0.002,5,0031\n",
     "leading zeros": "time_s,voltage_v,temperature\n1,5,02\n2,5,13\n",
     "many decimals": "time_s,voltage_v,x\n1,-5,6432\n2,+4,643\n3,5,64\n",
 }

@@ -255,6 +255,15 @@ def test_a_clean_swing_keeps_its_zero_sure(seed: int) -> None:
     np.testing.assert_array_less(off_deg(found, phi), 0.02)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_a_rest_held_beside_hanging_is_less_sure_for_it(seed: int) -> None:
+    t, phi = rig.drop(3.0, 500.0, seed, rest_s=1.0)
+    # The lower link is held 9 deg beside where it hangs, and goes there before the fall.
+    phi[:, 1] += np.radians(9.0) * np.clip((1.0 - t) / 0.2, 0.0, 1.0)
+    found = filmed(t, phi)
+    np.testing.assert_array_less(off_deg(found, phi), 3 * np.degrees(found.meta["zero"]["sigma_rad"]))
+
+
 def test_a_lift_by_hand_does_not_speak_against_the_rest() -> None:
     t, phi = rig.drop(0.1, 500.0, 5, rest_s=1.0)
     for links in (1, 2):

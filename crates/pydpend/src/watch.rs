@@ -39,8 +39,12 @@ impl Watch {
         self.stopped.map(|(_, error)| error)
     }
 
-    /// The result of work that is all or nothing; the exception that stopped the work comes before any other.
-    pub fn done<T>(self, py: Python<'_>, outcome: Result<T, Error>) -> PyResult<T> {
+    /// The result of work that is all or nothing, after the last count was told, so that a bar comes to its end; the exception that
+    /// stopped the work comes before any other.
+    pub fn done<T>(mut self, py: Python<'_>, outcome: Result<T, Error>) -> PyResult<T> {
+        if outcome.is_ok() && self.done > 0 {
+            self.call();
+        }
         match (outcome, self.into_error()) {
             (Ok(value), None) => Ok(value),
             (Ok(_) | Err(Error::Interrupted), Some(stopped)) => Err(stopped),

@@ -27,6 +27,10 @@ UNSEEN_SIGMA_RAD = np.radians(15.0)
 """Standard uncertainty of a rest of which neither swing nor picture says whether the links hang: one that is held more
 than three times as far off is seen to be held by whoever films it."""
 
+APART_SIGMAS = 2.0
+"""A rest farther than so many standard uncertainties from the swing's zero is not known to hang: if it does, one in
+twenty is that far off by chance, and is only said to be less sure."""
+
 BEARINGS_RAD = np.radians(0.3)
 """Ordinary dry friction lets a link stop this far off hanging: no more need be said of it."""
 
@@ -203,7 +207,7 @@ def confirmed_sigma(kept: list[Rest], zero_rad: Floats, sigma_rad: Floats, swing
     """Standard uncertainty (L,) of a zero that the swing goes about.
 
     It is at least how far they are apart where dry friction may have stopped the links: in a rest after the swing, in
-    a swing with dry friction, or where they are more than three of their sigmas apart. After a swing with dry friction
+    a swing with dry friction, or where they are more than `APART_SIGMAS` apart. After a swing with dry friction
     it is no less than that of the swing: where the links stop says no more.
     """
     after = all(rest.start_s > swing.start_s for rest in kept)
@@ -216,12 +220,14 @@ def confirmed_sigma(kept: list[Rest], zero_rad: Floats, sigma_rad: Floats, swing
 
 
 def _disagree(apart_rad: Floats, sigma_rad: Floats, swing: Swing) -> NDArray[np.bool_]:
-    """Whether zeros of rest and swing (L,) differ by more than three of their sigmas, and than bearings explain."""
-    return np.asarray(apart_rad > np.maximum(3 * np.hypot(swing.sigma_rad, sigma_rad), BEARINGS_RAD))
+    """Whether zeros of rest and swing (L,) differ by more than `APART_SIGMAS`, and than bearings explain."""
+    return np.asarray(
+        apart_rad > np.maximum(APART_SIGMAS * np.hypot(swing.sigma_rad, sigma_rad), BEARINGS_RAD)
+    )
 
 
 def off_the_swing(kept: list[Rest], zero_rad: Floats, sigma_rad: Floats, swing: Swing) -> list[str]:
-    """The note where a zero and the swing that confirms it differ by more than three of their sigmas."""
+    """The note where a zero and the swing that confirms it differ by more than `APART_SIGMAS`."""
     apart = np.abs(swing.off(zero_rad))
     if not _disagree(apart, sigma_rad, swing).any():
         return []

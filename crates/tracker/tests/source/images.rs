@@ -337,5 +337,9 @@ fn jpeg_pictures_of_every_kind_are_read_and_damage_to_their_data_is_told() {
         let mut bytes = whole.clone();
         bytes.splice(whole.len() - 2..whole.len() - 2, [0xff; 5]);
         assert!(is_read(&bytes), "file {i}: fill bytes");
+        // One more mark of a part behind the last one.
+        let mut bytes = whole.clone();
+        bytes.splice(whole.len() - 2..whole.len() - 2, [0xff, 0xd0]);
+        assert!(is_read(&bytes), "file {i}: a mark of a part at the end");
     }
 }

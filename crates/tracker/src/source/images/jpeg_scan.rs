@@ -6,7 +6,7 @@ use super::jpeg_bits::{Bits, Codes};
 
 /// Bytes behind the last block that are no damage: some cameras fill the data up to a multiple of a bus's width, at most 512 bits.
 const FILLING: usize = 64;
-/// Blocks of a picture of the largest size there is, each coded by two bits at least.
+/// Components that a picture has at most: those of colours for print.
 const MOST_COMPONENTS: usize = 4;
 
 /// What the frame's header says of a component.
@@ -38,6 +38,11 @@ pub(crate) fn check(jpeg: &[u8]) -> Result<(), String> {
     while let Some(&[0xff, marker]) = jpeg.get(at..at + 2) {
         if marker == 0xff {
             at += 1;
+            continue;
+        }
+        // Markers without a segment: some encoders end the data with one more mark of a part.
+        if matches!(marker, 0x01 | 0xd0..=0xd7) {
+            at += 2;
             continue;
         }
         if marker == 0xd9 {
