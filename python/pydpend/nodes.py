@@ -7,268 +7,44 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from pydpend import _native
+from pydpend.bare_nodes import bare_tracks, is_bare
 from pydpend.crossing import Columns, HeldColumns
-from pydpend.errors import ArgumentError, fault
-from pydpend.output import AnyPath
+from pydpend.errors import ArgumentError, TableError, fault
+from pydpend.marker_status import AMBIGUOUS, MISSING, REACQUIRED, SEEN, STATUS_WORDS, UNDECODED
+from pydpend.node_arrays import Bodies, Who, assembled
+from pydpend.output import AnyPath, path_of
+from pydpend.raw_tracks import RawTracks
+from pydpend.rig import Joint, Node, Rig, rig_of
 from pydpend.tabular import html_table
 
 if TYPE_CHECKING:
     import pandas as pd
     import pyarrow as pa
 
-MISSING, SEEN, REACQUIRED, AMBIGUOUS, UNDECODED = range(5)
-"""Numbers in `Nodes.status`: not seen; seen; the first frame back; may be it, but another name is possible; the
-frame could not be decoded."""
-
-STATUS_WORDS = ("missing", "seen", "reacquired", "ambiguous", "undecoded")
-
-
-@dataclass(frozen=True)
-class Node:
-    """One marker of a rig.
-
-    Attributes
-    ----------
-    name, body : str
-        The marker's name and its body's.
-    x_px, y_px : float
-        Centre in the reference picture, px; x right, y down.
-    """
-
-    name: str
-    body: str
-    x_px: float
-    y_px: float
-
-
-@dataclass(frozen=True)
-class Joint:
-    """A point that two bodies share, or with one body the fixed pivot.
-
-    Attributes
-    ----------
-    name : str
-        The joint's name.
-    bodies : tuple of str
-        Names of its one or two bodies.
-    x_px, y_px : float
-        Place in the reference picture, px; x right, y down.
-    """
-
-    name: str
-    bodies: tuple[str, ...]
-    x_px: float
-    y_px: float
-
-
-@dataclass(frozen=True)
-class Rig:
-    """Nodes, bodies and joints, and the picture in which they stand so.
-
-    Places are in recorded pixels, x right, y down; bodies are rigid in square pixels,
-    with a camera in the plane that it films.
-
-    Attributes
-    ----------
-    image_px : tuple of int
-        Width and height of the recording, px.
-    nodes : tuple of Node
-        The markers by body, along it; the order of all arrays over nodes.
-    bodies : tuple of str
-        Names of the links from the pivot outwards.
-    joints : tuple of Joint
-        The joints with the pivot first.
-    reference_frame : int or None
-        Index of the reference picture in the recording.
-    region : dict or None
-        Part of the picture that is looked at, as in the rig file.
-    lens : dict or None
-        Distortion of the lens, as in the rig file.
-    pixel_aspect : tuple of int
-        Width and height of a pixel (16, 15 for pixels 1.0667 times as wide as high).
-    camera : dict or None
-        Tilt and lens of the camera that films the plane, as in the rig file.
-    """
-
-    image_px: tuple[int, int]
-    nodes: tuple[Node, ...]
-    bodies: tuple[str, ...]
-    joints: tuple[Joint, ...] = ()
-    reference_frame: int | None = None
-    region: dict[str, Any] | None = None
-    lens: dict[str, Any] | None = None
-    pixel_aspect: tuple[int, int] = (1, 1)
-    camera: dict[str, Any] | None = None
-
-    @staticmethod
-    def read(path: AnyPath) -> Rig:
-        """A rig from its file (TOML), as `tracker setup` writes it.
-
-        Parameters
-        ----------
-        path : path-like
-            The rig file.
-
-        Returns
-        -------
-        Rig
-            The rig.
-
-        Raises
-        ------
-        RigError
-            Naming the line or key at fault.
-        """
-        return Rig.from_json(_native.read_rig(os.fsdecode(path)))
-
-    @staticmethod
-    def from_json(text: str) -> Rig:
-        """A rig from the JSON of a table's metadata.
-
-        Parameters
-        ----------
-        text : str
-            What `to_json` gave.
-
-        Returns
-        -------
-        Rig
-            The rig.
-
-        Raises
-        ------
-        RigError
-            Naming what is wrong.
-        """
-        _native.rig_toml(text)  # refuses what is no rig
-        return _rig(json.loads(text))
-
-    def to_dict(self) -> dict[str, Any]:
-        """The rig as plain values.
-
-        Returns
-        -------
-        dict
-            The keys of a rig file.
-        """
-        value: dict[str, Any] = json.loads(self.to_json())
-        return value
-
-    def to_json(self) -> str:
-        """The rig as the JSON of a table's metadata.
-
-        Returns
-        -------
-        str
-            `to_dict` as text.
-        """
-        value: dict[str, Any] = {"schema": 1, "image_px": list(self.image_px)}
-        width, height = self.pixel_aspect
-        if width != height:
-            value["pixel_aspect"] = f"{width}:{height}"
-        for key in ("reference_frame", "region", "lens", "camera"):
-            if getattr(self, key) is not None:
-                value[key] = getattr(self, key)
-        value["body"] = [{"name": name} for name in self.bodies]
-        value["node"] = [{"name": n.name, "body": n.body, "x_px": n.x_px, "y_px": n.y_px} for n in self.nodes]
-        value["joint"] = [
-            {"name": j.name, "bodies": list(j.bodies), "x_px": j.x_px, "y_px": j.y_px} for j in self.joints
-        ]
-        return json.dumps(value)
-
-    def to_toml(self) -> str:
-        """The rig as the text of a rig file.
-
-        Returns
-        -------
-        str
-            TOML that `Rig.read` reads.
-
-        Raises
-        ------
-        RigError
-            If the rig is wrong in itself.
-        """
-        return _native.rig_toml(self.to_json())
-
-    def write(self, path: AnyPath) -> None:
-        """Writes a rig file.
-
-        Parameters
-        ----------
-        path : path-like
-            The file; one that is there is replaced.
-
-        Raises
-        ------
-        RigError
-            If the rig is wrong in itself or the file cannot be written.
-        """
-        _native.write_rig(os.fsdecode(path), self.to_json())
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the nodes, in the order of the arrays."""
-        return tuple(n.name for n in self.nodes)
-
-    def indices(self, body: str) -> NDArray[np.intp]:
-        """Indices of a body's nodes, in the order of the arrays.
-
-        Parameters
-        ----------
-        body : str
-            Name of the body.
-
-        Returns
-        -------
-        ndarray of int, shape (K,)
-            Places of its K nodes in `nodes`.
-
-        Raises
-        ------
-        ArgumentError
-            If there is no such body.
-        """
-        if body not in self.bodies:
-            raise ArgumentError(
-                fault("body", f"{body!r} is not in the rig", f"It has {', '.join(self.bodies)}")
-            )
-        return np.array([i for i, n in enumerate(self.nodes) if n.body == body], dtype=np.intp)
-
-    def places_px(self) -> NDArray[np.float64]:
-        """Centres of the nodes in the reference picture.
-
-        Returns
-        -------
-        ndarray of float, shape (N, 2)
-            Places in px; x right, y down.
-        """
-        return np.array([[n.x_px, n.y_px] for n in self.nodes])
-
-
-def _rig(value: dict[str, Any]) -> Rig:
-    width, height = value["image_px"]
-    wide, _, high = value.get("pixel_aspect", "1:1").partition(":")
-    return Rig(
-        image_px=(int(width), int(height)),
-        nodes=tuple(Node(**n) for n in value.get("node", ())),
-        bodies=tuple(b["name"] for b in value.get("body", ())),
-        joints=tuple(
-            Joint(j["name"], tuple(j["bodies"]), j["x_px"], j["y_px"]) for j in value.get("joint", ())
-        ),
-        reference_frame=value.get("reference_frame"),
-        region=value.get("region"),
-        lens=value.get("lens"),
-        camera=value.get("camera"),
-        pixel_aspect=(int(wide), int(high)),
-    )
+__all__ = [
+    "AMBIGUOUS",
+    "MISSING",
+    "REACQUIRED",
+    "SEEN",
+    "STATUS_WORDS",
+    "UNDECODED",
+    "Bodies",
+    "Joint",
+    "Node",
+    "Nodes",
+    "Rig",
+    "nodes_of",
+    "nodes_of_tracks",
+    "read_nodes",
+]
 
 
 @dataclass(frozen=True, eq=False)
@@ -305,6 +81,85 @@ class Nodes:
     status: NDArray[np.uint8]
     rig: Rig
     meta: dict[str, Any] = field(default_factory=dict)
+
+    @classmethod
+    def from_arrays(
+        cls,
+        t_s: ArrayLike,
+        xy_px: ArrayLike,
+        *,
+        names: Sequence[str] | None = None,
+        bodies: Mapping[str, Sequence[str]] | Sequence[str] | None = None,
+        sigma_px: ArrayLike | None = None,
+        frame: ArrayLike | None = None,
+        image_px: tuple[int, int] | None = None,
+    ) -> Nodes:
+        """Nodes of places that anyone found, in T frames of N nodes.
+
+        Parameters
+        ----------
+        t_s : array_like, shape (T,)
+            Time of each frame, s, increasing.
+        xy_px : array_like, shape (T, N, 2)
+            Places in px: x right, y down, the middle of the first pixel at (0, 0). NaN where a node is not seen.
+        names : sequence of str, optional
+            Names of the nodes (N); n0, n1, ... by default.
+        bodies : dict of str to sequence of str, or sequence of str, optional
+            Nodes of each body, in the order from the pivot outwards, or the body of each node (N). A node of no body is
+            one by itself, which has no angle of its own.
+        sigma_px : array_like, optional
+            Standard uncertainty of each coordinate in px, above 0, for all, each node (N,) or each place (T, N). By
+            default how the places scatter about smooth motion.
+        frame : array_like of int, shape (T,), optional
+            Numbers of the frames, increasing from 0 or more; 0, 1, ... by default.
+        image_px : tuple of int, optional
+            Width and height of the pictures, px. By default all places are held.
+
+        Returns
+        -------
+        Nodes
+            The nodes; what was taken for what is not given stands in `notes`.
+
+        Raises
+        ------
+        ArgumentError
+            If shapes do not fit, a time does not increase or is no number, half a place is given, or a name or body is
+            not known; with the frame at fault.
+        """
+        times = _array("t_s", t_s, 1)
+        places = _array("xy_px", xy_px, 3)
+        count, width, axes = places.shape
+        if times.size != count or axes != 2:
+            shapes = f"the shapes are {times.shape} and {places.shape}"
+            raise ArgumentError(
+                fault("t_s and xy_px", shapes, "Give (T,) and (T, N, 2) for T frames of N nodes")
+            )
+        numbers = np.arange(count) if frame is None else _array("frame", frame, 1)
+        if numbers.shape != (count,) or np.any(numbers != np.round(numbers)) or np.any(np.diff(numbers) <= 0):
+            raise ArgumentError(
+                fault("frame", "it is no number of each frame", f"Give {count} whole numbers that increase")
+            )
+        called = tuple(f"n{i}" for i in range(width)) if names is None else tuple(map(str, names))
+        if len(called) != width:
+            raise ArgumentError(fault("names", f"{len(called)} names for {width} nodes", "Give one for each"))
+        sigma = None
+        if sigma_px is not None:
+            try:
+                sigma = np.broadcast_to(np.asarray(sigma_px, dtype=np.float64), (count, width))
+            except ValueError as problem:
+                advice = f"Give one number, ({width},) or ({count}, {width})"
+                raise ArgumentError(fault("sigma_px", "its shape does not fit", advice)) from problem
+        tracks = RawTracks(
+            "arrays",
+            "",
+            called,
+            numbers.astype(np.int64),
+            places,
+            times,
+            sigma=sigma,
+            image_px=image_px,
+        )
+        return cls(*assembled(tracks, bodies))
 
     def __len__(self) -> int:
         """Number of frames."""
@@ -348,6 +203,12 @@ class Nodes:
         """
         damage = self.meta.get("damage")
         return None if damage is None else _native.damage_words(json.dumps(damage))
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was assumed where the nodes are not our tracker's, in sentences; empty where they are."""
+        imported = self.meta.get("settings", {}).get("import", {})
+        return tuple(str(note) for note in imported.get("notes", ()))
 
     def check(self) -> None:
         """Checks the table's invariants: shapes, increasing frames and times, places exactly where seen.
@@ -451,21 +312,36 @@ class Nodes:
         return json.dumps({**meta, "rig": json.loads(self.rig.to_json())})
 
 
+def _array(name: str, value: ArrayLike, dimensions: int) -> NDArray[np.float64]:
+    """A caller's numbers as an array of so many dimensions, a copy. Raises ArgumentError naming it."""
+    try:
+        array = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError) as problem:
+        raise ArgumentError(fault(name, f"it is no array of numbers ({problem})", "Give one")) from problem
+    if array.ndim != dimensions:
+        raise ArgumentError(fault(name, f"its shape is {array.shape}", f"Give {dimensions} dimensions"))
+    return array
+
+
 def nodes_of(columns: Columns) -> Nodes:
     """Nodes of what the compiled half hands over."""
     frame, t_s, xy_px, sigma_px, area_px, status, text = columns
     meta = json.loads(text)
-    rig = _rig(meta.pop("rig"))
+    rig = rig_of(meta.pop("rig"))
     return Nodes(frame, t_s, xy_px, sigma_px, area_px, status, rig, meta)
 
 
 def read_nodes(path: AnyPath) -> Nodes:
-    """Nodes from a table, Parquet or CSV by the ending; every value is checked.
+    """Nodes from a table, Parquet or CSV; every value is checked.
+
+    A table that has our metadata is read by the ending of its name. One that has none, from any program, is told by its
+    columns ``frame``, ``time_s``, ``node``, ``x_px`` and ``y_px``, beside which ``body``, ``sigma_px``, ``area_px`` and
+    ``status`` may stand; what is assumed of it stands in `Nodes.notes`.
 
     Parameters
     ----------
     path : path-like
-        A table written by `tracker track` or `Nodes.write`.
+        A table written by `tracker track`, `Nodes.write` or anyone.
 
     Returns
     -------
@@ -479,4 +355,15 @@ def read_nodes(path: AnyPath) -> Nodes:
     RigError
         If the rig in it is wrong.
     """
+    file = path_of(path)
+    if is_bare(file):
+        return nodes_of_tracks(bare_tracks(file))
     return nodes_of(_native.read_table(os.fsdecode(path)))
+
+
+def nodes_of_tracks(tracks: RawTracks, bodies: Bodies = None) -> Nodes:
+    """Nodes of tracks in pixels. Raises TableError if they have no times, and naming what else is wrong."""
+    if tracks.t_s is None:
+        advice = "Write the time of each frame in s"
+        raise TableError(fault(tracks.source, "there is no column time_s", advice))
+    return Nodes(*assembled(tracks, bodies, Who(tracks.source)))

@@ -112,7 +112,7 @@ def run(args: argparse.Namespace) -> int:
         sure = zero.get("sigma_rad")
         known = f" (+- {' and '.join(f'{v:.2g}' for v in np.degrees(sure))} deg)" if sure else ""
         print(f"zero from {zero['from']}{known}; written to {args.output}")
-    for note in found.meta["notes"]:
+    for note in (*nodes.notes, *found.meta["notes"]):
         print(f"note: {note}", file=sys.stderr)
     return 1 if found.left_out else 0
 

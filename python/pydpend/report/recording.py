@@ -296,7 +296,7 @@ def read(r: StoredRecording) -> Part:
         time = nodes.meta.get("time")
         if isinstance(time, dict):
             part.warnings += [f"{part.label}: {w}" for w in time.get("notes", [])]
-        part.warnings += [f"{part.label}: {w}" for w in nodes.meta.get("warnings", [])]
+        part.warnings += [f"{part.label}: {w}" for w in (*nodes.meta.get("warnings", []), *nodes.notes)]
         ending = nodes.meta.get("ending")
         if isinstance(ending, dict) and ending.get("kind") == "early":
             part.warnings.append(f"{part.label}: the recording ended early: {ending.get('reason')}")
