@@ -6,9 +6,10 @@ Owns: reading the named columns of a table, Parquet or text, into float64. Knows
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 import pyarrow as pa
@@ -26,6 +27,10 @@ PARQUET_FAULTS = (pa.ArrowException, OSError, UnicodeDecodeError, KeyError, Memo
 
 _FIRST_LINE_BYTES = 1 << 16
 """More than the names of any table's columns."""
+
+
+Optional: TypeAlias = "Sequence[str] | Callable[[Sequence[str]], Sequence[str]] | None"
+"""Columns that may be missing: their names, or which of a header's names they are, or all."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +67,7 @@ class Columns:
 def read_columns(
     path: Path,
     required: Sequence[str],
-    optional: Sequence[str] | None = (),
+    optional: Optional = (),
     *,
     error: type[PydpendError],
     time: str | None = None,
@@ -70,9 +75,9 @@ def read_columns(
 ) -> Columns:
     """Reads the named columns of a Parquet file (by its first four bytes) or else of a delimited text file.
 
-    ``optional`` columns may be missing; ``None`` takes every column there is. The column ``time`` may hold dates, times
-    of day or durations: dates become seconds from the first, the others seconds. ``naming``: the caller's setting
-    that names columns.
+    ``optional`` columns may be missing; a function picks them from the header, ``None`` takes all. The column
+    ``time`` may hold dates, times of day or durations: dates become seconds from the first, the others seconds.
+    ``naming``: the caller's setting that names columns.
 
     In text the header is the first line that holds every required name, so notes above it do no harm, nor does a
     line of units below it, nor lines that begin with ``#``, ``%`` or ``//``. Fields are parted by commas, semicolons,
@@ -113,7 +118,7 @@ def _wanted(
     name: str,
     header: Sequence[str],
     required: Sequence[str],
-    optional: Sequence[str] | None,
+    optional: Optional,
     error: type[PydpendError],
     naming: Setting | None,
     place: str = "",
@@ -122,7 +127,8 @@ def _wanted(
     missing = [c for c in required if c not in header]
     if missing:
         raise error(no_column(name, missing, header, naming))
-    more = header if optional is None else [c for c in optional if c in header]
+    picked = optional(header) if callable(optional) else optional
+    more = header if picked is None else [c for c in picked if c in header]
     wanted = list(dict.fromkeys([*required, *more]))
     for column in wanted:
         if header.count(column) > 1:
@@ -141,7 +147,7 @@ def _parquet(
     name: str,
     data: bytes,
     required: Sequence[str],
-    optional: Sequence[str] | None,
+    optional: Optional,
     error: type[PydpendError],
     time: str | None,
     naming: Setting | None,
@@ -200,7 +206,7 @@ def _text(
     name: str,
     data: bytes,
     required: Sequence[str],
-    optional: Sequence[str] | None,
+    optional: Optional,
     error: type[PydpendError],
     time: str | None,
     naming: Setting | None,

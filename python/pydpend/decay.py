@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pydpend.errors import FitError, Setting, fault
+from pydpend.errors import SELECT, FitError, Setting, fault
 from pydpend.kinematics import LinkAngles, find_rest
 from pydpend.model import Model
 
@@ -57,6 +57,19 @@ def rates(t_s: Floats, phi_rad: Floats, span_s: float = 0.02) -> Floats:
     return out
 
 
+def check_pendulum(angles: LinkAngles) -> None:
+    """Raises FitError for angles of more links than a pendulum of the fits has."""
+    if angles.links > 2:
+        raise FitError(
+            fault(
+                angles.name,
+                f"angles of {angles.links} links ({', '.join(angles.link_names)}), and the equations of motion are of "
+                "one or two",
+                "Take the pendulum's by " + SELECT + ", from the pivot outwards",
+            )
+        )
+
+
 def find_decay(
     angles: LinkAngles, model: Model, start_s: float | None = None, stop_s: float | None = None
 ) -> Decay:
@@ -68,6 +81,7 @@ def find_decay(
 
     Raises FitError when the links do not move, or less than a second of free decay is left.
     """
+    check_pendulum(angles)
     t, phi = angles.t_s, angles.phi_rad
     if t.size < 20:
         raise FitError(fault(angles.name, f"{t.size} samples are no recording of a motion", "Record longer"))

@@ -93,6 +93,8 @@ CHECK = Step("tracker check", "nodes.status")
 """Sums up what became of each node."""
 SETUP = Step("tracker setup", "dp.setup")
 """Finds markers, bodies, joints and camera."""
+SELECT = Step("pydpend angles --bodies A,B", "dp.LinkAngles.select")
+"""Takes some links of many."""
 CALIBRATE = Step("pydpend calibrate", "dp.calibrate")
 """Makes the encoder's calibration."""
 ANALYSE = Step("pydpend analyse", "pydpend.analyse.analyse")

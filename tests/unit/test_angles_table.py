@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from pydpend.errors import AnglesError
-from pydpend.kinematics import LinkAngles, read_angles, write_angles
+from pydpend.kinematics import LinkAngles, LinkJoint, read_angles, write_angles
 
 SHARED = Path(__file__).parents[2] / ".." / "shared" / "data"
 
@@ -112,9 +112,15 @@ def test_files_that_are_something_else(tmp_path: Path) -> None:
 
 def test_the_class_refuses_shapes_that_cannot_be() -> None:
     t = np.arange(4.0)
-    for phi in (np.zeros((4, 3)), np.zeros((3, 1)), np.zeros(4)):
+    for phi in (np.zeros((4, 0)), np.zeros((3, 1)), np.zeros(4)):
         with pytest.raises(AnglesError, match="shape"):
             LinkAngles(t, phi, phi)
+    with pytest.raises(AnglesError, match="Give each link a name of its own"):
+        LinkAngles(t, np.zeros((4, 2)), np.zeros((4, 2)), link_names=("a", "a"))
+    with pytest.raises(AnglesError, match="the joint knee is of a link 'c' that is not there"):
+        LinkAngles(
+            t, np.zeros((4, 1)), np.zeros((4, 1)), link_names=("a",), joints=(LinkJoint("knee", ("a", "c")),)
+        )
     with pytest.raises(AnglesError, match="frames"):
         LinkAngles(t, np.zeros((4, 1)), np.zeros((4, 1)), np.arange(3))
 

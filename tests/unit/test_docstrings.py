@@ -24,6 +24,7 @@ a function is called after what it gives, and so is its summary."""
 GIVEN = (
     "nodes.Node",
     "nodes.Joint",
+    "kinematics.LinkJoint",
     "kinematics.Rest",
     "kinematics.Shape",
     "encoder.Hold",

@@ -1,4 +1,4 @@
-"""Angles of the links from a node table, with their uncertainties.
+"""Angles of the links of a mechanism from a node table, with their uncertainties.
 
 Angles are counter-clockwise positive, zero hanging down, counted over turns. The table written is Parquet
 or CSV by the ending of OUT.
@@ -38,7 +38,11 @@ def add_arguments(p: argparse.ArgumentParser) -> None:
         "or vertical=0.5), reference_frame, the links' angles in the rig's reference picture in degrees (12.5,-3), or "
         "the node table of a recording at rest",
     )
-    p.add_argument("--bodies", metavar="A,B", help="names of the links from the pivot outwards")
+    p.add_argument(
+        "--bodies",
+        metavar="A,B",
+        help="names of the links from the pivot outwards (default: all bodies of the rig)",
+    )
     p.add_argument("--mirrored", action="store_true", help="the film is mirror-inverted or taken from behind")
     p.add_argument("--link-length-m", type=float, metavar="M", help="pivot to elbow in metres, for the scale")
     p.add_argument(
@@ -107,7 +111,9 @@ def run(args: argparse.Namespace) -> int:
             value = sigma[k]
             noise = "not known" if value is None else f"{np.degrees(value):.4f} deg noise"
             part = "" if camera is None else f" and {np.degrees(camera[k]):.4f} deg camera"
-            print(f"phi{k + 1}: {seen[k]} of {found.t_s.size} frames, standard uncertainty {noise}{part}")
+            print(
+                f"{found.columns.stem(k)}: {seen[k]} of {found.t_s.size} frames, standard uncertainty {noise}{part}"
+            )
         zero = found.meta["zero"]
         sure = zero.get("sigma_rad")
         known = f" (+- {' and '.join(f'{v:.2g}' for v in np.degrees(sure))} deg)" if sure else ""

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydpend.damping.fitted_recording import FittedRecording
 from pydpend.damping.noise import Noise, noise
 from pydpend.damping.shooting import Track
-from pydpend.decay import Decay, find_decay
+from pydpend.decay import Decay, check_pendulum, find_decay
 from pydpend.errors import FitError, fault
 from pydpend.kinematics import LinkAngles, find_swing
 from pydpend.model import Model
@@ -147,6 +147,7 @@ def prepare(
 
     Raises FitError where there is no decay to fit.
     """
+    check_pendulum(angles)
     scatter = [highpass_noise(c) for c in angles.phi_rad.T]
     known = [v for v in scatter if np.isfinite(v)]
     swing = find_swing(

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pydpend.decay import check_pendulum
 from pydpend.errors import FitError, Setting, fault
 from pydpend.kinematics import LinkAngles
 from pydpend.model import Model
@@ -29,6 +30,7 @@ def one_body(angles: LinkAngles, elbow_rad: float = 0.0) -> tuple[LinkAngles, fl
     Where both links were measured, both say where the body is, each with its own weight; with one link the
     pinned angle is ``elbow_rad``. Raises FitError when the links move against each other.
     """
+    check_pendulum(angles)
     if angles.links == 1:
         return angles, elbow_rad
     between = angles.phi_rad[:, 1] - angles.phi_rad[:, 0]
@@ -68,7 +70,15 @@ def one_body(angles: LinkAngles, elbow_rad: float = 0.0) -> tuple[LinkAngles, fl
     if camera is not None:
         part = np.where(weight > 0, weight, 0.0) / np.where(total > 0, total, 1.0)[:, None]
         camera = (part[..., None] * np.nan_to_num(camera)).sum(axis=1)[:, None]
-    return replace(angles, phi_rad=mean[:, None], sigma_rad=error[:, None], camera_rad=camera), elbow
+    body = replace(
+        angles,
+        phi_rad=mean[:, None],
+        sigma_rad=error[:, None],
+        camera_rad=camera,
+        link_names=angles.link_names[:1],
+        joints=(),
+    )
+    return body, elbow
 
 
 def pinned(model: Model, elbow_rad: float) -> tuple[Model, float]:
@@ -95,6 +105,7 @@ def pinned(model: Model, elbow_rad: float) -> tuple[Model, float]:
 def same_links(recordings: Sequence[LinkAngles], model: Model) -> None:
     """Raises FitError for a recording that has not as many links as the model."""
     for a in recordings:
+        check_pendulum(a)
         if a.links == 1 and model.links == 2:
             raise FitError(
                 fault(

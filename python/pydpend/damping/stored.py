@@ -13,6 +13,7 @@ from pydpend.damping.maps import Maps, corrected
 from pydpend.damping.prediction import WINDOWS_S, Prediction, initial_state, predict
 from pydpend.damping.recording import prepare
 from pydpend.damping.result import DampingFit
+from pydpend.decay import check_pendulum
 from pydpend.documents import Table
 from pydpend.errors import FitError, ModelError, Setting, fault
 from pydpend.kinematics import LinkAngles
@@ -84,6 +85,7 @@ class StoredFit:
     ) -> Prediction:
         """Predicts a recording's free decay. Raises FitError when it has none, or other links than the fit."""
         model = self.model()
+        check_pendulum(angles)
         if angles.links > model.links:
             advice = (
                 "Give a table of one link (time_s, phi1_rad; zero where the body hangs), or a fit without "

@@ -226,7 +226,9 @@ class Course:
             raise EncoderError(fault(angles.name, f"it has {angles.links} link(s), not a link {link + 1}"))
         seen = angles.seen[:, link]
         if seen.sum() < 10:
-            raise EncoderError(fault(angles.name, f"phi{link + 1} is seen in {int(seen.sum())} frames only"))
+            raise EncoderError(
+                fault(angles.name, f"{angles.columns.stem(link)} is seen in {int(seen.sum())} frames only")
+            )
         t = angles.t_s[seen]
         spline = scipy.interpolate.CubicSpline(t, angles.phi_rad[seen, link])
         step = angles.step_s

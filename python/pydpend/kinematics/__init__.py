@@ -1,6 +1,6 @@
 """Angles of the links: the table every later stage starts from, and the ways from nodes to it.
 
-``table``, ``files``: the result and its file forms. ``markers``: image to world. ``pose``, ``linkage``, ``pairwise``:
+``table``, ``names``, ``files``: the result, its columns and its file forms. ``structure``: what hangs on what. ``markers``: image to world. ``pose``, ``linkage``, ``pairwise``:
 the estimators. ``body_view``, ``camera``, ``camera_slopes``: what the camera does to the angles. ``unwrap``: turns.
 ``zero``, ``swing``, ``vertical``: rests, where the motion says that the links hang, where the picture does; ``rests``,
 ``hanging``: which of them is the zero. ``estimate``: the one body that calls them.
@@ -13,6 +13,7 @@ from pydpend.kinematics.files import read_angles, write_angles, written_files
 from pydpend.kinematics.hanging import parse_zero, roll_sigma
 from pydpend.kinematics.linkage import Linkage, Shape
 from pydpend.kinematics.misfit import misfits
+from pydpend.kinematics.names import LinkJoint
 from pydpend.kinematics.pairwise import PairAngles, pair_angles
 from pydpend.kinematics.pose import Pose, fit_pose
 from pydpend.kinematics.swing import Swing, find_swing
@@ -21,6 +22,7 @@ from pydpend.kinematics.zero import Rest, find_rest
 
 __all__ = [
     "LinkAngles",
+    "LinkJoint",
     "Linkage",
     "PairAngles",
     "Pose",

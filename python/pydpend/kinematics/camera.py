@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from pydpend._native import CAMERA_BY_EYE
 from pydpend.errors import SETUP, AnglesError, fault
 from pydpend.kinematics.body_view import Evidence
+from pydpend.kinematics.names import ColumnNames
 from pydpend.kinematics.scale import PRIOR_DOF
 from pydpend.kinematics.table import CAMERA_NUMBERS, Floats
 
@@ -182,10 +183,12 @@ class CameraPart:
     notes: list[str]
 
 
-def camera_part(rig: Rig, camera: Known, slopes: Floats, at_zero: Floats, sigma: Floats) -> CameraPart:
+def camera_part(
+    rig: Rig, camera: Known, slopes: Floats, at_zero: Floats, sigma: Floats, names: ColumnNames
+) -> CameraPart:
     """The camera's part of angles with the derivatives ``slopes`` (T, L, 5), those of their zero ``at_zero`` (L, 5).
 
-    ``sigma`` (T, L): the angles' own standard uncertainties, rad.
+    ``sigma`` (T, L): the angles' own standard uncertainties, rad. ``names``: the angles'.
     """
     columns = (slopes - at_zero) @ camera.root()
     rms = rms_of(columns)
@@ -202,7 +205,7 @@ def camera_part(rig: Rig, camera: Known, slopes: Floats, at_zero: Floats, sigma:
     }
     notes = []
     if (rms > noise).any():
-        notes.append(f"{both_parts(noise, rms)}: {ORIGINS[camera.origin]}; {WHY_NOT_NOISE}")
+        notes.append(f"{both_parts(noise, rms, names)}: {ORIGINS[camera.origin]}; {WHY_NOT_NOISE}")
     if camera.significant and (asked > noise).any():
         off = " and ".join(f"{v:.2g}" for v in np.degrees(asked))
         notes.append(
@@ -224,11 +227,11 @@ def rms_of(columns_rad: Floats) -> Floats:
     return np.asarray(np.sqrt(np.nanmean((columns_rad**2).sum(axis=2), axis=0)))
 
 
-def both_parts(noise_rad: Floats, camera_rad: Floats) -> str:
+def both_parts(noise_rad: Floats, camera_rad: Floats, names: ColumnNames) -> str:
     """The two parts of each angle's standard uncertainty in words."""
     return ", ".join(
-        f"phi{k}: {np.degrees(n):.2g} deg noise, {np.degrees(c):.2g} deg camera"
-        for k, (n, c) in enumerate(zip(noise_rad, camera_rad, strict=True), 1)
+        f"{names.stem(k)}: {np.degrees(n):.2g} deg noise, {np.degrees(c):.2g} deg camera"
+        for k, (n, c) in enumerate(zip(noise_rad, camera_rad, strict=True))
     )
 
 

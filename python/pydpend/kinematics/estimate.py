@@ -9,16 +9,18 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import numpy as np
 
 from pydpend.argument_types import of_type
-from pydpend.errors import CHECK, AnglesError, Setting, fault, one_of
+from pydpend.errors import CHECK, AnglesError, Setting, Text, fault, one_of
 from pydpend.kinematics.body_view import BodyView
 from pydpend.kinematics.camera import CameraPart, camera_part, known
 from pydpend.kinematics.camera_slopes import linkage_slopes, pairwise_slopes, rigid_slopes, zero_slopes
-from pydpend.kinematics.hanging import Raw, zero_for
+from pydpend.kinematics.hanging import VERTICAL, Raw, zero_for
 from pydpend.kinematics.linkage import Linkage, Shape, first_shape
 from pydpend.kinematics.linkage_frames import checked_sigma, fit_linkage
 from pydpend.kinematics.markers import BodyMarkers, body_markers, sigma_to_image, to_image
+from pydpend.kinematics.names import ColumnNames
 from pydpend.kinematics.pairwise import pair_angles
 from pydpend.kinematics.pose import Pose, fit_pose
+from pydpend.kinematics.structure import Structure
 from pydpend.kinematics.table import Floats, LinkAngles
 from pydpend.kinematics.unwrap import unwrap
 from pydpend.nodes import Nodes
@@ -43,7 +45,7 @@ def angles(
     name: str | None = None,
     method: None = None,
 ) -> LinkAngles:
-    """Angles of one or two links from where their markers are: counter-clockwise positive, zero hanging down.
+    """Angles of links from where their markers are: counter-clockwise positive, zero hanging down.
 
     Parameters
     ----------
@@ -51,16 +53,16 @@ def angles(
         Where each marker is in each of T frames.
     estimator : {"rigid", "linkage", "pairwise"}
         ``"rigid"``: weighted least-squares pose of each body by itself, robust against a bad marker. ``"linkage"``:
-        both links and the joints they share fitted together; needs a pivot that stays in place. ``"pairwise"``: the
-        paper's Eqs. 30-32 with a circular mean.
+        one or two links and the joints they share fitted together; needs a pivot that stays in place. ``"pairwise"``:
+        the paper's Eqs. 30-32 with a circular mean.
     zero : str, float, sequence of float or Nodes
         ``"rest"`` finds the stretches in which all links hang still, and believes them if nothing in the recording
         contradicts that (docs/explanation/angles.md); ``"vertical"`` is the picture's vertical, with the camera's roll
         as standard uncertainty, 1 deg or as in ``"vertical=0.5"``; the nodes of another recording with the same rig and
         camera take the rest from there; one number per link says at what angles, in rad, the links stand in the rig's
-        reference picture; ``"reference_frame"`` says 0 for both.
+        reference picture; ``"reference_frame"`` says 0 for all.
     bodies : sequence of str, optional
-        Names of the links from the pivot outwards; in the rig's order if not given.
+        Names of the links from the pivot outwards; all of the rig's in its order if not given.
     mirrored : bool
         Whether the film was taken from behind.
     link_length_m : float, optional
@@ -105,6 +107,7 @@ def angles(
         why = nodes.damage or ending.get("reason") or ending.get("kind")
         notes.append(f"the node table is not of the whole recording ({why})")
     phi, left_out = _unwrapped(nodes, raw.theta, markers, label, gaps, notes)
+    _check_hanging(raw.structure, zero, label)
     offset, zero_meta, doubts = zero_for(nodes, phi, raw, markers, zero, bodies, mirrored, label)
     notes += doubts
     at_zero = zero_slopes(zero, zero_meta, offset, nodes.t_s, seen.slopes, seen.views, mirrored)
@@ -120,7 +123,40 @@ def angles(
         if nodes.meta.get(key) is not None:
             meta[key] = nodes.meta[key]
     sigma = _with_time(nodes.t_s, phi, white, _time_sigma_s(nodes))
-    return LinkAngles(nodes.t_s, phi, sigma, nodes.frame, meta, label, camera.columns_rad)
+    links, joints = raw.structure.links, raw.structure.between()
+    return LinkAngles(nodes.t_s, phi, sigma, nodes.frame, meta, label, camera.columns_rad, links, joints)
+
+
+def _check_hanging(structure: Structure, zero: object, label: str) -> None:
+    """Raises AnglesError where the zero is to be a rest, and links of a loop hang in none."""
+    if isinstance(zero, str) and zero == "rest" and structure.loops:
+        closing = structure.loops[0]
+        raise AnglesError(
+            fault(
+                label,
+                f"the links close a loop at {closing.name} ({' and '.join(closing.bodies)}), where none hangs by "
+                "itself, so a rest is no zero",
+                "Give "
+                + Setting("zero", VERTICAL)
+                + " (angles from the picture's vertical) or "
+                + Setting("zero", "reference_frame"),
+            )
+        )
+
+
+def _check_chain(structure: Structure, wish: Text) -> None:
+    """Raises AnglesError where what is wished needs a pendulum of one or two links."""
+    if len(structure.links) > 2 or not structure.is_chain:
+        raise AnglesError(
+            fault(
+                wish,
+                f"the links {', '.join(structure.links)} are no pendulum of one or two",
+                "Use "
+                + Setting("estimator", "rigid")
+                + " without it, or name the pendulum's with "
+                + Setting("bodies"),
+            )
+        )
 
 
 def _time_sigma_s(nodes: Nodes) -> float:
@@ -169,6 +205,7 @@ def find_linkage(nodes: Nodes, *, bodies: Sequence[str] | None = None, mirrored:
     """
     of_type("nodes", nodes, Nodes)
     poses = [fit_pose(m) for m in body_markers(nodes, bodies, mirrored)]
+    _check_chain(Structure.of(nodes.rig, [p.markers.name for p in poses]), "find_linkage")
     return fit_linkage(poses[0], poses[1] if len(poses) > 1 else None).linkage
 
 
@@ -220,7 +257,8 @@ class _Seen:
                 both = np.isfinite(pose.sigma_rad) & np.isfinite(square.sigma_rad)
                 less = square.sigma_scale / pose.sigma_scale
                 white[:, k] *= np.where(both, square.sigma_rad / pose.sigma_rad, less)
-        return camera_part(rig, camera, self.slopes, at_zero, white), white
+        names = ColumnNames(tuple(view.markers.name for view in self.views))
+        return camera_part(rig, camera, self.slopes, at_zero, white, names), white
 
 
 def _estimate(
@@ -232,8 +270,13 @@ def _estimate(
 ) -> tuple[Raw, _Seen]:
     """Turns by an estimator; ``length``: distance of pivot and elbow and its standard uncertainty, m."""
     rig, (length_m, length_sigma_m) = nodes.rig, length
+    structure = Structure.of(rig, [m.name for m in markers])
     if estimator not in ESTIMATORS:
         raise AnglesError(one_of("estimator", estimator, ESTIMATORS))
+    if estimator == "linkage" or length_m is not None:
+        _check_chain(
+            structure, Setting("estimator", estimator) if length_m is None else Setting("link_length_m")
+        )
     poses = [fit_pose(m) for m in markers]
     views = [BodyView.of(nodes, pose, mirrored) for pose in poses]
     if estimator == "pairwise":
@@ -257,7 +300,7 @@ def _estimate(
         theta = np.stack([p.mean_rad for p in pairs], axis=1)
         sigma = np.stack([p.sigma_rad * s for p, s in zip(pairs, scales, strict=True)], axis=1)
         seen = _Seen(views, poses, pairwise_slopes(views))
-        return Raw(theta, sigma, [m.reference_px for m in markers], None, meta), seen
+        return Raw(theta, sigma, [m.reference_px for m in markers], None, meta, structure), seen
     meta = {"bodies": [_body_meta(p) for p in poses]}
     lower = poses[1] if len(poses) > 1 else None
     if estimator == "rigid":
@@ -269,9 +312,9 @@ def _estimate(
             shape = linked.linkage.shape
             meta["linkage"] = _linkage_meta(linked.linkage, rig, mirrored, length_m, length_sigma_m)
         else:
-            shape = _shape_or_none(poses)
+            shape = _shape_or_none(poses) if structure.is_chain else None
         seen = _Seen(views, poses, rigid_slopes(views))
-        return Raw(theta, sigma, [p.template_px for p in poses], shape, meta), seen
+        return Raw(theta, sigma, [p.template_px for p in poses], shape, meta, structure), seen
     linked = fit_linkage(poses[0], lower)
     meta["linkage"] = _linkage_meta(linked.linkage, rig, mirrored, length_m, length_sigma_m)
     sigma, meta["notes"] = checked_sigma(linked, poses)
@@ -279,11 +322,13 @@ def _estimate(
     templates = [shape.upper_px] if lower is None else [shape.upper_px, shape.lower_px]
     weight = np.concatenate([pose.markers.weight for pose in poses], axis=1)
     seen = _Seen(views, poses, linkage_slopes(views, weight, linked))
-    return Raw(linked.theta_rad, sigma, templates, shape, meta), seen
+    return Raw(linked.theta_rad, sigma, templates, shape, meta, structure), seen
 
 
 def _shape_or_none(poses: list[Pose]) -> Shape | None:
-    """The joints from the motion; ``None`` if the links turn too little to show them."""
+    """The joints of one or two links from the motion; ``None`` of more, or if they turn too little to show them."""
+    if len(poses) > 2:
+        return None
     try:
         return first_shape(poses[0], poses[1] if len(poses) > 1 else None)
     except AnglesError:

@@ -6,8 +6,11 @@ names, and the folder of ``.npy`` files in which the paper's authors published t
 
 from __future__ import annotations
 
+import csv
+import itertools
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +26,8 @@ from pydpend.documents import parse_json, read_text
 from pydpend.errors import AnglesError, Setting, fault
 from pydpend.instants import refuse_stamps, since_1970
 from pydpend.kinds import expect
-from pydpend.kinematics.table import CAMERA_NUMBERS, Floats, LinkAngles, camera_column, check_table
+from pydpend.kinematics.names import OURS, ColumnNames, LinkJoint, noise_beside, numbered_names, stems_of
+from pydpend.kinematics.table import CAMERA_NUMBERS, Floats, LinkAngles, check_table
 from pydpend.output import AnyPath, path_of, whole, write_text
 from pydpend.units import is_of_time, unit_at_end, unit_called
 
@@ -35,7 +39,7 @@ def read_angles(
     path: AnyPath,
     *,
     columns: Mapping[str, str] | None = None,
-    hanging_rad: float | tuple[float, float] = 0.0,
+    hanging_rad: float | Sequence[float] = 0.0,
     clockwise: bool = False,
     unwrap: bool = False,
     name: str | None = None,
@@ -45,13 +49,13 @@ def read_angles(
     Parameters
     ----------
     path : path-like
-        Parquet or CSV with ``time_s``, ``phi1_rad`` (or ``phi1_deg``) and, if there is a second link, ``phi2_*``;
-        ``frame``, ``sigma1_*``, ``sigma2_*`` and the camera's ``camera1_phi1_rad`` to ``camera5_phi2_rad`` are
-        optional; empty where not seen. Or a folder with
+        Parquet or CSV with ``time_s`` and the links' angles: numbered ``phi1_rad`` (or ``phi1_deg``), ``phi2_*``, ...,
+        or named ``phi_crank_rad``, ...; ``frame``, ``sigma1_*`` or ``sigma_phi_crank_*`` and the camera's
+        ``camera1_phi1_rad`` to ``camera5_phi2_rad`` are optional; empty where not seen. Or a folder with
         ``DPmean_data_RB0.npy``, ... (rows: s, degrees) and, for the sigmas, ``DPstd_data_RB0.npy``, ....
     columns : dict of str to str, optional
         The file's columns where their names differ, ours first: ``{"time_s": "t_s", "phi1_rad": "theta1_rad"}``.
-    hanging_rad : float or tuple of float
+    hanging_rad : float or sequence of float
         What the file's angles read when the link hangs, rad (one number, or one per link); it is taken off.
     clockwise : bool
         Whether the file counts clockwise positive.
@@ -78,23 +82,25 @@ def read_angles(
     is_theirs = path.is_dir() and any(path.glob("DP*.npy"))
     expect(path, ("angles", "tables") if is_theirs else ("angles",), AnglesError)
     label = name if name is not None else (path.name if path.is_dir() else path.stem)
-    meta: dict[str, Any]
     if path.is_dir():
         if columns:
             raise AnglesError(
                 fault(Setting("columns"), f"{path} is a folder of arrays without names", "Leave it out")
             )
-        t, phi, sigma = _read_published(path)
-        frame, meta, table, camera = None, {"source": str(path), "form": "published npy"}, None, None
+        read = _read_published(path)
     else:
-        t, phi, sigma, frame, meta, table = _read_table(path, dict(columns or {}))
-        camera = _read_camera(path, table, phi.shape[1])
+        read = _read_table(path, dict(columns or {}))
+    t, phi, camera, meta, table = read.t_s, read.phi_rad, read.camera_rad, read.meta, read.table
+    if table is not None:
         if camera is None and isinstance(meta.get("bodies"), list):
             meta = meta | {"notes": [*meta.get("notes", ()), NO_CAMERA_PART]}
         t, notes = _from_first(t, table, dict(columns or {}).get("time_s", "time_s"))
         if notes:
             meta = meta | {"notes": [*meta.get("notes", ()), *notes]}
-    hanging = np.broadcast_to(np.asarray(hanging_rad, dtype=np.float64), (phi.shape[1],))
+    hanging = np.asarray(hanging_rad, dtype=np.float64)
+    if hanging.shape not in ((), (phi.shape[1],)):
+        problem = f"{hanging.size} angles for {phi.shape[1]} link(s)"
+        raise AnglesError(fault(Setting("hanging_rad"), problem, "Give one number, or one per link"))
     phi = (phi - hanging) * (-1.0 if clockwise else 1.0)
     if camera is not None and clockwise:
         camera = -camera
@@ -102,16 +108,15 @@ def read_angles(
         for k in range(phi.shape[1]):
             seen = np.isfinite(phi[:, k])
             phi[seen, k] = np.unwrap(phi[seen, k])
-    ours = dict(columns or {})
 
     def place(row: int, column: str) -> str:
-        theirs = ours.get(column, column)
+        theirs = read.theirs.get(column, column)
         return f"row {row}, column {theirs}" if table is None else table.place(row, theirs)
 
-    check_table(str(path), t, phi, sigma, frame, place)
+    check_table(str(path), (t, phi, read.sigma_rad, read.frame), ColumnNames(read.names), place)
     if table is None or not table.has_instants:
         refuse_stamps(str(path), t, AnglesError, lambda row: place(row, "time_s"))
-    return LinkAngles(t, phi, sigma, frame, meta, label, camera)
+    return LinkAngles(t, phi, read.sigma_rad, read.frame, meta, label, camera, read.names, read.joints)
 
 
 def _from_first(t: Floats, table: Columns, column: str) -> tuple[Floats, list[str]]:
@@ -130,12 +135,28 @@ NO_CAMERA_PART = (
 """What is said of angles from a film without the camera's part."""
 
 
-def _read_camera(path: Path, table: Columns, links: int) -> Floats | None:
+@dataclass(frozen=True, eq=False)
+class _Read:
+    """The parts of a table; ``theirs``: the file's name of each of our columns where it differs."""
+
+    t_s: Floats
+    phi_rad: Floats
+    sigma_rad: Floats
+    names: tuple[str, ...]
+    meta: dict[str, Any]
+    frame: NDArray[np.int64] | None = None
+    joints: tuple[LinkJoint, ...] = ()
+    camera_rad: Floats | None = None
+    table: Columns | None = None
+    theirs: dict[str, str] = field(default_factory=dict)
+
+
+def _read_camera(path: Path, table: Columns, stems: list[str]) -> Floats | None:
     """The camera's columns (T, L, 5) of a table; None where it has none.
 
     Raises :class:`AnglesError` where some are missing.
     """
-    names = [camera_column(number, link) for link in range(links) for number in range(CAMERA_NUMBERS)]
+    names = [f"camera{number + 1}_{stem}_rad" for stem in stems for number in range(CAMERA_NUMBERS)]
     there = [name for name in names if name in table.values]
     if not there:
         return None
@@ -148,10 +169,8 @@ def _read_camera(path: Path, table: Columns, links: int) -> Floats | None:
                 "Keep all columns of the camera's part, or none",
             )
         )
-    return np.stack([table.values[name] for name in names], axis=1).reshape(table.rows, links, CAMERA_NUMBERS)
-
-
-_TableParts = tuple[Floats, Floats, Floats, "NDArray[np.int64] | None", dict[str, Any], Columns]
+    columns = np.stack([table.values[name] for name in names], axis=1)
+    return columns.reshape(table.rows, len(stems), CAMERA_NUMBERS)
 
 
 def _check_units(path: Path, table: Columns, theirs: Mapping[str, str]) -> None:
@@ -172,76 +191,120 @@ def _check_units(path: Path, table: Columns, theirs: Mapping[str, str]) -> None:
                 )
 
 
-def _read_table(path: Path, columns: dict[str, str]) -> _TableParts:
-    ours = ["time_s", "frame"] + [
-        f"{q}{k}_{u}" for k in (1, 2) for q in ("phi", "sigma") for u in ("rad", "deg")
-    ]
+def _read_table(path: Path, columns: dict[str, str]) -> _Read:
     for key in columns:
-        if key not in ours:
+        if key != "time_s" and not OURS.fullmatch(key):
             raise AnglesError(
                 fault(
                     str(path),
                     Setting("columns") + f" names {key!r}, which is not one of pydpend's",
-                    f"pydpend's are {', '.join(ours)}",
+                    "pydpend's are time_s, frame, phi1_rad, phi1_deg, sigma1_rad, sigma1_deg, phi2_rad, ..., or "
+                    "with a link's name phi_NAME_rad, sigma_phi_NAME_rad",
                 )
             )
-    theirs = {c: columns.get(c, c) for c in ours}
     table = read_columns(
         path,
-        [theirs["time_s"], *(columns[c] for c in columns if c != "time_s")],
-        [theirs[c] for c in ours if c not in columns and c != "time_s"]
-        + [camera_column(number, link) for link in (0, 1) for number in range(CAMERA_NUMBERS)],
+        [columns.get("time_s", "time_s"), *(columns[c] for c in columns if c != "time_s")],
+        lambda header: [c for c in header if OURS.fullmatch(c) and c not in columns],
         error=AnglesError,
-        time=theirs["time_s"],
+        time=columns.get("time_s", "time_s"),
         naming=Setting("columns"),
     )
+    ours = [c for c in table.header if c in table.values and OURS.fullmatch(c) and c not in columns]
+    theirs = {c: c for c in ours} | {"time_s": "time_s"} | columns
     _check_units(path, table, theirs)
     if table.rows == 0:
         raise AnglesError(fault(str(path), "the table has a header and no rows", "Give one row per instant"))
+    stems = _stems(path, table, list(theirs))
 
-    def column(quantity: str, link: int) -> Floats | None:
-        rad, deg = (theirs[f"{quantity}{link}_{unit}"] for unit in ("rad", "deg"))
-        if rad in table.values and deg in table.values:
-            raise AnglesError(fault(str(path), f"both {rad} and {deg} are there", "Keep one of them"))
-        if rad in table.values:
-            return table.values[rad]
-        return np.radians(table.values[deg]) if deg in table.values else None
+    def column(stem: str, sigma: bool) -> Floats | None:
+        rad, deg = (noise_beside(stem, unit) if sigma else f"{stem}_{unit}" for unit in ("rad", "deg"))
+        if rad in theirs and deg in theirs:
+            raise AnglesError(
+                fault(str(path), f"both {theirs[rad]} and {theirs[deg]} are there", "Keep one of them")
+            )
+        if rad in theirs:
+            return table.values[theirs[rad]]
+        return np.radians(table.values[theirs[deg]]) if deg in theirs else None
 
-    found = [column("phi", k) for k in (1, 2)]
-    if found[0] is None:
+    phis = [column(stem, sigma=False) for stem in stems]
+    sigmas = [column(stem, sigma=True) for stem in stems]
+    absent = np.full(table.rows, np.nan)
+    meta = _read_meta(path, table)
+    names, joints = _names(stems, meta.pop("links", None), meta.pop("joints", None))
+    named = ColumnNames(names)
+    for k, stem in enumerate(stems):
+        unit = "rad" if f"{stem}_rad" in theirs else "deg"
+        theirs[named.phi(k)] = theirs[f"{stem}_{unit}"]
+        noise = next((c for u in ("rad", "deg") if (c := noise_beside(stem, u)) in theirs), None)
+        if noise is not None:
+            theirs[named.sigma(k)] = theirs[noise]
+    return _Read(
+        table.values[theirs["time_s"]],
+        np.column_stack([absent if p is None else p for p in phis]),
+        np.column_stack([absent if s is None else s for s in sigmas]),
+        names,
+        meta,
+        _frames(path, table, theirs.get("frame")),
+        joints,
+        _read_camera(path, table, stems),
+        table,
+        theirs,
+    )
+
+
+def _stems(path: Path, table: Columns, ours: list[str]) -> list[str]:
+    """The angles' names in a table with some of our columns. Raises :class:`AnglesError` if there are none."""
+    try:
+        stems, lacking = stems_of(ours), 1
+    except ValueError as problem:
+        stems, lacking = [], problem.args[0]
+    if stems:
+        return stems
+    later = ", and there are later ones" if lacking > 1 else ""
+    raise AnglesError(
+        fault(
+            str(path),
+            f"there is no column phi{lacking}_rad or phi{lacking}_deg{later}",
+            f"The columns are {', '.join(table.header)}; say which holds the angle with "
+            + Setting("columns"),
+        )
+    )
+
+
+def _names(stems: list[str], links: object, joints: object) -> tuple[tuple[str, ...], tuple[LinkJoint, ...]]:
+    """The links' names, by the columns or else by the metadata, and the joints between them, by the metadata."""
+    names = tuple(s.removeprefix("phi_") for s in stems)
+    if stems[0] == "phi1":
+        known = (
+            isinstance(links, list) and len(links) == len(stems) and all(isinstance(n, str) for n in links)
+        )
+        names = tuple(links) if known and isinstance(links, list) else numbered_names(len(stems))
+    found = [j for j in joints if isinstance(j, dict)] if isinstance(joints, list) else []
+    between = [(str(j.get("name")), j.get("links")) for j in found]
+    return names, tuple(
+        LinkJoint(name, (ends[0], ends[1]))
+        for name, ends in between
+        if isinstance(ends, list) and len(ends) == 2 and set(ends) <= set(names)
+    )
+
+
+def _frames(path: Path, table: Columns, column: str | None) -> NDArray[np.int64] | None:
+    """Indices in the recording (T,), if the table has them."""
+    if column is None:
+        return None
+    raw = table.values[column]
+    bad = np.flatnonzero(~np.isfinite(raw) | (raw != np.rint(raw)))
+    if bad.size:
         raise AnglesError(
             fault(
                 str(path),
-                "there is no column phi1_rad or phi1_deg",
-                f"The columns are {', '.join(table.header)}; say which holds the angle with "
-                + Setting("columns"),
+                f"{raw[bad[0]]} is not a frame's index",
+                "Give whole numbers, or leave the column out",
+                place=table.place(int(bad[0]), column),
             )
         )
-    phis = [f for f in found if f is not None]
-    absent = np.full(table.rows, np.nan)
-    sigmas = [column("sigma", k + 1) for k in range(len(phis))]
-    frame = None
-    if theirs["frame"] in table.values:
-        raw = table.values[theirs["frame"]]
-        bad = np.flatnonzero(~np.isfinite(raw) | (raw != np.rint(raw)))
-        if bad.size:
-            raise AnglesError(
-                fault(
-                    str(path),
-                    f"{raw[bad[0]]} is not a frame's index",
-                    "Give whole numbers, or leave the column out",
-                    place=table.place(int(bad[0]), theirs["frame"]),
-                )
-            )
-        frame = raw.astype(np.int64)
-    return (
-        table.values[theirs["time_s"]],
-        np.column_stack(phis),
-        np.column_stack([absent if s is None else s for s in sigmas]),
-        frame,
-        _read_meta(path, table),
-        table,
-    )
+    return raw.astype(np.int64)
 
 
 def _read_meta(path: Path, table: Columns) -> dict[str, Any]:
@@ -255,12 +318,12 @@ def _read_meta(path: Path, table: Columns) -> dict[str, Any]:
     return parse_json(text, where, AnglesError, "Write the table again").values
 
 
-def _read_published(folder: Path) -> tuple[Floats, Floats, Floats]:
+def _read_published(folder: Path) -> _Read:
     """``DPmean_data_RB{k}.npy`` and ``DPstd_data_RB{k}.npy`` of a folder: s, rad, rad."""
     t: Floats | None = None
     phis: list[Floats] = []
     sigmas: list[Floats] = []
-    for k in (0, 1):
+    for k in itertools.count():
         mean = folder / f"DPmean_data_RB{k}.npy"
         if not mean.is_file():
             break
@@ -296,7 +359,8 @@ def _read_published(folder: Path) -> tuple[Floats, Floats, Floats]:
                 "Give an angles table (Parquet or CSV) or a folder in the authors' form",
             )
         )
-    return t, np.column_stack(phis), np.column_stack(sigmas)
+    meta = {"source": str(folder), "form": "published npy"}
+    return _Read(t, np.column_stack(phis), np.column_stack(sigmas), numbered_names(len(phis)), meta)
 
 
 def _read_pair(path: Path) -> tuple[Floats, Floats]:
@@ -336,7 +400,8 @@ def write_angles(angles: LinkAngles, path: AnyPath) -> None:
     """
     of_type("angles", angles, LinkAngles)
     path = path_of(path)
-    meta = json.dumps({**angles.meta, "name": angles.name}, sort_keys=True)
+    told = {"links": list(angles.link_names), "joints": [asdict(j) for j in angles.joints]}
+    meta = json.dumps({**angles.meta, **told, "name": angles.name}, sort_keys=True)
     columns = angles.to_columns()
     if path.suffix not in (".parquet", ".csv"):
         raise AnglesError(
@@ -353,7 +418,7 @@ def write_angles(angles: LinkAngles, path: AnyPath) -> None:
                     )
             else:
                 with new.open("w", encoding="utf-8", newline="") as text:
-                    text.write(",".join(columns) + "\n")
+                    csv.writer(text, lineterminator="\n").writerow(columns)
                     for row in zip(*(v.tolist() for v in columns.values()), strict=True):
                         text.write(",".join("" if v != v else repr(v) for v in row) + "\n")
                 # Where the CSV is, its metadata are too.

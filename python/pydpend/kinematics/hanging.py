@@ -22,6 +22,7 @@ from pydpend.kinematics.rests import (
     unconfirmed,
     unconfirmed_sigma,
 )
+from pydpend.kinematics.structure import Structure
 from pydpend.kinematics.swing import Swing, find_swing
 from pydpend.kinematics.table import Floats, LinkAngles
 from pydpend.kinematics.unwrap import unwrap
@@ -37,13 +38,17 @@ VERTICAL = "vertical"
 
 @dataclass(frozen=True, eq=False)
 class Raw:
-    """Turns from the rig's reference picture before unwrapping, (T, L), and what they came from."""
+    """Turns from the rig's reference picture before unwrapping, (T, L), and what they came from.
+
+    ``structure``: what hangs on what.
+    """
 
     theta: Floats
     sigma: Floats
     templates: list[Floats]
     shape: Shape | None
     meta: dict[str, Any]
+    structure: Structure
 
 
 def parse_zero(text: str) -> str | list[float] | None:
@@ -109,7 +114,9 @@ def zero_for(
             )
         )
     down = picture_down(raw.shape, nodes, markers, mirrored)
-    swing = find_swing(nodes.t_s, phi, _noise(phi, raw.sigma), down.turn_rad)
+    swing = None
+    if raw.structure.is_chain:
+        swing = find_swing(nodes.t_s, phi, _noise(phi, raw.sigma), down.turn_rad)
     notes: list[str] = []
     if isinstance(zero, str) and zero == "rest":
         rests = find_rest(LinkAngles(nodes.t_s, phi, raw.sigma, name=label))
@@ -216,7 +223,9 @@ def _zero_from_reference(
     sigma = np.stack([p.information**-0.5 for p in poses], axis=1)
     rests = find_rest(LinkAngles(reference.t_s, turns, sigma, name="reference recording"))
     down = picture_down(raw.shape, reference, markers, mirrored)
-    swing = find_swing(reference.t_s, turns, _noise(turns, sigma), down.turn_rad)
+    swing = None
+    if raw.structure.is_chain:
+        swing = find_swing(reference.t_s, turns, _noise(turns, sigma), down.turn_rad)
     # Whoever names it says that it hangs; only upside down cannot be.
     judged = judge(rests, turns, swing, down, HANGS_WITHIN_RAD)
     kept, notes = hanging_rests(judged, swing, "reference recording")

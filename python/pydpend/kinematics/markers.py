@@ -101,10 +101,10 @@ def _scale(rig: Rig, mirrored: bool) -> Floats:
 def body_markers(
     nodes: Nodes, bodies: Sequence[str] | None = None, mirrored: bool = False
 ) -> list[BodyMarkers]:
-    """The markers of one or two bodies, from the pivot outwards (the rig's order unless ``bodies`` is given).
+    """The markers of each body, from the pivot outwards (the rig's order unless ``bodies`` is given).
 
-    Raises :class:`AnglesError` for more than two bodies, an unknown one, one that is never seen, or a seen
-    centre without a standard uncertainty.
+    Raises :class:`AnglesError` for an unknown body, one that is never seen, or a seen centre without a standard
+    uncertainty.
     """
     rig = nodes.rig
     names = list(rig.bodies)
@@ -114,12 +114,11 @@ def body_markers(
             raise AnglesError(
                 fault(Setting("bodies"), f"there is no body {name!r}", f"The rig has {', '.join(names)}")
             )
-    if not 1 <= len(wanted) <= 2 or len(set(wanted)) != len(wanted):
+    if not wanted or len(set(wanted)) != len(wanted):
+        twice = ", ".join(wanted) or "none"
         raise AnglesError(
             fault(
-                "nodes",
-                f"{len(wanted)} bodies ({', '.join(wanted)}), but angles are of one or two links",
-                "Name the upper and the lower link with " + Setting("bodies"),
+                Setting("bodies"), f"{twice}: no body, or one twice", f"Name each once of {', '.join(names)}"
             )
         )
     trusted = np.isin(nodes.status, SEEN_STATUS) & np.isfinite(nodes.xy_px).all(axis=2)
@@ -143,7 +142,7 @@ def body_markers(
                 fault(
                     "nodes",
                     f"no node of the body {name} is ever seen",
-                    "Look at " + CHECK + " of the table",
+                    "Look at " + CHECK + " of the table, or name other bodies with " + Setting("bodies"),
                 )
             )
         xy = to_world(np.where(seen[..., None], nodes.xy_px[:, index], 0.0), rig, mirrored)

@@ -123,10 +123,10 @@ def find_swing(t_s: Floats, phi_rad: Floats, noise_rad: float, down_rad: Floats)
     """The zero of the free motion in turns ``phi_rad`` (T, L), NaN where not seen; ``None`` if it does not say.
 
     ``noise_rad``: standard deviation of one angle. ``down_rad`` (L,): turn at which each link points down in the
-    picture, NaN where not known. What a hand moves obeys no such equations and is left out; only a single lift of one
-    link looks like half a swing, and is told from it by the picture.
+    picture, NaN where not known. Nothing is said of more than two links. What a hand moves obeys no such equations and
+    is left out; only a single lift of one link looks like half a swing, and is told from it by the picture.
     """
-    local = _local(t_s, phi_rad, noise_rad)
+    local = _local(t_s, phi_rad, noise_rad) if phi_rad.shape[1] in ZERO_AT else None
     if local is None:
         return None
     equations = _equations(local)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from pydpend.errors import AnglesError, Setting, Text, fault
 from pydpend.instants import seconds_of_numpy
+from pydpend.kinematics.names import NUMBERED, ColumnNames, LinkJoint, numbered_names
 from pydpend.tabular import TableResult, html_table
 
 Floats = NDArray[np.float64]
@@ -22,10 +23,13 @@ Floats = NDArray[np.float64]
 CAMERA_NUMBERS = 5
 """Numbers of a camera that angles depend on."""
 
+PER_LINK = ("sigma_rad", "reference_frame_rad")
+"""Entries of ``meta["zero"]`` that have a value for each link."""
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LinkAngles(TableResult):
-    """Angles of one or two links at T instants (L = 1 or 2 links).
+    """Angles of L links at T instants.
 
     Parameters
     ----------
@@ -47,6 +51,10 @@ class LinkAngles(TableResult):
         What the camera adds to the angles, rad, for one standard deviation of each of five independent numbers that are
         the same in all frames: with noise e, ``phi = true + e + camera_rad @ n``, n of unit variance. NaN where not
         seen. None where nothing is stated.
+    link_names : tuple of str
+        Names of the L links; ``link1``, ``link2``, ... if not given.
+    joints : tuple of pydpend.kinematics.LinkJoint
+        The joints between links of these, each with the angle `theta_rad`.
 
     Raises
     ------
@@ -61,6 +69,8 @@ class LinkAngles(TableResult):
     meta: dict[str, Any] = field(default_factory=dict)
     name: str = "angles"
     camera_rad: Floats | None = None
+    link_names: tuple[str, ...] = ()
+    joints: tuple[LinkJoint, ...] = ()
 
     def __post_init__(self) -> None:
         t = seconds_of_numpy(np.asarray(self.t_s))
@@ -70,12 +80,12 @@ class LinkAngles(TableResult):
             raise AnglesError(
                 fault(self.name, f"times of shape {t.shape}, not (T,) with T > 0", "Give one time a row")
             )
-        if phi.shape not in ((t.size, 1), (t.size, 2)) or sigma.shape != phi.shape:
+        if phi.ndim != 2 or phi.shape[0] != t.size or not phi.shape[1] or sigma.shape != phi.shape:
             raise AnglesError(
                 fault(
                     self.name,
                     f"angles of shape {phi.shape} and sigmas of shape {sigma.shape} for {t.size} times",
-                    "Both must be (T, 1) or (T, 2)",
+                    "Both must be (T, L), a column for each link",
                 )
             )
         if self.frame is not None:
@@ -88,9 +98,38 @@ class LinkAngles(TableResult):
         sigma = np.where(np.isnan(phi), np.nan, sigma)
         for key, value in (("t_s", t), ("phi_rad", phi), ("sigma_rad", sigma)):
             object.__setattr__(self, key, value)
+        self._check_names()
         if self.camera_rad is not None:
             object.__setattr__(self, "camera_rad", self._checked_camera(self.camera_rad))
-        check_table(self.name, t, phi, sigma, self.frame, lambda row, column: f"row {row}, column {column}")
+        check_table(
+            self.name,
+            (t, phi, sigma, self.frame),
+            self.columns,
+            lambda row, column: f"row {row}, column {column}",
+        )
+
+    def _check_names(self) -> None:
+        """Each link has a name of its own, and the joints are between them."""
+        names = tuple(self.link_names) or numbered_names(self.links)
+        if len(names) != self.links or len(set(names)) != self.links or not all(names):
+            raise AnglesError(
+                fault(
+                    self.name,
+                    f"the names {', '.join(map(repr, names))} for {self.links} link(s)",
+                    "Give each link a name of its own, in the order of the columns",
+                )
+            )
+        for joint in self.joints:
+            unknown = [link for link in joint.links if link not in names]
+            if unknown:
+                raise AnglesError(
+                    fault(
+                        self.name,
+                        f"the joint {joint.name} is of a link {unknown[0]!r} that is not there",
+                        f"The links are {', '.join(names)}",
+                    )
+                )
+        object.__setattr__(self, "link_names", names)
 
     def _checked_camera(self, columns: Floats) -> Floats:
         """The camera's columns, NaN where there is no angle."""
@@ -111,7 +150,7 @@ class LinkAngles(TableResult):
                     self.name,
                     f"it is {camera[row, link, number]} where there is an angle",
                     "Give the camera's part of every angle, or none at all",
-                    place=f"row {row}, column {camera_column(number, link)}",
+                    place=f"row {row}, column {self.columns.camera(number, link)}",
                 )
             )
         return np.where(self.seen[..., None], camera, np.nan)
@@ -133,8 +172,43 @@ class LinkAngles(TableResult):
 
     @property
     def links(self) -> int:
-        """Number of links, 1 or 2."""
+        """Number of links."""
         return int(self.phi_rad.shape[1])
+
+    @property
+    def columns(self) -> ColumnNames:
+        """The names of the links' columns."""
+        return ColumnNames(self.link_names)
+
+    @property
+    def theta_rad(self) -> Floats:
+        """Angle at each of the `joints`, its second link's less its first's, (T, J), rad; NaN where not seen."""
+        return self._between(self.phi_rad)
+
+    @property
+    def sigma_theta_rad(self) -> Floats:
+        """Standard uncertainty (T, J) of `theta_rad` by the links' noise, rad, which differs from frame to frame."""
+        ends = self._ends()
+        return np.asarray(np.hypot(self.sigma_rad[:, ends[1]], self.sigma_rad[:, ends[0]]))
+
+    @property
+    def sigma_camera_theta_rad(self) -> Floats:
+        """Standard uncertainty (T, J) of `theta_rad` by the camera, rad; NaN where not seen or not stated.
+
+        The camera turns the two links of a joint together in part, so it is less than both parts' squares' sum.
+        """
+        if self.camera_rad is None:
+            return np.full(self.theta_rad.shape, np.nan)
+        return np.asarray(np.sqrt((self._between(self.camera_rad) ** 2).sum(axis=2)))
+
+    def _ends(self) -> list[list[int]]:
+        """Indices of the joints' first links, and of their second ones."""
+        return [[self.link_names.index(joint.links[k]) for joint in self.joints] for k in (0, 1)]
+
+    def _between(self, values: Floats) -> Floats:
+        """Differences (T, J, ...) over the joints of the links' values (T, L, ...)."""
+        first, second = self._ends()
+        return np.asarray(values[:, second] - values[:, first])
 
     @property
     def seen(self) -> NDArray[np.bool_]:
@@ -150,6 +224,49 @@ class LinkAngles(TableResult):
     def left_out(self) -> int:
         """The number of angles or readings left out on the way here; ``meta["notes"]`` says which and why."""
         return int(self.meta.get("left_out", 0))
+
+    def select(self, *links: str) -> LinkAngles:
+        """The angles of some of the links.
+
+        Parameters
+        ----------
+        *links : str
+            Their names, in the order that is wanted.
+
+        Returns
+        -------
+        LinkAngles
+            These, with the joints between them.
+
+        Raises
+        ------
+        AnglesError
+            For a link that is not there.
+        """
+        for name in links:
+            if name not in self.link_names:
+                advice = f"The links are {', '.join(self.link_names)}"
+                raise AnglesError(fault(self.name, f"there is no link {name!r}", advice))
+        index = [self.link_names.index(name) for name in links]
+        meta = dict(self.meta)
+        zero = meta.get("zero")
+        if isinstance(zero, dict):
+            # What the zero says of each link goes with the links.
+            meta["zero"] = zero | {k: [zero[k][i] for i in index] for k in PER_LINK if k in zero}
+        if isinstance(meta.get("bodies"), list):
+            meta["bodies"] = [body for body in meta["bodies"] if body.get("name") in links]
+        camera = meta.get("camera")
+        if isinstance(camera, dict) and "rms_rad" in camera:
+            meta["camera"] = camera | {"rms_rad": [camera["rms_rad"][i] for i in index]}
+        return replace(
+            self,
+            phi_rad=self.phi_rad[:, index],
+            sigma_rad=self.sigma_rad[:, index],
+            meta=meta,
+            camera_rad=None if self.camera_rad is None else self.camera_rad[:, index],
+            link_names=tuple(links),
+            joints=tuple(j for j in self.joints if set(j.links) <= set(links)),
+        )
 
     def between(self, start_s: float | None = None, stop_s: float | None = None) -> LinkAngles:
         """The rows with ``start_s <= t <= stop_s``.
@@ -198,27 +315,38 @@ class LinkAngles(TableResult):
         -------
         dict of str to ndarray, each of shape (T,)
             ``frame`` if there is one, ``time_s``, and of each link ``phi1_rad``, ``sigma1_rad`` (the noise) and, where
-            the camera's part is stated, ``sigma_camera1_rad`` and ``camera1_phi1_rad`` to ``camera5_phi1_rad``.
+            the camera's part is stated, ``sigma_camera1_rad`` and ``camera1_phi1_rad`` to ``camera5_phi1_rad``. Of more
+            than two links their names stand in place of the numbers: ``phi_crank_rad``, ``sigma_phi_crank_rad``,
+            ``sigma_camera_phi_crank_rad``, ``camera1_phi_crank_rad``. Last of each joint ``theta_elbow_rad``,
+            ``sigma_theta_elbow_rad`` and ``sigma_camera_theta_elbow_rad``.
         """
+        names = self.columns
         out: dict[str, NDArray[Any]] = {}
         if self.frame is not None:
             out["frame"] = self.frame
         out["time_s"] = self.t_s
         for k in range(self.links):
-            out[f"phi{k + 1}_rad"] = self.phi_rad[:, k]
+            out[names.phi(k)] = self.phi_rad[:, k]
         for k in range(self.links):
-            out[f"sigma{k + 1}_rad"] = self.sigma_rad[:, k]
+            out[names.sigma(k)] = self.sigma_rad[:, k]
         if self.camera_rad is not None:
             for k in range(self.links):
-                out[f"sigma_camera{k + 1}_rad"] = self.sigma_camera_rad[:, k]
+                out[names.sigma_camera(k)] = self.sigma_camera_rad[:, k]
             for k in range(self.links):
                 for number in range(CAMERA_NUMBERS):
-                    out[camera_column(number, k)] = self.camera_rad[:, k, number]
+                    out[names.camera(number, k)] = self.camera_rad[:, k, number]
+        parts = [("theta", self.theta_rad), ("sigma_theta", self.sigma_theta_rad)]
+        if self.camera_rad is not None:
+            parts.append(("sigma_camera_theta", self.sigma_camera_theta_rad))
+        for part, values in parts:
+            out |= {f"{part}_{j.name}_rad": values[:, k] for k, j in enumerate(self.joints)}
         return out
 
     def __repr__(self) -> str:
         """A line for people."""
-        seen = " and ".join(f"{100 * part:.1f} %" for part in self.seen.mean(axis=0))
+        parts = [f"{100 * part:.1f} %" for part in self.seen.mean(axis=0)]
+        # Of many links one line has room for the least and the most.
+        seen = " and ".join(parts if self.links <= NUMBERED else dict.fromkeys((min(parts), max(parts))))
         span = f"{self.t_s[0]:g} to {self.t_s[-1]:g} s"
         links = f"{self.links} link{'s'[: self.links > 1]}"
         return f"<LinkAngles {self.name}: {self.t_s.size} times x {links}, {span}, {seen} seen>"
@@ -235,26 +363,25 @@ class LinkAngles(TableResult):
             of_camera = f"{math.degrees(float(np.sqrt(np.mean(camera**2)))):.4f} deg"
             if not np.isfinite(camera).any():
                 of_camera = "not stated"
-            rows.append((f"phi{k + 1}", f"{100 * seen.mean():.1f} %", f"{turns:.2f} turns", error, of_camera))
+            rows.append(
+                (self.columns.stem(k), f"{100 * seen.mean():.1f} %", f"{turns:.2f} turns", error, of_camera)
+            )
         return html_table(
             repr(self)[1:-1], ("angle", "seen", "range", "median noise", "camera's part (RMS)"), rows
         )
 
 
-def camera_column(number: int, link: int) -> str:
-    """Name of the column of one of the camera's numbers for a link, both from 0."""
-    return f"camera{number + 1}_phi{link + 1}_rad"
-
-
 def check_table(
     name: str,
-    t: Floats,
-    phi: Floats,
-    sigma: Floats,
-    frame: NDArray[np.int64] | None,
+    table: tuple[Floats, Floats, Floats, NDArray[np.int64] | None],
+    columns: ColumnNames,
     place: Callable[[int, str], str],
 ) -> None:
-    """Times finite and rising, angles not infinite, sigmas not negative, no wrap between neighbours."""
+    """Times finite and rising, angles not infinite, sigmas not negative, no wrap between neighbours.
+
+    ``table``: times, angles, sigmas and frames.
+    """
+    t, phi, sigma, frame = table
 
     def refuse_first(bad: NDArray[np.bool_], column: str, say: Callable[[int], str], advice: Text) -> None:
         """The error for the first row that is ``bad``, if there is one."""
@@ -290,26 +417,26 @@ def check_table(
     )
 
     def check_link(k: int, angle: Floats, error: Floats) -> None:
-        """Checks the angles and sigmas of link ``k``, from 1, at the T times."""
+        """Checks the angles and sigmas of link ``k``, from 0, at the T times."""
         refuse_first(
             np.isinf(angle),
-            f"phi{k}_rad",
+            columns.phi(k),
             lambda i: "the angle is infinite",
             "Leave the field empty where the link was not seen",
         )
         refuse_first(
             (error < 0) | np.isinf(error),
-            f"sigma{k}_rad",
+            columns.sigma(k),
             lambda i: f"the standard uncertainty {error[i]:.6g} rad cannot be",
             "Give a finite one that is not negative, or none",
         )
         jump = np.abs(np.diff(angle, prepend=np.nan))
         refuse_first(
             (jump > math.pi) & neighbours,
-            f"phi{k}_rad",
+            columns.phi(k),
             lambda i: f"the angle jumps by {jump[i]:.4g} rad from one row to the next: it is not unwrapped",
             "Read it with " + Setting("unwrap", True),
         )
 
     for k in range(phi.shape[1]):
-        check_link(k + 1, phi[:, k], sigma[:, k])
+        check_link(k, phi[:, k], sigma[:, k])

@@ -10,6 +10,7 @@ import numpy as np
 from pydpend.errors import AnglesError, Setting, fault
 from pydpend.kinematics.linkage import Shape
 from pydpend.kinematics.markers import BodyMarkers, to_world
+from pydpend.kinematics.structure import Structure
 from pydpend.kinematics.swing import within_half_turn
 from pydpend.kinematics.table import Floats
 
@@ -30,11 +31,12 @@ class Down:
 
     ``turn_rad`` (L,): within (-pi, pi], NaN where the link's joint is not known. ``sigma_rad`` (L,): how uncertain the
     link's own direction is. That of a link with two joints is the line through them; that of the last one leads from
-    its joint to the mean of its markers, as sure as these lie on a line.
+    its joint to the mean of its markers, as sure as these lie on a line. ``links``: their names.
     """
 
     turn_rad: Floats
     sigma_rad: Floats
+    links: tuple[str, ...]
 
     def off(self, turn_rad: Floats) -> Floats:
         """The distance of turns (L,) from the picture's vertical, rad, within (-pi, pi]; NaN where it is not known."""
@@ -44,7 +46,8 @@ class Down:
 def picture_down(shape: Shape | None, nodes: Nodes, markers: list[BodyMarkers], mirrored: bool) -> Down:
     """The turns at which the links point down, by the joints found from the motion, or else by those of the rig."""
     found = [_direction(v) for v in _vectors(shape, nodes, markers, mirrored)]
-    return Down(np.array([turn for turn, _ in found]), np.array([sigma for _, sigma in found]))
+    links = tuple(m.name for m in markers)
+    return Down(np.array([turn for turn, _ in found]), np.array([sigma for _, sigma in found]), links)
 
 
 def vertical_zero(down: Down, roll_sigma_rad: float, label: str) -> tuple[Floats, Floats]:
@@ -57,7 +60,7 @@ def vertical_zero(down: Down, roll_sigma_rad: float, label: str) -> tuple[Floats
         raise AnglesError(
             fault(
                 label,
-                f"the joint of link {unknown[0] + 1} is not known, so the picture does not say when it hangs",
+                f"the joint of link {down.links[unknown[0]]} is not known, so the picture does not say when it hangs",
                 "Put the joint into the rig, or give "
                 + Setting("zero")
                 + " with the links' angles in the rig's reference picture or a recording in which they hang at rest",
@@ -87,12 +90,15 @@ def _vectors(
     if shape is not None:
         return [shape.upper_px] if shape.links == 1 else [shape.elbow_px[None], shape.lower_px]
     rig = nodes.rig
-    joints = {j.bodies: to_world(np.array([j.x_px, j.y_px]), rig, mirrored) for j in rig.joints}
-    pivot = next((p for b, p in joints.items() if tuple(b) == (markers[0].name,)), None)
-    elbow = next((p for b, p in joints.items() if len(b) == 2), None)
-    if len(markers) == 1:
-        return [None if pivot is None else markers[0].reference_px - pivot]
-    upper = None
-    if pivot is not None:
-        upper = markers[0].reference_px - pivot if elbow is None else (elbow - pivot)[None]
-    return [upper, None if elbow is None else markers[1].reference_px - elbow]
+    structure = Structure.of(rig, [m.name for m in markers])
+    at = {j.name: to_world(np.array([j.x_px, j.y_px]), rig, mirrored) for j in structure.joints}
+    out: list[Floats | None] = []
+    for body, inner in zip(markers, structure.inner, strict=True):
+        outer = [j for j in structure.joints if body.name in j.bodies and j is not inner]
+        if inner is None:
+            out.append(None)
+        elif outer:
+            out.append((at[outer[0].name] - at[inner.name])[None])
+        else:
+            out.append(body.reference_px - at[inner.name])
+    return out

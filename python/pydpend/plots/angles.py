@@ -18,6 +18,7 @@ from pydpend.kinematics.increments import (
     vectors_of,
 )
 from pydpend.kinematics.markers import BodyMarkers
+from pydpend.kinematics.names import NUMBERED
 from pydpend.kinematics.table import LinkAngles
 from pydpend.plots.style import COLORS, new_figure, plain, style
 
@@ -70,17 +71,18 @@ def angles_figure(angles: LinkAngles, title: str | None = None) -> Figure:
         figure = new_figure(6.5, 4.2)
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
         for k in range(angles.links):
-            name = f"$\\phi_{k + 1}$"
-            upper.plot(*thinned(angles.t_s, np.degrees(angles.phi_rad[:, k])), color=COLORS[k], label=name)
+            color = COLORS[k % len(COLORS)]
+            name = _phi(angles, k)
+            upper.plot(*thinned(angles.t_s, np.degrees(angles.phi_rad[:, k])), color=color, label=name)
             sigma = np.degrees(angles.sigma_rad[:, k])
             if np.isfinite(sigma).any():
                 t, low, middle, high = spread(angles.t_s, sigma)
-                lower.fill_between(t, low, high, color=COLORS[k], alpha=0.25, lw=0)
-                lower.plot(t, middle, color=COLORS[k], label=f"$\\sigma_{{\\phi_{k + 1}}}$ noise")
+                lower.fill_between(t, low, high, color=color, alpha=0.25, lw=0)
+                lower.plot(t, middle, color=color, label=f"{_sigma(angles, k)} noise")
             part = np.degrees(angles.sigma_camera_rad[:, k])
             if np.isfinite(part).any():
                 t, _, middle, _ = spread(angles.t_s, part)
-                lower.plot(t, middle, color=COLORS[k], ls=":", label=f"$\\sigma_{{\\phi_{k + 1}}}$ camera")
+                lower.plot(t, middle, color=color, ls=":", label=f"{_sigma(angles, k)} camera")
         upper.set_ylabel("angle in deg")
         upper.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=2, borderaxespad=0)
         upper.set_title(plain(title if title is not None else angles.name), loc="left", fontsize=9)
@@ -94,6 +96,20 @@ def angles_figure(angles: LinkAngles, title: str | None = None) -> Figure:
                 0.5, 0.5, "no uncertainties stated", transform=lower.transAxes, ha="center", va="center"
             )
         return figure
+
+
+def _phi(angles: LinkAngles, link: int) -> str:
+    """The symbol of a link's angle: with its number, or its name where there are more than two."""
+    if angles.links <= NUMBERED:
+        return f"$\\phi_{link + 1}$"
+    return f"$\\phi$ {plain(angles.link_names[link])}"
+
+
+def _sigma(angles: LinkAngles, link: int) -> str:
+    """The symbol of its standard uncertainty."""
+    if angles.links <= NUMBERED:
+        return f"$\\sigma_{{\\phi_{link + 1}}}$"
+    return f"$\\sigma$ {plain(angles.link_names[link])}"
 
 
 def body_methods_figure(markers: BodyMarkers) -> Figure:

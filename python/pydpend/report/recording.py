@@ -89,17 +89,19 @@ class Part:
         a = self.angles
         degrees = np.degrees(a.phi_rad)
         sigmas = np.degrees(a.sigma_rad)
-        angle = tuple(Series(f"phi{k + 1} (deg)", degrees[:, k], k) for k in range(a.links))
+        angle = tuple(Series(f"{a.columns.stem(k)} (deg)", degrees[:, k], k) for k in range(a.links))
         blocks: list[Block] = [
             *self._film_blocks(id_),
             Chart(f"{id_}-phi", "Angles", id_, a.t_s, angle, y_label="angle (deg)", height=280),
         ]
         if np.isfinite(sigmas).any():
-            sigma = tuple(Series(f"noise of phi{k + 1} (deg)", sigmas[:, k], k) for k in range(a.links))
+            sigma = tuple(
+                Series(f"noise of {a.columns.stem(k)} (deg)", sigmas[:, k], k) for k in range(a.links)
+            )
             part = np.degrees(a.sigma_camera_rad)
             if np.isfinite(part).any():
                 sigma += tuple(
-                    Series(f"camera's part of phi{k + 1} (deg)", part[:, k], k, dashed=True)
+                    Series(f"camera's part of {a.columns.stem(k)} (deg)", part[:, k], k, dashed=True)
                     for k in range(a.links)
                 )
             blocks.append(
@@ -317,11 +319,16 @@ def read(r: StoredRecording) -> Part:
             sigma = part.angles.sigma_rad[:, k]
             if np.isfinite(sigma).any():
                 noise = f"{digits(math.degrees(np.nanmedian(sigma)))} deg noise"
-                rows.append((f"uncertainty of phi{k + 1}", noise + _camera_in_words(part.angles, k)))
+                rows.append(
+                    (
+                        f"uncertainty of {part.angles.columns.stem(k)}",
+                        noise + _camera_in_words(part.angles, k),
+                    )
+                )
         turns = (np.nanmax(part.angles.phi_rad, axis=0) - np.nanmin(part.angles.phi_rad, axis=0)) / (
             2 * np.pi
         )
-        rows += [(f"range of phi{k + 1}", f"{t:.2f} turns") for k, t in enumerate(turns)]
+        rows += [(f"range of {part.angles.columns.stem(k)}", f"{t:.2f} turns") for k, t in enumerate(turns)]
     if r.did("overlay"):
         part.film = r.overlay()
     if r.did("encoder"):
