@@ -227,8 +227,11 @@ def summary(each: Sequence[DampingFit], joint: DampingFit) -> Trials:
         for name, estimate in getattr(joint, group).items():
             pairs = np.array([(getattr(f, group)[name].value, getattr(f, group)[name].sigma) for f in each])
             if (pairs[:, 1] > 0).all():
-                of_camera = np.array([f.camera_sigma.get(name, 0.0) for f in each])
-                shared = of_camera if one_camera and group == "coefficients" else None
+                of_camera = np.array([f.camera_sigma.get(name, 0.0) if one_camera else 0.0 for f in each])
+                of_parts = np.array(
+                    [0.0 if f.consistency is None else f.consistency.sigma.get(name, 0.0) for f in each]
+                )
+                shared = np.hypot(of_camera, of_parts) if group == "coefficients" else None
                 spreads[name] = combine(pairs[:, 0], pairs[:, 1], estimate.unit, shared)
     differing = [name for name, s in spreads.items() if s.p_value < 0.01]
     message = (

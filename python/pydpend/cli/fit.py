@@ -26,7 +26,7 @@ from pydpend.fit_status import FitStatus
 from pydpend.terminal import below
 
 if TYPE_CHECKING:
-    from pydpend.damping import DampingFit
+    from pydpend.damping import DampingFit, RatioCheck
     from pydpend.kinematics import LinkAngles
 
 HELP = "damping of each joint from angles of free decays"
@@ -165,13 +165,15 @@ def describe(fit: DampingFit) -> list[str]:
     """The result in lines for a reader."""
     from pydpend.damping.prediction import slashed
 
-    lines = [fit.message]
+    warned = [note for note in fit.notes if note.startswith("warning: ")]
+    lines = [fit.message, *warned]
     for name, e in fit.coefficients.items():
         lines.append(f"{name:12s} {e.value: .4e} +- {e.sigma:.1e} {e.unit}")
     for name, e in ({} if fit.ten is None else fit.ten.values).items():
         lines.append(f"of ten: {name:8s} {e.value: .4e} +- {e.sigma:.1e} {e.unit}")
     for name, e in fit.ratios.items():
-        lines.append(f"{name + '/psi':12s} {e.value: .6g} +- {e.sigma:.1e} {e.unit}")
+        beside = "" if fit.consistency is None else _beside(fit.consistency.ratios[name])
+        lines.append(f"{name + '/psi':12s} {e.value: .6g} +- {e.sigma:.1e} {e.unit}{beside}")
     lines += [interval.sentence(name) for name, interval in fit.intervals.items()]
     swings = ", ".join(f"{f:.4f}" for f in fit.modes_hz)
     lines.append(f"small oscillations of the fitted pendulum: {swings} Hz")
@@ -186,4 +188,12 @@ def describe(fit: DampingFit) -> list[str]:
         lines.append(f"energy by {group}: {parts}")
     for window, p in fit.prediction.items():
         lines.append(f"prediction, {window} s windows: {slashed(p.rms_deg)} deg RMS")
-    return [*lines, *(t.sentence for t in fit.terms), *fit.identifiability.sentences, *fit.notes]
+    rest = [note for note in fit.notes if note not in warned]
+    return [*lines, *(t.sentence for t in fit.terms), *fit.identifiability.sentences, *rest]
+
+
+def _beside(ratio: RatioCheck) -> str:
+    """What the model's parts say of a ratio."""
+    parts = ratio.parts
+    said = f"{parts.value:.6g} +- {parts.sigma:.1e}" if parts.sigma > 0 else f"{parts.value:.6g}"
+    return f" (the parts: {said}, {ratio.sigmas:+.1f} sigma)"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pydpend.damping.compare import compare_terms
+from pydpend.damping.consistency import Consistency, Explanation, LengthCheck, RatioCheck
 from pydpend.damping.fit import fit_damping
 from pydpend.damping.fitted_recording import AngleMaps, FittedRecording, Window
 from pydpend.damping.maps import Maps
@@ -19,14 +20,18 @@ from pydpend.damping.result_parts import (
 
 __all__ = [
     "AngleMaps",
+    "Consistency",
     "DampingFit",
     "EnergyCurve",
     "Estimate",
+    "Explanation",
     "FittedRecording",
     "Identifiability",
     "Interval",
+    "LengthCheck",
     "Maps",
     "Prediction",
+    "RatioCheck",
     "Residuals",
     "Term",
     "Window",

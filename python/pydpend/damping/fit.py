@@ -119,7 +119,9 @@ def _trajectory(
     fit = fit_trajectory(recordings, model, names, options, progress=progress)
     if options.prediction:
         bare = options.bare()
-        prediction, note = held_out(recordings, lambda some: fit_trajectory(some, model, names, bare))
+        prediction, note = held_out(
+            recordings, lambda some: fit_trajectory(some, model, names, bare, checked=False)
+        )
         fit = replace(fit, prediction=prediction, notes=(*fit.notes, note))
     if options.comparison:
         try:

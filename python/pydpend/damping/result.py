@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pydpend import _native
 from pydpend.coefficients import FULL, RATIOS, unit
+from pydpend.damping.consistency import Consistency
 from pydpend.damping.fitted_recording import AngleMaps, FittedRecording, Window
 from pydpend.damping.result_parts import (
     SHORT_S,
@@ -94,6 +95,9 @@ class DampingFit(JsonResult, TableResult):
     camera_sigma : dict of str to float
         What of each coefficient's standard error is the cameras', SI: its square is a part of the whole's. Empty where
         no angles state the camera's part.
+    consistency : pydpend.damping.Consistency or None
+        The ratios against the model's parts: g, clock and length, contradictions and what explains them (trajectory fit
+        of two links with free ratios).
     notes : tuple of str
         What was left out or should be known.
     """
@@ -128,6 +132,7 @@ class DampingFit(JsonResult, TableResult):
     maps: AngleMaps | None = None
     ten: TenCoefficients | None = None
     camera_sigma: dict[str, float] = field(default_factory=dict)
+    consistency: Consistency | None = None
     notes: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
@@ -199,6 +204,7 @@ class DampingFit(JsonResult, TableResult):
             "maps": None if self.maps is None else self.maps.to_dict(),
             "ten_coefficients": None if self.ten is None else self.ten.to_dict(),
             "camera_sigmas": self.camera_sigma,
+            "consistency": None if self.consistency is None else self.consistency.to_dict(),
             "notes": list(self.notes),
         }
         values: dict[str, Any] = plain(out)
@@ -278,6 +284,7 @@ class DampingFit(JsonResult, TableResult):
             if "ten_coefficients" in table
             else None,
             camera_sigma=_numbers_of(table, "camera_sigmas"),
+            consistency=Consistency.of_table(table.table("consistency")) if "consistency" in table else None,
             notes=table.texts("notes"),
         )
 

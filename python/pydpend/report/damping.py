@@ -15,6 +15,7 @@ from pydpend.fit_status import FitStatus, Verdict
 from pydpend.json_text import number
 from pydpend.plots.damping import coefficients_figure, shares_figure
 from pydpend.plots.style import inline_svg
+from pydpend.report.consistency import against_parts, ratio_unit
 from pydpend.report.page import (
     Block,
     Chart,
@@ -86,6 +87,9 @@ def warnings(fit: DampingFit) -> list[str]:
                 f"{given.name}: the zero of its angles was off by {listed(off)}, as the fit found with a zero "
                 "of its own. The damping is free of that; the angles above are not."
             )
+    if fit.consistency is not None:
+        told = fit.consistency.sentences
+        out += [sentence(s.removeprefix("warning: ")) for s in told if s.startswith("warning: ")]
     # The sentence on the whole recording; those on single coefficients stand with them.
     if fit.identifiability.too_short:
         out.append(fit.identifiability.warning)
@@ -284,7 +288,7 @@ def sections(run: StoredRun, fit: DampingFit, predictions: Mapping[str, Predicti
         blocks += [] if energy is None else _energy(energy, f"e{k}", title)
         if left is not None or energy is not None:
             blocks.append(Reset(f"e{k}"))
-    out = [Section("damping", "Damping", (*blocks, *_constants(fit), *_ten(fit)))]
+    out = [Section("damping", "Damping", (*blocks, *_constants(fit), *against_parts(fit), *_ten(fit)))]
     out.append(Section("identifiability", "What the data can tell", tuple(_told(fit))))
     trials = run.fit_folder.trials()
     if len(names) > 1 and trials is not None:
@@ -312,11 +316,6 @@ def _constants(fit: DampingFit) -> list[Block]:
         Heading("Constants of the motion"),
         Table(("constant", "symbol", "value"), tuple(rows), numbers=frozenset({2})),
     ]
-
-
-def ratio_unit(name: str) -> str:
-    """Unit of a ratio over psi, as a page has it."""
-    return "" if RATIO_UNITS[name] == "1" else with_squares(RATIO_UNITS[name])
 
 
 def _ten(fit: DampingFit) -> list[Block]:
