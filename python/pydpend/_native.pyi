@@ -106,7 +106,7 @@ class OpenOptions:
 
 @final
 class DetectSettings:
-    """What is a marker; `pydpend.reading_options.DetectOptions` names each."""
+    """Settings of detection; `pydpend.reading_options.DetectOptions` names each."""
 
     def __new__(
         cls,
@@ -121,7 +121,7 @@ class DetectSettings:
 
 @final
 class Wanted:
-    """What is to be followed: places ``X,Y[@FRAME]``, a count, numbers of the picture, pairs of nodes that are one."""
+    """Markers to follow: places ``X,Y[@FRAME]``, a count, numbers of the picture, pairs of nodes that are one."""
 
     def __new__(
         cls,
@@ -205,13 +205,13 @@ def recording_files(input: str | Path) -> list[Path]:
     """The files that a recording is read from; none for what is read once only."""
 
 def fingerprint(files: list[Path]) -> str:
-    """What tells the contents of some files from others without reading all of them, in hexadecimal."""
+    """Hash that tells the contents of some files from others without reading all of them, in hexadecimal."""
 
 def check_outputs(outputs: list[str], inputs: list[str], replace: bool) -> None:
     """Refuses outputs that would replace an input, one another or, unless `replace`, what is there already."""
 
 def info(input: str, open: OpenOptions) -> str:
-    """What is known of a recording before it is read through, as JSON."""
+    """Description of a recording before it is read through, as JSON."""
 
 def detect(
     image: NDArray[Any],
@@ -233,7 +233,7 @@ class LiveTracker:
         """Places (N, 2) in px, sigma in px, area in px and status (N,) in the next image."""
 
     def detections(self) -> Found:
-        """What was detected in the last image."""
+        """Detections in the last image."""
 
 def read_table(path: str) -> Columns:
     """Frame (T,), time in s (T,), centres in px (T, N, 2), sigma in px, area in px and status (T, N), JSON."""
@@ -266,7 +266,7 @@ def plane_places(rig: str, recorded_px: NDArray[np.float64]) -> NDArray[np.float
     """Recorded places (n, 2) in the plane of the bodies, px, and the most that lengths are stretched there, (n, 3)."""
 
 def plane_slopes(rig: str, recorded_px: NDArray[np.float64]) -> NDArray[np.float64]:
-    """What places (n, 2) in the plane of the bodies change by with a, b, v1, v2 and k1 of the camera, px, (n, 2, 5)."""
+    """Slopes of places (n, 2) in the plane of the bodies by a, b, v1, v2 and k1 of the camera, px, (n, 2, 5)."""
 
 def recorded_places(rig: str, plane_px: NDArray[np.float64]) -> NDArray[np.float64]:
     """Places (n, 2) of the plane in recorded pixels."""
@@ -343,7 +343,7 @@ class Law:
 
     @property
     def words(self) -> str:
-        """What people read for the coefficient."""
+        """Words that people read for the coefficient."""
 
     @property
     def source(self) -> str:
@@ -375,7 +375,7 @@ class Ratio:
 
     @property
     def words(self) -> str:
-        """What people read for it."""
+        """Words that people read for it."""
 
     @property
     def is_of_one_link(self) -> bool:
@@ -486,7 +486,7 @@ def shooting_segments(
 
 @final
 class ShootingSettings:
-    """What a fit is asked for; `pydpend.damping.shooting.solve` names each."""
+    """Settings of a fit; `pydpend.damping.shooting.solve` names each."""
 
     def __new__(
         cls,
@@ -531,11 +531,11 @@ class ShootingFit:
 
     @property
     def angle_information(self) -> _Floats:
-        """What of it the angles give, (G, G)."""
+        """Part of the information from the angles, (G, G)."""
 
     @property
     def jump_information(self) -> _Floats:
-        """What of it the jumps give, (G, G)."""
+        """Part of the information from the jumps, (G, G)."""
 
     @property
     def jumps_shown(self) -> _Floats:

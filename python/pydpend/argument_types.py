@@ -56,7 +56,7 @@ def of_type(name: str, value: object, *wanted: type, like: tuple[str, ...] = ())
 
 
 def all_of_type(name: str, values: object, *wanted: type) -> None:
-    """The same for each of several objects in a sequence."""
+    """Check the type of each of several objects in a sequence."""
     if isinstance(values, (str, bytes, os.PathLike)) or not hasattr(values, "__iter__"):
         of_type(name, values, *wanted)
     for value in values if hasattr(values, "__iter__") else ():

@@ -28,7 +28,7 @@ _HEADER_FAULTS = (
     RecursionError,
     tokenize.TokenError,
 )
-"""What NumPy raises for a header that is damaged: it is a Python literal, a type's name and a shape."""
+"""Errors that NumPy raises for a header that is damaged: it is a Python literal, a type's name and a shape."""
 
 
 def read_npy(path: Path, error: type[PydpendError], advice: str) -> NDArray[np.generic]:

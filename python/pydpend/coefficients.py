@@ -38,7 +38,7 @@ RATIOS = tuple(ratio.name for ratio in _RATIOS)
 RATIO_UNITS = {ratio.name: ratio.unit for ratio in _RATIOS}
 
 WORDS = {law.name: law.words for law in LAW_TABLE.values()} | {ratio.name: ratio.words for ratio in _RATIOS}
-"""What people read for each coefficient and ratio."""
+"""Words that people read for each coefficient and ratio."""
 
 
 def ratios_of(links: int) -> tuple[str, ...]:

@@ -23,7 +23,7 @@ from pydpend.instants import NotInstants, is_instant, seconds_of_arrow, seconds_
 from pydpend.units import unit_at_end, unit_called
 
 PARQUET_FAULTS = (pa.ArrowException, OSError, UnicodeDecodeError, KeyError, MemoryError, OverflowError)
-"""What pyarrow raises for a Parquet file that is damaged."""
+"""Errors that pyarrow raises for a Parquet file that is damaged."""
 
 _FIRST_LINE_BYTES = 1 << 16
 """More than the names of any table's columns."""

@@ -21,7 +21,7 @@ HeldColumns: TypeAlias = tuple[
 ]
 """Frames, times, places, uncertainties, areas and status."""
 Columns: TypeAlias = tuple[*HeldColumns, str]
-"""The same, and the metadata as JSON."""
+"""The columns, and the metadata as JSON."""
 
 Found: TypeAlias = tuple[NDArray[np.float64], NDArray[np.float32], NDArray[np.uint8]]
 Row: TypeAlias = tuple[NDArray[np.float64], NDArray[np.float32], NDArray[np.float32], NDArray[np.uint8]]
@@ -47,7 +47,7 @@ class SegmentArrays(Protocol):
 
 
 class StartNumbers(Protocol):
-    """What the compiled fit reads of `pydpend.damping.shooting.Start`, R recordings and C cameras."""
+    """The attributes that the compiled fit reads of `pydpend.damping.shooting.Start`, R recordings and C cameras."""
 
     @property
     def zeros_rad(self) -> Sequence[tuple[float, float]]:

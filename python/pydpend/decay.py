@@ -19,10 +19,10 @@ HELD_S = 0.1
 RELEASED_RAD_S = 4.0
 """Rate at which a held link has been let go."""
 SETTLE_S = 1.0
-"""What is left out after a release by hand: the hand's last touch, and the first instants near the unstable
+"""Time left out after a release by hand: the hand's last touch, and the first instants near the unstable
 equilibrium, which no initial state describes."""
 TOUCH_S = 0.2
-"""What is left out after a gentle release: the hand's last touch."""
+"""Time left out after a gentle release: the hand's last touch."""
 START_S = 0.5
 """A hold that begins within this of the motion's start is where it was released from."""
 REST_RAD = np.radians(1.5)

@@ -26,7 +26,7 @@ _HEADER_WITHIN = 200
 """A header is looked for in this many lines: loggers write some lines of notes before it."""
 
 _COMMENTS = ("#", "%", "//")
-"""What a line begins with that is not data; a header may begin so too."""
+"""First character of a line that is not data; a header may begin so too."""
 
 _PARTERS = {",": "commas", ";": "semicolons", "\t": "tabs", " ": "spaces"}
 

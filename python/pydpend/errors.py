@@ -86,7 +86,7 @@ class Message(_Part):
 
 
 Text: TypeAlias = "str | Message | Setting | Step"
-"""What a message may be made of."""
+"""Parts of a message."""
 
 
 CHECK = Step("tracker check", "nodes.status")

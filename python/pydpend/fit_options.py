@@ -25,7 +25,7 @@ INTERVALS = ("covariance", "profile")
 """How each coefficient's uncertainty is told."""
 
 UPPER = tuple(name for name in FREE if JOINT_OF[name] != "lower")
-"""Those of `FREE` that a single pendulum has."""
+"""Members of `FREE` that a single pendulum has."""
 
 OLD_NAMES = {"predict": "prediction", "compare": "comparison"}
 """Names that options had."""
@@ -174,7 +174,7 @@ class FitOptions:
 
     @property
     def fit(self) -> FitOptions:
-        """These options alone, of a class that has more."""
+        """Options of a fit alone, of a class that has more."""
         return FitOptions(**{field.name: getattr(self, field.name) for field in fields(FitOptions)})
 
     @property

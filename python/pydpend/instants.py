@@ -45,7 +45,7 @@ STAMP_ADVICE = (
     "Write the times in s from the first, as dates (2024-05-01T12:00:00.250) "
     "or as s since 1970 in a column time_s"
 )
-"""What to do about stamps that are written as numbers."""
+"""Advice about stamps that are written as numbers."""
 
 
 class NotInstants(ValueError):

@@ -19,11 +19,11 @@ class JsonResult(ABC):
     """A result with a form in plain values, and that as text."""
 
     _error: ClassVar[type[PydpendError]] = PydpendError
-    """What a text that is none raises."""
+    """Error that text which is not JSON raises."""
     _source: ClassVar[str] = "the text"
-    """What a text is called in messages."""
+    """Name of the text in messages."""
     _advice: ClassVar[Text] = "Give what to_json gave"
-    """What to do about a text that is none."""
+    """Advice about text that is not JSON."""
 
     @abstractmethod
     def to_dict(self) -> dict[str, Any]:

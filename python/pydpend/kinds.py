@@ -39,7 +39,7 @@ def kind_of(path: str | os.PathLike[str]) -> Kind:
 
 
 def misplaced(path: str | os.PathLike[str], wanted: tuple[Kind, ...]) -> Message | None:
-    """What a file is and what is done with it, if it is of a known kind and of none that is wanted.
+    """The kind of a file and the next step with it, if it is of a known kind and of none that is wanted.
 
     Where nothing is wanted, a command is.
     """

@@ -113,7 +113,7 @@ class ReadingOptions(DetectOptions, OpenOptions):
     """Both: what every command that looks for markers in a film can be told."""
 
     def reading(self) -> dict[str, Any]:
-        """These options alone, of a class that has more, as keywords of `track` and `setup`."""
+        """Options of reading alone, of a class that has more, as keywords of `track` and `setup`."""
         return {field.name: getattr(self, field.name) for field in fields(ReadingOptions)}
 
     def reading_key(self) -> dict[str, Any]:

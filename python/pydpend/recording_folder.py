@@ -29,7 +29,7 @@ from pydpend.worded import Words
 Floats: TypeAlias = NDArray[np.float64]
 
 AGAIN = "Do " + ANALYSE + " again"
-"""What to do about a file of a run that is not as it should be."""
+"""Advice about a file of a run that is not as it should be."""
 
 
 class RunFileError(PydpendError):

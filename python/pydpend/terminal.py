@@ -8,8 +8,8 @@ from typing import Any, TextIO
 _OBEYED = re.compile(
     "[\x00-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff\U0010ff00-\U0010ffff]"
 )
-"""What a terminal obeys or cannot show: controls, marks that turn the direction of writing, and what stands for a byte
-of a name that is not UTF-8, here and in the compiled half."""
+"""Characters that a terminal obeys or cannot show: controls, marks that turn the direction of writing, and what
+stands for a byte of a name that is not UTF-8, here and in the compiled half."""
 
 
 def shown(text: str) -> str:

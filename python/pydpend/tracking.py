@@ -56,7 +56,7 @@ def _files(rig: Rig | Path | None) -> list[str]:
 
 
 def _loss(nodes: Nodes) -> str | None:
-    """What lacks of a recording, in a sentence; None if nothing does."""
+    """Loss of a recording, in a sentence; None if nothing is lost."""
     ending = nodes.meta.get("ending", {})
     early = None
     if ending.get("kind") == "early":

@@ -57,3 +57,21 @@ def test_the_indices_name_every_page() -> None:
 def test_each_decision_has_a_number_of_its_own() -> None:
     numbers = [p.name[:4] for p in sorted((ROOT / "docs/decisions").glob("0*.md"))]
     assert len(set(numbers)) == len(numbers)
+
+
+# Openings that name nothing: the noun stands elsewhere.
+RIDDLES = r"(What|It|They|This|That|Those|These|The same)\b"
+RUST_RIDDLE = re.compile(r"\s*//[/!] " + RIDDLES)
+PYTHON_RIDDLE = re.compile(r'\s*"""' + RIDDLES)
+
+
+def test_no_documentation_opens_without_a_noun() -> None:
+    found = []
+    for file in sorted([*(ROOT / "crates").rglob("*.rs"), *(ROOT / "python").rglob("*.py")]):
+        riddle = RUST_RIDDLE if file.suffix == ".rs" else PYTHON_RIDDLE
+        before = ""
+        for number, line in enumerate(file.read_text("utf-8").splitlines(), 1):
+            if riddle.match(line) and not before.lstrip().startswith(("///", "//!")):
+                found.append(f"{file.relative_to(ROOT)}:{number}: {line.strip()}")
+            before = line
+    assert found == []

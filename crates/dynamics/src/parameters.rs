@@ -152,7 +152,7 @@ pub struct Ratio {
     pub unit: &'static str,
     /// Whether a pendulum of one link has it.
     pub is_of_one_link: bool,
-    /// What people read for it.
+    /// Words that people read for it.
     pub words: &'static str,
 }
 
@@ -193,7 +193,7 @@ impl<S: Real> Parameters<S> {
     pub fn is_active(&self, field: Field) -> bool {
         self.active & (1 << field as usize) != 0
     }
-    /// The same with one value replaced.
+    /// Parameters with one value replaced.
     #[must_use]
     pub fn with(mut self, field: Field, value: S) -> Self {
         self.set(field, value);
@@ -204,7 +204,7 @@ impl<S: Real> Parameters<S> {
     pub fn value(&self) -> Parameters<f64> {
         Parameters { values: self.values.map(|s| s.value()), active: self.active, fixed: self.fixed }
     }
-    /// The same numbers in another scalar, without derivatives.
+    /// Parameters of the same values in another scalar, without derivatives.
     #[must_use]
     pub fn lift<T: Real>(&self) -> Parameters<T> {
         Parameters {

@@ -24,6 +24,6 @@ pub struct Motion<S> {
     /// Dry torque at each joint, N m: `sign * capacity` when sliding, the constraint's torque when stuck. The
     /// torque on link 1 is `-dry[0] + dry[1]`, on link 2 `-dry[1]`.
     pub dry: [S; 2],
-    /// What dry friction can hold at each joint, N m: `r mu N + tau_c`.
+    /// Greatest moment that dry friction holds at each joint, N m: `r mu N + tau_c`.
     pub capacity: [S; 2],
 }

@@ -109,11 +109,11 @@ pub struct Term {
     pub field: Field,
     /// Its law.
     pub law: Law,
-    /// What it does.
+    /// The term's effect on energy.
     pub kind: Kind,
     /// Where.
     pub place: Place,
-    /// What people read for its coefficient.
+    /// Words that people read for its coefficient.
     pub words: &'static str,
     /// Source in the paper, or what it stands for.
     pub source: &'static str,

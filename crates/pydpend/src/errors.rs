@@ -21,7 +21,7 @@ pub fn exception(py: Python<'_>, class: &str, message: &Message) -> PyErr {
     }
 }
 
-/// The same message as a `Message` of `pydpend.errors`, its settings and steps still data.
+/// A `Message` of `pydpend.errors`, its settings and steps still data.
 pub fn to_python<'py>(py: Python<'py>, message: &Message) -> PyResult<Bound<'py, PyAny>> {
     let errors = py.import("pydpend.errors")?;
     let piece = |(i, piece): (usize, &Piece)| match piece {

@@ -131,7 +131,7 @@ impl PyOpenOptions {
 pub struct OutputSettings {
     /// The file; `None` writes none.
     pub path: Option<PathBuf>,
-    /// What is done where it is there already.
+    /// Treatment of an output that is there already.
     pub existing: Existing,
     /// Form of the names in a CSV.
     pub cells: Cells,

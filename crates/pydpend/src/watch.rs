@@ -24,7 +24,7 @@ pub struct Watch {
     called: Instant,
     /// When and by what the run was stopped.
     stopped: Option<(Instant, PyErr)>,
-    /// What was found of what moves, if anything was looked for.
+    /// Candidates among what moves, if they were looked for.
     pub candidates: Option<Candidates>,
 }
 

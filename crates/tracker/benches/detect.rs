@@ -71,7 +71,7 @@ fn main() {
     }
 }
 
-/// What a thread does with a frame.
+/// Work of a thread on one frame.
 const WAYS: usize = 3;
 
 /// Frames, and the three ways.
@@ -137,7 +137,7 @@ fn frames(count: usize) {
     }
 }
 
-/// The same by criterion.
+/// Times of the same parts by criterion.
 fn by_criterion(count: usize) {
     let mut criterion = Criterion::default()
         .sample_size(10)

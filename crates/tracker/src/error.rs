@@ -115,9 +115,9 @@ pub struct Fault {
     pub subject: Message,
     /// Where in it.
     pub place: Place,
-    /// What was expected and what was found, a clause without a full stop.
+    /// The value expected and the value found, a clause without a full stop.
     pub problem: Message,
-    /// What the user can do, a sentence without its full stop; empty if there is nothing.
+    /// Advice to the user, a sentence without its full stop; empty if there is none.
     pub advice: Message,
     /// Its kind.
     pub kind: FaultKind,
@@ -158,14 +158,14 @@ impl Fault {
             .of_kind(FaultKind::Unsupported)
     }
 
-    /// The same fault, of a kind.
+    /// The fault with its kind.
     #[must_use]
     pub fn of_kind(mut self, kind: FaultKind) -> Self {
         self.kind = kind;
         self
     }
 
-    /// The same fault with the error of the operating system that it comes from, which is its kind.
+    /// The fault with the operating system's error that caused it, which is its kind.
     #[must_use]
     pub fn caused_by(mut self, error: &io::Error) -> Self {
         self.kind = match error.kind() {
@@ -183,14 +183,14 @@ impl Fault {
         self
     }
 
-    /// The same fault at a place.
+    /// The fault with its place.
     #[must_use]
     pub fn at(mut self, place: Place) -> Self {
         self.place = place;
         self
     }
 
-    /// The same fault with what to do about it.
+    /// The fault with advice.
     #[must_use]
     pub fn advice(mut self, advice: impl Into<Message>) -> Self {
         self.advice = advice.into();
@@ -254,7 +254,7 @@ impl Error {
         self.fault().map_or(FaultKind::Interrupted, |fault| fault.kind)
     }
 
-    /// The same error with more of what was wrong, and with what to do about that, if there is something.
+    /// The error with a further problem, and with advice about that, if there is any.
     #[must_use]
     pub fn and_also(mut self, more: &str, advice: Message) -> Self {
         if let Self::Source(f)

@@ -195,15 +195,15 @@ pub struct SourceInfo {
     pub rate_hz: Option<f64>,
     /// Where the rate comes from.
     pub rate_origin: RateOrigin,
-    /// What else it says of its rate.
+    /// Other statements of the recording about its rate.
     pub claims: RateClaims,
     /// Whether pixels were converted (no luma plane in the recording), and from what.
     pub converted_from: Option<String>,
     /// Bytes of the file or files, if they are files.
     pub size_bytes: Option<u64>,
-    /// What else the recording says, word and value: camera, exposure, trigger frame, range of values.
+    /// Other statements of the recording, word and value: camera, exposure, trigger frame, range of values.
     pub details: Vec<(String, String)>,
-    /// What a user should know: implausible stamps replaced, gaps in numbering, a size that does not match.
+    /// Warnings to the user: implausible stamps replaced, gaps in numbering, a size that does not match.
     pub warnings: Vec<Message>,
 }
 
@@ -237,7 +237,7 @@ pub enum Ending {
         frames: u64,
         /// Byte offset of the damage, if known.
         byte: Option<u64>,
-        /// What was wrong.
+        /// The decoder's reason.
         reason: String,
     },
 }

@@ -188,7 +188,7 @@ fn listed(parts: &[String]) -> String {
 pub struct Reason {
     /// Index of the frame.
     pub frame: u64,
-    /// What is wrong, a clause without a full stop.
+    /// The damage, a clause without a full stop.
     pub words: String,
 }
 

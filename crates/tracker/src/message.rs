@@ -40,11 +40,11 @@ pub enum Setting {
     Centroid,
     /// Codec of a film that is made.
     Codec,
-    /// What reads compressed film.
+    /// The library that decodes compressed film.
     Decoder,
     /// Only each n-th frame is drawn.
     Every,
-    /// What is there already is replaced; a switch.
+    /// Replacing of files that are there already; a switch.
     Force,
     /// Frames a second of recorded time.
     Fps,
@@ -84,7 +84,7 @@ pub enum Setting {
     Same,
     /// How many threads.
     Threads,
-    /// What is bright enough to be a marker.
+    /// Level from which on a pixel is bright enough to be a marker's.
     Threshold,
     /// Width of a drawn film.
     Width,
@@ -222,7 +222,7 @@ impl FrontEnd for Bare {
 /// A step of the work: what to type, and what to call in Python.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Step {
-    /// What to type.
+    /// The command to type.
     pub command: Cow<'static, str>,
     /// The function of the Python package.
     pub call: Cow<'static, str>,
@@ -267,7 +267,7 @@ impl Message {
         self.pieces.iter().map(piece).collect()
     }
 
-    /// The same with one text in place of another wherever it stands in the words.
+    /// The message with one text in place of another wherever it stands in the words.
     #[must_use]
     pub fn replace(&self, from: &str, to: &str) -> Self {
         let piece = |piece: &Piece| match piece {

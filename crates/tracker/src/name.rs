@@ -84,7 +84,7 @@ pub fn shown(text: &str) -> String {
     out
 }
 
-/// The same for several lines: their ends stay.
+/// Text of several lines as a terminal may show it: line ends stay.
 pub fn shown_lines(text: &str) -> String {
     text.split('\n').map(shown).collect::<Vec<_>>().join("\n")
 }

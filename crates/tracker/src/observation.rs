@@ -59,7 +59,7 @@ pub struct Observation {
     pub sigma_px: f32,
     /// Blob area, px.
     pub area_px: f32,
-    /// What is known.
+    /// Whether the node was seen, and how.
     pub status: Status,
 }
 

@@ -41,7 +41,7 @@ impl NewFile {
     /// Begins a file that is to be `target`.
     ///
     /// # Errors
-    /// What the file system says.
+    /// The file system's own error.
     pub fn create(target: &Path) -> io::Result<Self> {
         if is_stream(target) {
             let file = File::options().write(true).open(target)?;
@@ -82,7 +82,7 @@ impl NewFile {
     /// Gives it its name. `lasting`: not before all of it is on the disk, so that it outlives a power cut.
     ///
     /// # Errors
-    /// What the file system says.
+    /// The file system's own error.
     pub fn publish(self, lasting: bool) -> io::Result<()> {
         let Some(aside) = self.aside else { return Ok(()) };
         if lasting {
@@ -100,7 +100,7 @@ impl NewFile {
 /// Writes a file at once.
 ///
 /// # Errors
-/// What the file system says.
+/// The file system's own error.
 pub fn write(target: &Path, bytes: &[u8]) -> io::Result<()> {
     let new = NewFile::create(target)?;
     new.file().write_all(bytes)?;
@@ -113,7 +113,7 @@ static MADE: AtomicU64 = AtomicU64::new(0);
 /// Bytes of a file's name that the file systems in use take at most.
 pub const LONGEST_NAME: usize = 255;
 
-/// What stands for standard output where a command writes there.
+/// Name that stands for standard output where a command writes there.
 const STANDARD_OUTPUT: &str = "-";
 
 /// The device and number of a file, which tell it from any other; links of either kind are followed.

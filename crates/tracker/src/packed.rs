@@ -11,9 +11,9 @@ use crate::name::shell_word;
 /// Command that unpacks a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Command {
-    /// This program writes the one file that is in it to its output.
+    /// A program that writes the one packed file to its output.
     Stream(&'static str),
-    /// This command takes out all files.
+    /// A command that unpacks all files of an archive.
     Archive(&'static str),
 }
 

@@ -165,7 +165,7 @@ pub struct Rig {
     /// The lens; `None` is none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lens: Option<Lens>,
-    /// What was said of what to follow; a run with this rig follows the same.
+    /// Markers that the user asked to follow; a run with this rig follows the same.
     #[serde(default, skip_serializing_if = "Wanted::is_default")]
     pub wanted: Wanted,
     /// How the camera stands; `None` faces the bodies' plane squarely.

@@ -21,7 +21,7 @@ use crate::table::RunEnding;
 pub struct Setup {
     /// Nodes, bodies, joints and the reference picture.
     pub rig: Rig,
-    /// What to know of the rig and the recording, a sentence each.
+    /// Warnings about the rig and the recording, a sentence each.
     pub warnings: Vec<Message>,
     /// How the recording ended.
     pub ending: RunEnding,

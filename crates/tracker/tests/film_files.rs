@@ -265,7 +265,7 @@ fn an_overlay_without_a_picture_leaves_no_film() {
     assert_eq!(draw(&table, &mut Silent), FaultKind::Invalid);
 }
 
-/// What `tracker setup` says of a film of `scene`.
+/// Output of `tracker setup` on a film of `scene`.
 fn setup(scene: &Scene) -> Setup {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("film.mp4");

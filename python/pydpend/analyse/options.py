@@ -22,7 +22,7 @@ ESTIMATORS = ("rigid", "linkage", "pairwise")
 
 @dataclass(frozen=True, kw_only=True)
 class Options(FitOptions, ReadingOptions):
-    """What to analyse and how; the defaults need no thought.
+    """Recordings to analyse and how; the defaults need no thought.
 
     Every parameter is a flag of the same name, those of the fit (`FitOptions`) and of reading films (`ReadingOptions`)
     too.
@@ -171,7 +171,7 @@ WANTED: Mapping[str, tuple[Kind, ...]] = {
     "model": ("model",),
     "zero": ("film", "pictures", "nodes"),
 }
-"""What a file that an option names may be."""
+"""Kinds of file that an option may name."""
 
 
 def check_files(options: Options) -> None:

@@ -58,7 +58,7 @@ class Outcome(JsonResult):
     status: RunState
     message: str
     stages: dict[str, StageState]
-    """What became of each stage."""
+    """State of each stage."""
     reasons: dict[str, str]
     """Why, of each stage that gave nothing."""
     seconds: dict[str, float]

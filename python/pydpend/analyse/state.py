@@ -16,9 +16,9 @@ class StageState(Words):
     KEPT = "kept", "kept"
     """Its results are there from an earlier run of the same."""
     NOT_DONE = "not_done", "not done"
-    """These data do not allow it."""
+    """The data do not allow the stage."""
     DOES_NOT_APPLY = "does_not_apply", "does not apply"
-    """It has no meaning for these recordings; nothing is wrong with them."""
+    """The stage has no meaning for these recordings; nothing is wrong with them."""
 
     @property
     def has_results(self) -> bool:
@@ -71,7 +71,7 @@ class Note:
 
 
 Event: TypeAlias = Started | Going | Note | StageResult
-"""What is told of a stage."""
+"""Words for a stage's state."""
 
 Progress: TypeAlias = Callable[[int, int, str, Event], None]
 """Called as ``progress(stage's number from 1, number of stages, title, event)``."""

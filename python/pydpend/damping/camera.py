@@ -53,7 +53,7 @@ def without(recordings: Sequence[Recording]) -> list[str]:
 
 
 def of_camera(solution: Solution, total: Floats, *, model_error: bool) -> dict[str, float]:
-    """What of each unknown's standard error is the cameras', by its name, in its unit.
+    """The cameras' part of each unknown's standard error, by its name, in its unit.
 
     ``total`` (G, G): covariance of the solution's unknowns. Were the cameras known, it would be that of the others
     alone; the difference of the variances is the cameras'.
@@ -79,7 +79,7 @@ Numbers: TypeAlias = tuple[float, ...] | None
 
 
 def found_numbers(solution: Solution, total: Floats, index: int) -> tuple[Numbers, Numbers]:
-    """What a fit made of a recording's camera: its numbers and their standard errors, in units of the prior's."""
+    """A fit's estimate of a recording's camera: its numbers and their standard errors, in units of the prior's."""
     cameras = solution.cameras
     part = None if cameras is None else cameras.parts[index]
     if cameras is None or part is None:

@@ -59,10 +59,10 @@ class FittedEnergy:
     few: list[EnergyProfile]
     """The profiles that were fitted, at the middle of the pieces."""
     whole: list[EnergyProfile]
-    """The same at every sample."""
+    """The profiles at every sample."""
     smoothed: Smoothed
     camera_sigma: Floats
-    """What of each coefficient's standard error is the cameras', SI."""
+    """The cameras' part of each coefficient's standard error, SI."""
 
 
 def smooth(

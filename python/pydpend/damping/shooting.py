@@ -93,7 +93,7 @@ class Segments:
 
 @dataclass(frozen=True, eq=False)
 class Cameras:
-    """What the cameras of R recordings do to their angles: measured = true + part @ numbers."""
+    """Effect of the cameras of R recordings on their angles: measured = true + part @ numbers."""
 
     parts: Sequence[tuple[Floats, int] | None]
     """Of each recording the angles' changes (T, L, 5) for one standard deviation of each number, rad, and which of the
@@ -137,11 +137,11 @@ class Solution:
     """Rows of `information`: free parameters, then two zeros per recording, then five numbers per camera."""
     information: Floats
     angle_information: Floats
-    """What of it the angles give: the part whose errors are their noise."""
+    """Part of `information` from the angles, whose errors are their noise."""
     jump_information: Floats
-    """What of it the jumps give, times their variance over the slack's square: the part with the model's errors."""
+    """Part from the jumps, times their variance over the slack's square, with the model's errors."""
     jumps_shown: Floats
-    """That variance over the slack's square, per component: 1 where the slack was learned, down to 0 at its floor."""
+    """Variance of the jumps over the slack's square, per component: 1 where the slack was learned, 0 to 1 at its floor."""
     gradient: Floats
     scores: Floats
     """Each segment's part of the gradient with the states eliminated, (K, G)."""

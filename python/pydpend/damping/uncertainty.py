@@ -55,7 +55,7 @@ def covariance(solution: Solution, *, model_error: bool) -> Floats:
 
 
 def _prior(solution: Solution) -> Floats:
-    """What of the information is the cameras' prior, whose errors are of unit variance."""
+    """Information from the cameras' prior, whose errors are of unit variance."""
     return np.diag([1.0 if n.startswith(CAMERA) else 0.0 for n in solution.names])
 
 

@@ -31,10 +31,10 @@ SPEC_V = 2.5e-3
 """The encoder maker's uncertainty of a reading, V (Section 5.1)."""
 
 RANGE_V = (0.0, 10.0)
-"""What the encoder can put out, V (Section 5)."""
+"""Least and greatest output of the encoder, V (Section 5)."""
 
 CHANCE = 1e-3
-"""What is less likely than this by noise alone is not noise."""
+"""Probability by noise alone below which a deviation is not noise."""
 
 MOST_OFF = 0.01
 """Holds further off the line than this part of the span, and further than their noise explains, are refused: a slope

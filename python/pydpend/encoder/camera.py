@@ -1,4 +1,4 @@
-"""What the film's camera does to a comparison with an encoder: five numbers with their prior, never noise."""
+"""Effect of the film's camera on a comparison with an encoder: five numbers with their prior, never noise."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ from pydpend.kinds import expect
 from pydpend.series import correlation_time
 
 ENDINGS = (".csv", ".tdms", ".npy", ".parquet", ".txt")
-"""What counts as a recording in a folder of holds."""
+"""Endings of files that count as recordings in a folder of holds."""
 
 
 @dataclass(frozen=True)

@@ -36,7 +36,7 @@ SETTLED = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """What the residuals of a body say of the camera's numbers, with the stated sigmas.
+    """Information of a body's residuals on the camera's numbers, with the stated sigmas.
 
     ``information`` (5, 5) and ``score`` (5,): second and first derivatives of half of ``chi2``, which has ``dof``
     degrees of freedom.
@@ -155,7 +155,7 @@ class BodyView:
         return np.where(np.isfinite(theta)[:, None], out, np.nan)
 
     def evidence(self, centre_px: Floats) -> Evidence:
-        """What the residuals about poses at ``centre_px`` (T, 2) say, with the shape from the frames that count."""
+        """Information of residuals about poses at ``centre_px`` (T, 2), with the shape from the frames that count."""
         rows = self._key_frames(centre_px)
         moves = self.shape_moves(rows)
         information, score = np.zeros((CAMERA_NUMBERS, CAMERA_NUMBERS)), np.zeros(CAMERA_NUMBERS)

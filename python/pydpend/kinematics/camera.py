@@ -1,4 +1,4 @@
-"""What a camera that is not known exactly does to the angles: five numbers, the same in every frame, never noise.
+"""Effect on the angles of a camera that is not known exactly: five numbers, the same in every frame, never noise.
 
 A body's angle follows the five numbers z of the camera as ``g(t) dz`` (`body_view`). With the covariance C of what is
 not known of z,
@@ -46,7 +46,7 @@ ORIGINS = {
 
 @dataclass(frozen=True, eq=False)
 class Known:
-    """What is known of the camera: the numbers used, and the covariance of what they are off by.
+    """Knowledge of the camera: the numbers used, and the covariance of what they are off by.
 
     Attributes
     ----------
@@ -109,7 +109,7 @@ def camera_of(rig: Rig) -> tuple[str, Floats, Floats | None]:
 
 
 def known(rig: Rig, evidence: Sequence[Evidence]) -> Known:
-    """What is known of a rig's camera, with what the bodies of a recording say.
+    """Knowledge of a rig's camera, joined with that from the bodies of a recording.
 
     A camera that was given is as uncertain as is said of it; one without a covariance is exact. One that was found is
     as uncertain as its covariance or as the recording says, whichever is less: both may be of the same frames. What

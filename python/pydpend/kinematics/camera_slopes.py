@@ -44,7 +44,7 @@ def pairwise_slopes(views: Sequence[BodyView]) -> Floats:
 
 
 def _pairwise(view: BodyView) -> Floats:
-    """The same of one body, (T, 5)."""
+    """Slopes of one body's angle, (T, 5)."""
     w = view.weight
     complete = np.flatnonzero((w > 0).all(axis=1))[:1]
     parts = []

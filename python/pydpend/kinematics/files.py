@@ -132,7 +132,7 @@ NO_CAMERA_PART = (
     "the table states the angles' noise only: what the camera's aim and lens do to them is not known (it was written "
     "before that was stated; make it from the node table again)"
 )
-"""What is said of angles from a film without the camera's part."""
+"""Note on angles from a film without the camera's part."""
 
 
 @dataclass(frozen=True, eq=False)

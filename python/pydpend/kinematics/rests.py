@@ -38,7 +38,7 @@ MOVES_RAD = np.radians(0.25)
 """A link that leaves its rest by less than this, or than `MOVES_NOISE`, does not say to which side it moves."""
 
 MOVES_NOISE = 8.0
-"""The same in standard deviations of one angle at rest: none of a million is that far off by chance."""
+"""The bound of `MOVES_RAD` in standard deviations of one angle at rest: none of a million is that far off by chance."""
 
 BEYOND = 0.15
 """A motion that goes by less than this part of itself to the other side goes to one side only."""

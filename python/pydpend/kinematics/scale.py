@@ -24,7 +24,7 @@ REJECT_P = 1e-6
 """A marker is left out if chance makes its squared normalised residual as large less often than this."""
 
 REJECT_HIDDEN_P = 1e-4
-"""The same where a marker of the body is hidden: what hides it may well cover the edge of the next."""
+"""The bound of `REJECT_P` where a marker of the body is hidden: what hides it may well cover the edge of the next."""
 
 _UNSURE = 5.0
 """A centre whose sigma is this many times the body's usual one is of a marker that is partly hidden."""

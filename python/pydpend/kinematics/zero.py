@@ -34,7 +34,7 @@ GIVE_ZERO = (
     + Setting("zero")
     + " with the links' angles in the rig's reference picture or a recording in which they hang at rest"
 )
-"""What can be done where a recording has no zero of its own."""
+"""Advice where a recording has no zero of its own."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,7 @@ from pydpend.errors import Setting, SimulationError, fault
 from pydpend.output import whole
 
 ENDINGS = (".gif", ".mp4")
-"""What `write_film` writes."""
+"""Kinds of file that `write_film` writes."""
 
 DPI = 100
 """Pixels an inch: a figure of even hundredths of an inch has even sides, as H.264 wants them."""

@@ -142,7 +142,7 @@ def answer(fit: DampingFit, predictions: Mapping[str, Prediction], scale: Stored
 
 
 def _of_camera(camera: float | None, sigma: float) -> str:
-    """What part of a standard uncertainty is the camera's."""
+    """The camera's part of a standard uncertainty."""
     return "–" if camera is None or not sigma > 0 else f"{digits(100 * camera / sigma)} %"
 
 

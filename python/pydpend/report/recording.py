@@ -51,7 +51,7 @@ class Part:
     calibration: str | None = None
     warnings: list[str] = field(default_factory=list)
     answer: list[tuple[str, str]] = field(default_factory=list)
-    """What was found of it, as (property, value)."""
+    """Its findings, as (property, value)."""
 
     def sections(self, id_: str, suffix: str) -> list[Section]:
         """The sections, titled with the recording's name where there are several."""

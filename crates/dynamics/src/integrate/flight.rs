@@ -71,7 +71,7 @@ pub enum Failure {
     Stalled {
         /// When.
         t_s: f64,
-        /// What happened.
+        /// The reason, a clause.
         problem: String,
     },
 }

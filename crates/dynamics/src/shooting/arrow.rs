@@ -40,7 +40,7 @@ pub struct Eliminated {
     next: Vec<Option<Matrix4<f64>>>,
     shared: Vec<Matrix4xX<f64>>,
     gradient: Vec<Vector4<f64>>,
-    /// What is left for the shared parameters: its marginal second derivatives.
+    /// Marginal second derivatives of half chi-square by the shared parameters.
     pub corner: DMatrix<f64>,
     /// And gradient.
     pub corner_gradient: DVector<f64>,

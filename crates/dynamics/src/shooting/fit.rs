@@ -18,9 +18,9 @@ pub struct Fit {
     pub free: Vec<Field>,
     /// Marginal second derivatives of half chi-square with respect to the shared parameters, (G, G).
     pub information: DMatrix<f64>,
-    /// What of it the angles give, the states following the shared parameters: the part whose errors are the angles' noise.
+    /// Part of `information` that the angles give, the states following the shared parameters: the part whose errors are the angles' noise.
     pub angle_information: DMatrix<f64>,
-    /// What of it the jumps give, each component times `jumps_shown`: the part whose errors are the model's.
+    /// Part of `information` that the jumps give, each component times `jumps_shown`: the part whose errors are the model's.
     pub jump_information: DMatrix<f64>,
     /// Variance that the jumps show over the slack's square, per component: 1 where the slack was learned. Where it
     /// stands at its floor or was given, the data may ask for less, down to none.

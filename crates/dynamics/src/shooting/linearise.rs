@@ -112,7 +112,7 @@ struct Sums<const N: usize> {
     camera: CameraSums<N>,
 }
 
-/// The same sums with the slopes by the camera's numbers, over both links but where the other factor is a link's.
+/// Sums of products with the angles' slopes by the camera's numbers, over both links but where the other factor is a link's.
 struct CameraSums<const N: usize> {
     with_motion: [[f64; CAMERA_NUMBERS]; N],
     with_zeros: [[f64; CAMERA_NUMBERS]; 2],

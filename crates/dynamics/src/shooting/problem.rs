@@ -8,7 +8,7 @@ pub const CAMERA_NUMBERS: usize = 5;
 /// The part of a recording's angles that a camera adds which is not known exactly.
 #[derive(Clone, Copy, Debug)]
 pub struct CameraPart<'a> {
-    /// What each sample's angles change by with the camera's numbers, each in units of its prior standard deviation, rad:
+    /// Changes of each sample's angles with the camera's numbers, each in units of its prior standard deviation, rad:
     /// measured = true + slopes . numbers. Of the length of the recording.
     pub slopes_rad: &'a [[[f64; CAMERA_NUMBERS]; 2]],
     /// Which camera it is, from 0: recordings may share one.
@@ -102,7 +102,7 @@ pub enum Slack {
     /// Standard deviations of the jump in `[phi1, phi2, w1, w2]`, relative to how well a segment's own samples
     /// determine its state.
     Relative(f64),
-    /// These standard deviations, rad and rad/s.
+    /// Given standard deviations of the jump, rad and rad/s.
     Fixed([f64; 4]),
     /// As large as makes the joints' chi-square one, but not below this relative floor.
     Learned(f64),
@@ -113,7 +113,7 @@ pub enum Slack {
 pub struct Settings {
     /// Free parameters of the motion.
     pub free: Vec<Field>,
-    /// Those of them that cannot be negative.
+    /// Fields among `free` that cannot be negative.
     pub bounded: Vec<Field>,
     /// Whether the recordings' clock scale is free (one for all).
     pub clock: bool,

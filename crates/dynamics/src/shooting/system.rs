@@ -33,7 +33,7 @@ const ROUNDING: f64 = 1e-9;
 pub(super) struct Step {
     /// Where it leads; `None` where the cost does not fall.
     pub(super) next: Option<Point>,
-    /// What half chi-square falls by; what it might at most where it does not fall.
+    /// Fall of half chi-square; where it does not fall, the greatest fall that was possible.
     pub(super) gain: f64,
     /// Half chi-square before.
     pub(super) cost: f64,

@@ -44,7 +44,7 @@ impl Filmed {
         Ok(Self { film: Arc::unwrap_or_clone(film), truth, store })
     }
 
-    /// What the tracker makes of it without a rig.
+    /// The tracker's score without a rig.
     pub fn follow(&self) -> Result<Followed> {
         let rig = discover(&self.store, self.film.scene().image_px, &Stop::default())?.rig;
         let mut tracked =
@@ -81,7 +81,7 @@ impl Filmed {
     }
 }
 
-/// What the tracker made of a film.
+/// The tracker's score on a film.
 pub struct Followed {
     pub tracked: Tracked,
     /// By frame, then node.

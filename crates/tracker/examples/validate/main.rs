@@ -30,7 +30,7 @@ use tracker::synth::{NodeTruth, PRESETS, View, preset};
 struct Outcome {
     score: Score,
     rig_right: bool,
-    /// What the paper's method makes of the same detections.
+    /// Score of the paper's method on the same detections.
     paper: Option<Score>,
     /// Rows that were missed, a line each.
     missed: Vec<String>,

@@ -109,7 +109,7 @@ impl Camera {
         self.numbers
     }
 
-    /// The same picture with other numbers.
+    /// The camera of the same picture with other numbers.
     #[must_use]
     pub fn with(&self, numbers: [f64; NUMBERS]) -> Self {
         let [a, b, ..] = numbers;
@@ -161,7 +161,7 @@ impl Camera {
         self.middle + self.back * m * self.radius_px
     }
 
-    /// The same, and how much longer lengths about it are in the plane, in the direction in which they are longest.
+    /// Place in the plane of a point of the picture, and how much longer lengths about it are there, in the direction in which they are longest.
     pub fn flatten(&self, picture: Vector2<f64>) -> (Vector2<f64>, f64) {
         let s = self.slopes(picture);
         let m = s.by_picture;
@@ -170,7 +170,7 @@ impl Camera {
         (s.place, (even + odd) / 2.0)
     }
 
-    /// The same with its slopes.
+    /// Place in the plane of a point of the picture, with its slopes.
     pub fn slopes(&self, picture: Vector2<f64>) -> Slopes {
         let [a, b, .., k] = self.numbers;
         let v = self.vanishing();

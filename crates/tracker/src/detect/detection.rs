@@ -42,7 +42,7 @@ pub struct Detection {
     pub peak: f32,
     /// Longer over shorter principal axis in the world, at least 1.
     pub elongation: f32,
-    /// What makes it less trustworthy.
+    /// Reasons to trust it less.
     pub flags: Flags,
 }
 

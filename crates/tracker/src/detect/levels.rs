@@ -43,7 +43,7 @@ pub struct Levels {
     pub area_px: [f64; 2],
     /// Area of a typical marker, px; `None` where areas have no common value.
     pub marker_area_px: Option<f64>,
-    /// What a marker looks like; `None` where markers are no discs.
+    /// The usual marker; `None` where markers are no discs.
     pub marker: Option<Marker>,
     /// Frames it was learned from.
     pub frames: usize,

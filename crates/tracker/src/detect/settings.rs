@@ -117,7 +117,7 @@ fn say_polarity<S: Serializer>(polarity: &PolaritySetting, to: S) -> Result<S::O
     to.serialize_str(polarity.word())
 }
 
-/// The same read.
+/// Reads the polarity from its word in a file.
 fn read_polarity<'de, D: Deserializer<'de>>(from: D) -> Result<PolaritySetting, D::Error> {
     let word = String::deserialize(from)?;
     PolaritySetting::from_word(&word).map_err(serde::de::Error::custom)

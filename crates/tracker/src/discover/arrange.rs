@@ -34,7 +34,7 @@ const BACKGROUND_PART: f64 = 0.5;
 const BACKGROUND_TURN_RAD: f64 = 0.05;
 const BACKGROUND_TRAVEL: f64 = 0.05;
 
-/// The same for a joint beside those on which bodies hang, px: nothing else would show that it is none.
+/// Greatest scatter of a joint that closes a loop, px: no other evidence would show that it is none.
 const LOOP_PX: f64 = 0.35;
 /// Joints nearer together than this are one, px.
 const ONE_POINT_PX: f64 = 3.0;

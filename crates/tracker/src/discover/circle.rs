@@ -12,7 +12,7 @@ const SCATTER_PART: f64 = 0.004;
 const LEAST: usize = 20;
 /// Part of the circle that must be seen, rad, where the marker goes to and fro on it.
 const SPREAD_RAD: f64 = 0.5;
-/// The same where it does not: a parabola follows a circle for a while.
+/// Part of the circle that must be seen, rad, where it does not: a parabola follows a circle for a while.
 const WIDE_RAD: f64 = 2.5;
 
 /// A circle through places.

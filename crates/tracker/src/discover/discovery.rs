@@ -12,6 +12,6 @@ pub struct Discovery {
     pub rig: Rig,
     /// Places that stand still and belong to no body: a ruler, a screw. px.
     pub standing: Vec<[f64; 2]>,
-    /// What a user should know, a sentence each.
+    /// Warnings to the user, a sentence each.
     pub warnings: Vec<Message>,
 }

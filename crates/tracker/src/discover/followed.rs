@@ -21,7 +21,7 @@ pub struct PathRig {
     pub rig: Rig,
     /// For each of its nodes the paths that are it: more than one where pieces of it are never seen together.
     pub paths: Vec<Vec<usize>>,
-    /// What a user should know, a sentence each.
+    /// Warnings to the user, a sentence each.
     pub warnings: Vec<Message>,
 }
 

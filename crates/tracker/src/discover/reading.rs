@@ -23,7 +23,7 @@ pub(super) struct Reading {
     pub sample: Sample,
     /// Bodies, with their poses in these.
     pub found: Vec<Found>,
-    /// Those of three markers and more.
+    /// Bodies of three markers and more.
     links: Vec<Link>,
     /// Markers that move by themselves and are too many to be followed.
     left_out: usize,
@@ -39,9 +39,9 @@ const JUDGED: usize = 100;
 /// The extent to which bodies of three markers explain the detections.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Explains {
-    /// They are nearly all that is seen.
+    /// The bodies are nearly all that is seen.
     pub all: bool,
-    /// They are rigid but for noise.
+    /// The bodies are rigid but for noise.
     pub fits: bool,
 }
 

@@ -15,7 +15,7 @@ use crate::track::track_recording;
 
 /// Frames before and after the reference picture in which a rig is tried.
 const FRAMES: usize = 300;
-/// What a row costs that gives a tracklet a second name.
+/// Cost, in rows, of a row that gives a tracklet a second name.
 const COST: f64 = 5.0;
 /// A reading that comes earlier stands unless a later one is better by this part of what is seen.
 const BETTER: f64 = 0.01;

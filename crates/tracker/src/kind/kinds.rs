@@ -29,9 +29,9 @@ pub enum Kind {
     Model,
     /// Options of an analysis.
     Config,
-    /// What an analysis wrote.
+    /// A folder that an analysis wrote.
     RunFolder,
-    /// What a damping fit wrote.
+    /// A folder that a damping fit wrote.
     Fit,
     /// A page for a browser.
     Page,

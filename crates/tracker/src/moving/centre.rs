@@ -34,9 +34,10 @@ const SILHOUETTE_RATIO: std::ops::Range<f64> = 0.7..3.0;
 const LEVEL_STEP: f64 = 0.2;
 /// Part of that difference which is not known of the centre; the tests hold what it makes of the stated uncertainty.
 const LEVEL_DOUBT: f64 = 0.12;
-/// The same part of the difference between the silhouette's centre and the region's.
+/// Part of the difference between the silhouette's centre and the region's which is not known of the centre.
 const SILHOUETTE_DOUBT: f64 = 0.5;
-/// The same part of the difference between the centre along the marker's own colour direction and along the one that it was found in:
+/// Part of the difference between the centres along the marker's own colour direction and along the one it was found in which
+/// is not known:
 /// each is as good as the other, and the standard deviation of one of two values is their difference over sqrt(2).
 const COLOUR_DOUBT: f64 = std::f64::consts::FRAC_1_SQRT_2;
 /// Part of the difference between the outline's circle and the region which is not known of the centre.
@@ -48,7 +49,7 @@ const DIFFER_RADII: f64 = 0.1;
 const PLACES_AROUND: usize = 10;
 /// A circle so many radii from where those around are is of another arc of the outline.
 const OTHER_CIRCLE_RADII: f64 = 0.15;
-/// What the filter's answer alone leaves open of a centre, in radii.
+/// Uncertainty of a centre by the filter's response alone, radii.
 const COARSE_DOUBT_RADII: f64 = 0.3;
 
 /// The refined centres of a track.
@@ -66,7 +67,7 @@ struct Found {
     region: Region,
     /// How far it is from the spot.
     moved: f64,
-    /// What the way of finding it leaves open.
+    /// Uncertainty that comes from the way the centre was found.
     doubt: f64,
     /// Its outline, px from its centre, and the circle that most of it lies on, where there is one.
     outline: Vec<[f64; 2]>,

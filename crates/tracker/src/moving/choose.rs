@@ -31,7 +31,8 @@ const LOOK: [f64; 2] = [0.9, 0.75];
 const LEAST_QUALITY: f64 = 0.2;
 /// Part of the best track's weight from which on another of its look is an answer.
 const ANSWER_PART: f64 = 0.12;
-/// The same for what is offered beside the answers: of another look, and looked at in another way.
+/// Part of the best track's weight from which on a track is offered beside the answers: of another look, and along another
+/// colour direction or octave.
 const OTHER_LOOK_PART: f64 = 0.3;
 const OTHER_MODEL_PART: f64 = 0.5;
 /// A companion is seen in at most this part of the pictures in which the other one is, and it in at least this part of its own

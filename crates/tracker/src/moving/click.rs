@@ -36,7 +36,7 @@ const CHOICE_PART: f64 = 0.1;
 const LOOK: [f64; 2] = [0.92, 1.1];
 /// A streak has the same product of peak and length as the marker at rest, to a factor 2, as a logarithm.
 const STREAK: f64 = 0.7;
-/// What a thing that does not move is worth beside one that does: one points at what moves.
+/// Weight of a thing that does not move beside one that does: people point at what moves.
 const STILL: f64 = 0.1;
 /// A spot has a middle of its own, a picture the place that was pointed at: a picture must be found so many times as often.
 const PREFER_SPOT: f64 = 1.5;
@@ -61,11 +61,11 @@ pub struct Click {
 pub enum Missed {
     /// Nothing stands out there.
     Nothing,
-    /// What stands out there, in this way of looking, is seen in so few pictures in a row.
+    /// The spot that stands out there, in this octave and colour direction, is seen in so few pictures in a row.
     Ends(Model, usize, End),
-    /// What stands out there is so much larger that its middle is not what was pointed at.
+    /// The spot that stands out there is so much larger that its middle is not the place pointed at.
     Beside(Model),
-    /// It is seen in so many pictures, but jumps or changes its look.
+    /// The spot is seen in so many pictures, but jumps or changes its look.
     Restless(Model, usize),
 }
 
@@ -82,7 +82,7 @@ pub struct Unheld {
 struct Choice {
     model: Model,
     against: Against,
-    /// What was pointed at.
+    /// The spot that was pointed at.
     spot: Spot,
     limit: f32,
     score: f64,
@@ -274,7 +274,7 @@ fn judge(search: &Search, click: &Click, choice: &Choice, pictures: &[Vec<Spot>]
     Ok(Ok((worth, Marker { track, model: Some(model), radius_px })))
 }
 
-/// What a track through a place is worth as what was pointed at, and its radius, px: how much of it is seen, how smoothly and far
+/// Weight of a track through a place as the thing pointed at, and its radius, px: how much of it is seen, how smoothly and far
 /// it moves, how compact it is and how near to the place.
 fn worth(search: &Search, click: &Click, spot: &Spot, track: &Track, model: Model) -> Result<(f64, f64)> {
     let (radius_px, compact) = compact(search.film, track, &model)?;

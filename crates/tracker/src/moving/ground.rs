@@ -19,7 +19,7 @@ const LEAST_NOISE: f32 = 0.25;
 /// The ground of one octave along one direction.
 #[derive(Debug, Clone)]
 pub struct Ground {
-    /// What bright markers must exceed, and what dark ones must fall below.
+    /// Low quantile of the response, against which bright markers stand out, and the high one, for dark markers.
     low: Vec<f32>,
     high: Vec<f32>,
     /// One over the noise.

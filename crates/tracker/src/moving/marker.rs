@@ -16,7 +16,7 @@ use crate::error::Result;
 /// Places from which the radius of a marker is learned.
 const RADIUS_PLACES: usize = 24;
 
-/// What moves so smoothly and so far, in radii, is one thing and no chance of scraps.
+/// Least smoothness and travel, in radii, of a track that is one thing and not chained by chance.
 const FAR_SMOOTHNESS: f64 = 0.5;
 const FAR_RADII: f64 = 6.0;
 

@@ -21,7 +21,7 @@ const DIRECTIONS: usize = 24;
 /// Radius of the circle over that of a disc of the region's area: what is covered may be two thirds.
 const RADII: Range<f64> = 0.85..1.7;
 
-/// The same where the radius is known from other pictures.
+/// Radius of the circle over the radius known from other pictures.
 const KNOWN: Range<f64> = 0.9..1.1;
 
 /// A circle, px.

@@ -30,7 +30,7 @@ pub struct Spot {
     pub length: f64,
     /// How far it stands out, in units of the noise.
     pub snr: f64,
-    /// What is not known of the centre beside its scatter, px: by how much it depends on the way it is found.
+    /// Uncertainty of the centre beside its scatter, px: by how much it depends on the way it is found.
     pub doubt_px: f64,
 }
 

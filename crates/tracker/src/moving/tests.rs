@@ -87,7 +87,7 @@ impl Film for Drawn {
     }
 }
 
-/// What is followed of its own accord, whatever the confidence.
+/// Markers followed without a click, whatever the confidence.
 struct Followed {
     model: Model,
     tracks: Vec<Track>,
@@ -230,7 +230,7 @@ fn a_wish_to_stop_ends_the_work() {
     assert!(matches!(follow(&film), Err(Error::Interrupted)));
 }
 
-/// What is followed from places that are pointed at.
+/// Markers followed from places that are pointed at.
 fn pointed(film: &Drawn, limits: &Limits, clicks: &[Click]) -> Vec<Result<Marker, Unheld>> {
     let search = Search::learn(film, limits).unwrap().unwrap();
     let mut followed = follow_clicks(&search, clicks, &survey(&search).unwrap().markers).unwrap();

@@ -18,7 +18,8 @@ const RIVAL_Z: f64 = 5.0;
 
 /// Variance of a third difference of white noise over that of a place: 1 + 9 + 9 + 1.
 const THIRD_DIFFERENCE_VARIANCE: f64 = 20.0;
-/// The same of a fourth difference: 1 + 16 + 36 + 16 + 1. The higher one lets more of the motion through.
+/// Variance of a fourth difference of white noise over that of a place: 1 + 16 + 36 + 16 + 1. Of smooth
+/// motion less is left than in a third difference.
 const FOURTH_DIFFERENCE_VARIANCE: f64 = 70.0;
 /// A place that lies aside by more than this, in radii and in units of the usual scatter, is another region's.
 const JUMP_RADII: f64 = 0.25;
@@ -41,7 +42,7 @@ pub struct Track {
     pub count: usize,
     /// From 0 to 1: how smoothly it moves, how constant its look is, how far it travels in its own sizes.
     pub quality: f64,
-    /// The same without its travel.
+    /// From 0 to 1: how smoothly it moves and how constant its look is, whatever its travel.
     pub smoothness: f64,
     /// Extent of its path, px.
     pub extent_px: f64,

@@ -13,7 +13,7 @@ pub enum End {
     Lost,
     /// Two spots, or two tracklets, compete.
     Ambiguous,
-    /// What is there looks different.
+    /// The spot there looks different.
     Look,
 }
 

@@ -22,7 +22,7 @@ const COVERED_SIGMA: f32 = 6.0;
 const SHADOW_PART: f32 = 0.3;
 const SHADOW_SIGMA: f32 = 6.0;
 
-/// What is thinner than twice this, in radii of the marker, is no part of it.
+/// Half the least thickness of a part of the marker, in its radii: thinner pieces are rods and strings.
 const THIN_RADII: f64 = 0.25;
 /// A marker of a smaller radius has no middle apart from its edge, px of the octave.
 const SMALL_BELOW: f64 = 4.0;

@@ -46,7 +46,7 @@ pub struct Overlay {
     zoom: f64,
     /// Size of marks in the picture: 1 in one of 1280 px.
     mark: f64,
-    /// The same in square pixels of the recording.
+    /// Size of marks in square pixels of the recording.
     pub(super) scale: f64,
 }
 
@@ -138,7 +138,7 @@ impl Overlay {
         self.drawn(frame, time_s, row).map(Picture)
     }
 
-    /// The same as OpenCV has it: blue, green, red.
+    /// The drawn frame as OpenCV has it: blue, green, red.
     pub(super) fn drawn(&mut self, frame: &Frame, time_s: Option<f64>, row: &[Observation]) -> Result<Mat> {
         let poses = self.follow(frame.index, row);
         let mut picture = colour(frame, self.size)?;

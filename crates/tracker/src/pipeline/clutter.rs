@@ -46,7 +46,7 @@ pub(super) fn is_cluttered(store: &DetectionStore) -> Result<bool> {
     Ok(shows_clutter(&frames))
 }
 
-/// The same of frames that were only looked at.
+/// Whether a sample of frames, looked at before detection, shows clutter.
 ///
 /// # Errors
 /// Those of detection.

@@ -32,7 +32,7 @@ const LEAST_SEEN: f64 = 0.5;
 
 /// Outcome of looking at what moves.
 pub(super) enum Outcome {
-    /// It is followed.
+    /// A moving thing is followed.
     Followed(Box<RunSummary>),
     /// Why nothing is named, and the way on.
     Unclear(Unclear),

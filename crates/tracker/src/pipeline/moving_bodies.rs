@@ -90,7 +90,7 @@ impl Moving {
         }
     }
 
-    /// What the nodes are, a sentence without its full stop.
+    /// Description of the nodes, a sentence without its full stop.
     pub(super) fn bodies_words(&self) -> String {
         let Some(found) = &self.bodies else { return "No bodies are made of them".into() };
         let counted =

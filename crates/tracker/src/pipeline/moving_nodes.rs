@@ -34,11 +34,11 @@ const SURE_CONFIDENCE: f64 = 0.3;
 
 /// The way in which what is followed was chosen.
 pub(super) enum Chosen {
-    /// It is likeliest meant, with this confidence; so many other things move.
+    /// The likeliest answer, with its confidence and the number of other things that move.
     Likeliest { confidence: f64, others: usize },
-    /// It was pointed at.
+    /// A place that the user pointed at.
     Pointed,
-    /// It was named by its number in the picture.
+    /// A number of the picture that the user named.
     Numbered,
 }
 

@@ -70,7 +70,7 @@ pub(super) fn learn_and<T: Send + 'static>(
 pub(super) struct Attended {
     /// The work stops soon after it is asked to.
     pub stop: Stop,
-    /// What the work says of how far it is.
+    /// Steps that the work has done.
     pub done: AtomicU64,
 }
 

@@ -28,7 +28,7 @@ const SAMPLES: usize = 12;
 /// A run between its steps.
 pub(super) struct Run<'a> {
     pub settings: &'a RunSettings,
-    /// Those of the recording; none where it cannot be read again.
+    /// Files of the recording; none where it cannot be read again.
     pub files: Vec<PathBuf>,
     /// When they were changed, as the run found them.
     pub changes: Option<String>,

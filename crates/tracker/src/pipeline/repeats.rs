@@ -61,14 +61,14 @@ impl Repeats {
         (self.moved, self.stays, self.longest_px) = (steps, 0, 0.0);
     }
 
-    /// What to know of repeated frames, if they are many.
+    /// Warning of repeated frames, if they are many.
     pub fn words(&self) -> Option<Message> {
         let many = self.repeated >= TOLD && self.repeated as f64 >= TOLD_PART * self.frames as f64;
         many.then(|| copies_words(self.repeated, self.frames))
     }
 }
 
-/// What to know of frames that are copies.
+/// Warning of frames that are copies.
 pub fn copies_words(copies: usize, frames: usize) -> Message {
     format!(
         "{copies} of {frames} frames are copies of the frame before them, as recorders of a screen and converters make them: their \

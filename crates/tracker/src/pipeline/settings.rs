@@ -45,7 +45,7 @@ pub struct RunSettings {
     pub input: String,
     /// The table; `None` only collects rows in memory.
     pub output: Option<PathBuf>,
-    /// What to do where the output is there already.
+    /// Treatment of an output that is there already.
     pub existing: Existing,
     /// Whether the summary holds the table.
     pub collect: bool,
@@ -57,7 +57,7 @@ pub struct RunSettings {
     pub frames: Option<Range<u64>>,
     /// How markers are detected.
     pub detect: DetectSettings,
-    /// What is to be followed; the default is what stands out, or else what moves if it is clear what is meant.
+    /// Markers to follow; the default is those that stand out, or else those that move if it is clear which are meant.
     pub wanted: Wanted,
     /// Threads for detection; 0 is one for each core. The result is the same for any number.
     pub threads: usize,
@@ -79,7 +79,7 @@ impl RunSettings {
         of_rig.unwrap_or(&self.wanted)
     }
 
-    /// The same as JSON, `null` unless something was said.
+    /// The markers asked for as JSON, `null` unless something was asked.
     pub(super) fn wanted_json(&self) -> serde_json::Value {
         json!(Some(self.asked()).filter(|w| !w.is_default()))
     }

@@ -9,7 +9,7 @@ pub(super) const MOVING: &str = "moving";
 /// Summary of a run.
 #[derive(Debug, Clone)]
 pub struct RunSummary {
-    /// What the table says of itself.
+    /// The table's metadata.
     pub meta: TableMeta,
     /// Frames in the table.
     pub frames: u64,
@@ -21,9 +21,9 @@ pub struct RunSummary {
     pub moving: bool,
     /// Names of nodes of which it is doubtful whether they are what is meant, or where their centres are; notes say which.
     pub doubtful: Vec<String>,
-    /// What became of each node.
+    /// Each node's counts of rows by status.
     pub nodes: Vec<NodeSummary>,
-    /// What a user should know, a sentence each.
+    /// Warnings to the user, a sentence each.
     pub warnings: Vec<Message>,
     /// The table, if it was asked for.
     pub table: Option<NodeTable>,

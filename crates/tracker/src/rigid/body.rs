@@ -48,7 +48,7 @@ pub struct Hinge {
     pub body: usize,
     /// The joint in the body's coordinates, px.
     pub local: Vector2<f64>,
-    /// What is on the other side.
+    /// The ground, or the body on the other side.
     pub holder: Holder,
     /// Standard uncertainty of the two sides' agreement per coordinate, px.
     pub sigma_px: f64,

@@ -28,7 +28,7 @@ pub struct Forecast {
 }
 
 impl Forecast {
-    /// The same of a body of which `local` is known to be at `there`.
+    /// The forecast of a body whose point `local` is known to be at `there`.
     pub fn hung(mut self, local: Vector2<f64>, there: Vector2<f64>) -> Self {
         self.pose = hung_at(&self.pose, local, there);
         self.origin_px = 0.0;

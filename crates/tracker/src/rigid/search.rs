@@ -56,7 +56,7 @@ pub struct Search<'a> {
     pub floor_px: f64,
     /// Pairs of nodes from which a free pose is sought, the longest first: they turn least with noise.
     pub pairs: usize,
-    /// What may still be tried.
+    /// Budget of work for the search.
     pub work: &'a Work,
 }
 

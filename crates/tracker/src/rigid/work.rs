@@ -7,9 +7,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// Work that is saved up at most, and at the beginning, in places looked up: one detection that is sought near one place, some
 /// 0.1 us (docs/validation/robustness.md).
 pub const MOST_SAVED: u64 = 10_000_000;
-/// What one frame may take of it: what the user says is heard between two frames.
+/// Work that one frame may take at most: a wish to stop is heard between two frames.
 pub const MOST_OF_FRAME: u64 = 2_000_000;
-/// What each frame adds.
+/// Work that each frame adds.
 pub const EACH_FRAME: u64 = 10_000;
 
 /// Work that may still be done.

@@ -40,7 +40,7 @@ pub struct OpencvSource {
     orientation: Orientation,
     capture: VideoCapture,
     color: Mat,
-    /// The same film through the first decoder.
+    /// The film through FFmpeg, for times, gaps and damage.
     beside: FfmpegSource,
     /// Ticks are frame numbers: the user gives the rate.
     counts_frames: bool,

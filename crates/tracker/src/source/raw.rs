@@ -99,7 +99,7 @@ impl RawFrames {
         Box::new(Lent { shared: Arc::clone(&self.0), index, at, length, read: OnceLock::new() })
     }
 
-    /// The same as a copy, read at once.
+    /// A copy of the frame `index`, read at once.
     ///
     /// # Errors
     /// [`Error::Source`] if it cannot be read whole.

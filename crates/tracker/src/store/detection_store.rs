@@ -82,7 +82,7 @@ impl DetectionStore {
         Ok(store)
     }
 
-    /// The same for a recording of such pixels.
+    /// The store of a recording with pixels of this aspect.
     #[must_use]
     pub fn of_pixels(self, pixel_aspect: PixelAspect) -> Self {
         Self { pixel_aspect, ..self }

@@ -31,7 +31,7 @@ pub struct Film {
     /// For each marker the index of its link.
     pub(super) marker_links: Vec<usize>,
     pub(super) time_base: TimeBase,
-    /// What the camera makes of the links' plane; `None` is nothing.
+    /// The camera that sees the links' plane; `None` is one that looks straight at it.
     pub(super) camera: Option<Camera>,
 }
 

@@ -15,7 +15,7 @@ use crate::error::{Error, Fault, Place, Result};
 /// Angles of links, and places of free bodies, over time.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct MotionTable {
-    /// What it is called in messages.
+    /// Its name in messages.
     pub name: String,
     /// Times, s, increasing.
     pub time_s: Vec<f64>,

@@ -87,7 +87,7 @@ pub struct Camera {
     pub saturation: Option<f64>,
     /// Number of hot pixels, at random places that stay.
     pub hot_pixels: u32,
-    /// What a hot pixel adds to its level.
+    /// Level that a hot pixel adds.
     pub hot_level: f64,
     /// How the camera stands and what its lens does; `None` faces the links squarely, through a lens that keeps lines
     /// straight.
@@ -148,9 +148,9 @@ impl Camera {
 pub struct Light {
     /// Level of the ground in the middle of the image.
     pub background: f64,
-    /// What the ground gains from the left to the right border and from the top to the bottom one, levels.
+    /// Gain of the ground from the left to the right border and from the top to the bottom one, levels.
     pub background_gradient: [f64; 2],
-    /// What all light gains from left to right and from top to bottom, as a part of that in the middle.
+    /// Gain of all light from left to right and from top to bottom, as a part of that in the middle.
     pub uneven: [f64; 2],
 }
 
@@ -299,7 +299,7 @@ pub struct Glint {
     pub at_px: [f64; 2],
     /// Radius.
     pub radius_px: f64,
-    /// What it adds, levels.
+    /// Levels that it adds.
     pub level: f64,
 }
 

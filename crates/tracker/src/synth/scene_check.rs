@@ -18,7 +18,7 @@ impl Scene {
 
 /// Refuses with the key at fault.
 struct Checker<'a> {
-    /// What the scene is called in messages.
+    /// The scene's name in messages.
     name: &'a str,
 }
 

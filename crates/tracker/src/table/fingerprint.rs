@@ -52,7 +52,7 @@ fn written_ns(m: &Metadata) -> i128 {
 }
 
 impl Fingerprint {
-    /// That of the recording that is read from `files`.
+    /// Fingerprint of the recording that is read from `files`.
     ///
     /// # Errors
     /// [`Error::Source`] if one of them cannot be read.

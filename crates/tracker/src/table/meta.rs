@@ -52,7 +52,7 @@ pub struct SourceFacts {
     pub rate_origin: RateOrigin,
     /// Seconds per tick, numerator and denominator.
     pub time_base: [u64; 2],
-    /// What pixels were converted from, if they were.
+    /// Form of the samples before they were converted to brightness, if they were.
     pub converted_from: Option<String>,
     /// Bytes of the file or files.
     pub size_bytes: Option<u64>,
@@ -61,7 +61,7 @@ pub struct SourceFacts {
     /// SHA-256 of what tells the recording from others of its size, see [`crate::table::Fingerprint`].
     #[serde(default)]
     pub sha256_ends: Option<String>,
-    /// What the source warned of.
+    /// The source's warnings.
     pub warnings: Vec<String>,
 }
 
@@ -125,7 +125,7 @@ pub enum RunEnding {
         frames: u64,
         /// Byte offset of the damage, if known.
         byte: Option<u64>,
-        /// What was wrong.
+        /// The decoder's reason.
         reason: String,
     },
     /// The user stopped the run; the table holds what was done.
@@ -143,10 +143,10 @@ pub struct TableMeta {
     pub rig: Rig,
     /// The recording.
     pub source: SourceFacts,
-    /// What its times are and how well they are known; tables of earlier versions do not say it.
+    /// Origin and uncertainty of its times; tables of earlier versions do not say it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time: Option<Timing>,
-    /// What was asked for and what was learned from the recording, by name.
+    /// Settings that were given and those learned from the recording, by name.
     pub settings: serde_json::Value,
     /// How the run ended.
     pub ending: RunEnding,

@@ -130,7 +130,7 @@ fn several_row_groups_come_back_as_one() {
     assert_eq!(reader.metadata().num_row_groups(), 3);
 }
 
-/// What a CSV says when one piece of it is replaced.
+/// The error of a CSV table in which one piece of text is replaced.
 fn csv_complaint(from: &str, to: &str) -> String {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("t.csv");
@@ -229,7 +229,7 @@ fn names_that_are_formulas_survive_a_safe_csv() {
     }
 }
 
-/// What spoils a table.
+/// A change that spoils a table.
 type Spoil = Box<dyn Fn(&mut NodeTable)>;
 
 #[test]

@@ -33,7 +33,7 @@ pub enum Doubt {
 pub struct Captured {
     /// The tag's name.
     pub tag: String,
-    /// What it says, frames per second.
+    /// The rate that it states, frames per second.
     pub rate_hz: f64,
     /// Whether it gives the times, or agrees with them. Else it contradicts the time stamps.
     pub used: bool,
@@ -42,7 +42,7 @@ pub struct Captured {
 /// The frames' times, and how well they are known.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Timing {
-    /// What the times are.
+    /// Origin of the times.
     pub kind: TimingKind,
     /// Frames per second of recorded time; of a variable rate the mean; `None` if it is not known.
     pub rate_hz: Option<f64>,
@@ -75,6 +75,6 @@ pub struct Timing {
     pub camera: Option<String>,
     /// Why the rate may be wrong.
     pub doubt: Option<Doubt>,
-    /// What a person should know of the times, a sentence each, with settings by their bare names.
+    /// Notes to the user about the times, a sentence each, with settings by their bare names.
     pub notes: Vec<String>,
 }

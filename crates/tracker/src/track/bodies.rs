@@ -22,7 +22,7 @@ pub struct Bodies {
     pub priors: MotionPriors,
     /// The last poses of each body.
     pub motions: Vec<Motion>,
-    /// What may still be tried to find them.
+    /// Budget of work for finding them.
     pub work: Work,
     /// For each body the least turn that maps it on itself as far as two nodes, rad.
     pub(super) self_symmetry_rad: Vec<f64>,

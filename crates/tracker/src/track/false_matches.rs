@@ -18,7 +18,7 @@ use crate::rigid::work::{MOST_OF_FRAME, Work};
 pub(super) const CHANCE_ANYWHERE: f64 = 1e-5;
 /// How exactly the only node seen of a body must be expected, px: within what a half hidden marker may be off.
 const LONE_GATE_PX: f64 = 1.5;
-/// The same where its area shows that it is whole.
+/// Gate of the only node seen of a body where its area shows that it is whole, px.
 const WHOLE_GATE_PX: f64 = 3.0;
 
 /// Expected number of false matches as good as `s`: poses that unrelated detections would give to `search` in `trials` poses.

@@ -18,7 +18,7 @@ use crate::rigid::pose::place;
 /// How far the centre of a marker that is at least half seen may be from the marker's, in radii: that of half a
 /// disc is 0.42 from its centre.
 const BESIDE_RADII: f64 = 0.5;
-/// The same where the marker's size is not known, px.
+/// Greatest distance of the centres where the marker's size is not known, px.
 const BESIDE_PX: f64 = 2.0;
 /// Discs no farther apart than this run together in the picture, px: blur and the threshold's edge.
 const TOUCH_PX: f64 = 2.0;

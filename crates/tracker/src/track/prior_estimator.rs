@@ -15,7 +15,7 @@ use crate::rigid::pose::place;
 const SAMPLES: usize = 1024;
 /// Frames that show every node of a body, fewer say nothing of how it scatters: 50 know it to a tenth.
 const LEAST_COMPLETE: usize = 50;
-/// What stays within this stands still, px.
+/// Greatest travel of a detection that stands still, px.
 const SAME_PLACE_PX: f64 = 3.0;
 /// Places of left-over detections kept.
 const PLACES: usize = 256;

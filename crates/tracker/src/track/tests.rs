@@ -1,4 +1,4 @@
-//! What holds for any sequence of detections, however senseless: nothing is named twice, nothing but a blob
+//! Properties of tracking that hold for any sequence of detections, however senseless: nothing is named twice, nothing but a blob
 //! of several markers is used twice, every frame has its row.
 
 pub(crate) mod bed;
@@ -20,13 +20,13 @@ use crate::store::{DetectionStore, FrameStamp};
 use crate::table::{NodeTable, Rows, tests::meta};
 use swing::Swing;
 
-/// What is done to a frame of a true film before the tracker sees it.
+/// Harm to a frame of a true film before the tracker sees it.
 #[derive(Debug, Clone)]
 enum Harm {
     None,
     /// Every such detection is left out.
     Lose(usize),
-    /// What another frame shows.
+    /// Another frame's detections.
     Other(prop::sample::Index),
     /// Detections beside true ones, so near that they fit as well.
     Twins(Vec<(prop::sample::Index, f64, f64)>),

@@ -16,7 +16,7 @@ fn said(path: &Path) -> String {
     info(path).pixel_aspect.to_string()
 }
 
-/// What the `ffmpeg` program makes of a film.
+/// Pictures that the `ffmpeg` program makes of a film.
 fn made(from: &Path, arguments: &[&str], to: &str) -> PathBuf {
     let to = from.with_file_name(to);
     let mut command = Command::new("ffmpeg");

@@ -18,7 +18,7 @@ const LARGER: &str = "scale=392:232:flags=neighbor,noise=alls=12:all_seed=1";
 /// How a packet is damaged: its last two thirds become noise, or zeros, or one bit in its middle is turned over.
 const WAYS: [&str; 3] = ["noise", "zeros", "one bit"];
 
-/// What a film is called in the table, its file, its codec's options, and in which ways each damage to it must be told.
+/// A film's name in the table, its file, its codec's options, and in which ways each damage to it must be told.
 type Film = (&'static str, &'static str, &'static [&'static str], [bool; 3]);
 
 const ALL: [bool; 3] = [true; 3];
@@ -35,7 +35,7 @@ const FILMS: [Film; 8] = [
     ("MPEG-4 part 2", "mpeg4.avi", &["-c:v", "mpeg4", "-g", "12", "-q:v", "3"], MUCH),
 ];
 
-/// What can be damaged in a film or folder: the file, and place and length of a picture's data in it.
+/// A part of a film or folder that can be damaged: the file, and place and length of a picture's data in it.
 fn places(path: &Path) -> Vec<(PathBuf, usize, usize)> {
     if !path.to_str().unwrap().contains('%') {
         return packets(path).into_iter().map(|(at, size)| (path.to_owned(), at, size)).collect();

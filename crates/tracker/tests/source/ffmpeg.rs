@@ -8,7 +8,7 @@ use tracker::source::{OpenOptions, open};
 
 use crate::film::{HEIGHT, WIDTH, encode, have_ffmpeg, index_of, picture, read_all, real, samples};
 
-/// What a codec's file must give.
+/// Frames and values that a codec's file must give.
 struct Case {
     file: &'static str,
     arguments: &'static [&'static str],

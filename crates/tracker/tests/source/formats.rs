@@ -1,4 +1,4 @@
-//! What is opened: formats by name, and names as files.
+//! Formats are opened by name, and names are files.
 
 use std::path::Path;
 use std::process::{Command, Stdio};

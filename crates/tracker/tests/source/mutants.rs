@@ -97,7 +97,7 @@ fn which(pictures: &[Vec<u32>], frame: &Frame) -> Option<usize> {
     pictures.iter().position(|p| *p == seen)
 }
 
-/// What came of a damaged copy.
+/// Outcome of reading a damaged copy.
 fn outcome(path: &Path, pictures: &[Vec<u32>], times: &[f64]) -> &'static str {
     let Ok(mut source) = open(path.to_str().unwrap(), &OpenOptions::default()) else { return "refused" };
     let base = source.info().time_base;

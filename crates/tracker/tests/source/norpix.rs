@@ -12,7 +12,7 @@ const H: usize = 5;
 /// 2023-11-14, s since 1970.
 const BEGIN_S: u64 = 1_700_000_000;
 
-/// What a sequence is made of.
+/// Parts of a made sequence.
 #[derive(Clone)]
 struct Seq {
     version: u32,

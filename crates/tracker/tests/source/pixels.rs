@@ -11,7 +11,7 @@ use crate::film::{HEIGHT, WIDTH, encode, have_ffmpeg, picture, read_all, samples
 
 const COUNT: usize = 12;
 
-/// What is known of a recording, and the samples of all its frames.
+/// Description of a recording, and the samples of all its frames.
 fn read(path: &Path) -> (SourceInfo, Vec<Vec<u32>>) {
     let mut source = open(path.to_str().unwrap(), &OpenOptions::default()).unwrap();
     let info = source.info().clone();

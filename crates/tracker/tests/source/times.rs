@@ -38,7 +38,7 @@ fn again(folder: &Path, name: &str, from: &Path, more: &[&str]) -> PathBuf {
     path
 }
 
-/// What a recording's times are and the times themselves, by reading it through.
+/// Origin of a recording's times and the times themselves, by reading it through.
 fn timed(path: &Path) -> (Timing, Vec<f64>) {
     let mut source = open(path.to_str().unwrap(), &OpenOptions::default()).unwrap();
     let ticks: Vec<i64> = read_all(&mut *source).iter().map(|f| f.ticks).collect();

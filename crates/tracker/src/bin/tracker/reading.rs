@@ -17,7 +17,7 @@ pub struct OpenArgs {
     /// Frames a second of recorded time, instead of what the recording claims
     #[arg(long, value_name = "F")]
     fps: Option<f64>,
-    /// What reads compressed film
+    /// Library that decodes compressed film
     #[arg(long, default_value = "auto", value_parser = word::<Decoder>())]
     decoder: Decoder,
     /// How interlaced film is read, whose pictures hold two fields: not at all, or each picture as one

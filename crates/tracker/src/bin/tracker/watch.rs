@@ -41,7 +41,7 @@ pub fn listen() -> anyhow::Result<()> {
 /// Shows progress on a terminal's standard error and hears ctrl-c.
 pub struct Watch {
     bar: ProgressBar,
-    /// What was found of what moves, if anything was looked for.
+    /// Candidates among what moves, if they were looked for.
     pub candidates: Option<Candidates>,
 }
 

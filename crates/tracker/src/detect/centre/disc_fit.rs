@@ -31,7 +31,7 @@ pub(crate) struct Fitted {
     pub radius_sigma_px: f64,
     /// Weighted sum of squared residuals over its degrees of freedom.
     pub chi2: f64,
-    /// Those: pixels less free numbers.
+    /// Degrees of freedom: pixels less free numbers.
     pub freedom: f64,
     /// Root mean square residual, raw units.
     pub rms: f64,

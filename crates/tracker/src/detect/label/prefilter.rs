@@ -212,7 +212,7 @@ struct Words<const N: usize> {
     coarse: Option<Coarse<N>>,
 }
 
-/// The same for the first byte of each sample alone, which holds its upper bits: by even and odd bytes of a cell. Half
+/// Masks and limits of the first byte of each sample alone, which holds its upper bits: by even and odd bytes of a cell. Half
 /// of the work, and mostly enough.
 #[derive(Debug, Clone, PartialEq)]
 struct Coarse<const N: usize> {
@@ -312,7 +312,7 @@ impl<const N: usize> Words<N> {
         beyond.iter().fold(0, |all, b| all | b) != 0
     }
 
-    /// The same in fewer bytes.
+    /// Whether any sample of fewer bytes than a whole vector is beyond the threshold.
     #[inline(always)]
     fn any_of_few<const BRIGHT: bool>(&self, bytes: &[u8]) -> bool {
         let mut beyond = 0;

@@ -1,4 +1,4 @@
-//! What a user may say of detection, and what then comes.
+//! Settings of detection that a user may give, and their results.
 
 use std::sync::Arc;
 

@@ -20,7 +20,7 @@ const DISTANCE_FRAMES: usize = 20;
 const DISTANCE_PX: f64 = 0.3;
 /// A rival must be worse by this, px.
 const CLEAR_PX: f64 = 0.15;
-/// What a claim by distances alone costs, and one to a new marker, px.
+/// Costs of a claim by distances alone, and of one to a new marker, px.
 const DISTANCE_COST_PX: f64 = 0.3;
 const NEW_COST_PX: f64 = 2.0;
 

@@ -22,7 +22,7 @@ const TRACKLETS: usize = 160;
 const STILL_PX: f64 = 3.0;
 /// Part of the usual area below which a marker is half hidden: its centre is off by a tenth of its radius.
 const HALF_HIDDEN: f32 = 0.85;
-/// The same above, where it runs together with something.
+/// Part of the usual area above which a marker runs together with something.
 const SWOLLEN: f32 = 1.5;
 /// Centres are not better than this, px: an edge pixel's level is rounded.
 const LEAST_SIGMA_PX: f64 = 0.01;
@@ -30,7 +30,7 @@ const LEAST_SIGMA_PX: f64 = 0.01;
 /// Tracklets in frames that differ, in the plane.
 #[derive(Debug)]
 pub struct Evidence<'a> {
-    /// Those that move, seen in most frames first.
+    /// Moving tracklets, those seen in most frames first.
     pub tracklets: Vec<&'a Tracklet>,
     /// Indices of the frames in the store.
     pub frames: Vec<usize>,
@@ -71,7 +71,7 @@ impl<'a> Evidence<'a> {
         Ok(Self { tracklets: moving, frames, spans, places, sigma_px })
     }
 
-    /// The same in the plane of a camera.
+    /// The evidence in the plane of a camera.
     pub fn through(&self, camera: Option<&Camera>) -> Self {
         let seen = |p: &Option<Vector2<f64>>| p.map(|p| camera.map_or(p, |c| c.to_plane(p)));
         Self {

@@ -19,10 +19,10 @@ const SAME_PART: f64 = 0.03;
 const NEAR_PIVOT_PX: f64 = 12.0;
 /// Part of the frames that a marker must be seen in.
 const LEAST_PART: f64 = 0.1;
-/// The same of one that goes about nothing.
+/// Part of the frames that a marker must be seen in which goes about no point.
 const LONE_PART: f64 = 0.3;
 
-/// What a single marker goes about.
+/// The point about which a single marker turns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Holder {
     Ground,

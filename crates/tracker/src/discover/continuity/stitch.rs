@@ -14,9 +14,9 @@ use crate::rigid::pose::{Pair, fit_pose, place};
 /// Frames in which both are posed, and how far both turned in them, rad, for a verdict that they turn as one.
 const TOGETHER_FRAMES: usize = 40;
 const TURNED_RAD: f64 = 0.3;
-/// They turn against each other by less, rad.
+/// Greatest turn of two bodies against each other that are one, rad.
 const AS_ONE_RAD: f64 = 0.03;
-/// And a marker of one wanders by less in the other, px.
+/// Greatest wandering of a marker of one in the other, px.
 const WANDERS_PX: f64 = 0.5;
 /// Bodies that are posed in more frames together are two.
 const NEVER_FRAMES: usize = 3;

@@ -18,14 +18,15 @@ const MOST_RADIUS_PX: usize = 24;
 const RADIUS_PART: f64 = 1.3;
 /// Pixels of a thing's border show what is behind it, too: so many px of it.
 const BORDER_PX: i64 = 2;
-/// What it covers is learned from so many pictures before and after, at least, in which it is so many px away.
+/// Pictures before and after from which a thing's extent is learned: at most, at least, and the least distance of the thing
+/// in them, px.
 const GROW_PICTURES: usize = 12;
 const GROW_LEAST: usize = 4;
 const GROW_PX: f64 = 2.5;
 /// Likeness from which on a place is certain where the thing is expected, and where it was lost before.
 const CERTAIN: f64 = 0.7;
 const CERTAIN_AGAIN: f64 = 0.8;
-/// What the thing looks like is learned anew from places of a likeness between these.
+/// Likeness of the places from which a template is learned anew.
 const RENEW: std::ops::Range<f64> = 0.8..0.9;
 /// Another place that is as like but for this much competes.
 const RIVAL: f64 = 0.08;
@@ -43,7 +44,7 @@ const GATE_GROWTH: f64 = 0.5;
 const MOST_GATE_PX: f64 = 48.0;
 /// Pictures in a row in which it is not seen before it is given up.
 const MISSES: usize = 40;
-/// The same for what it looked like last; what it looked like at first is sought longer.
+/// Pictures in a row before the latest template is given up; the first one is sought for `MISSES`.
 const LATEST_MISSES: usize = 2;
 /// Pictures before the motion is known.
 const YOUNG: usize = 3;
@@ -53,11 +54,11 @@ const LEAST_PICTURES: usize = 5;
 /// The reason for which nothing is followed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Lost {
-    /// What is there stands still all through the recording.
+    /// The thing stands still all through the recording.
     Still,
-    /// It is plain: noise leaves more open of its place than may be.
+    /// The thing has too little texture: noise leaves its place more uncertain than `MOST_SIGMA_PX`.
     Plain,
-    /// It is seen with certainty in so many pictures only.
+    /// The thing is seen with certainty in so many pictures only.
     Soon(usize),
 }
 
@@ -66,7 +67,7 @@ struct Look {
     template: Template,
     /// The thing's pose there, in terms of the first picture.
     pose: Pose,
-    /// What is not known of its place there, px.
+    /// Uncertainty of its place there, px.
     sigma_px: f64,
 }
 
@@ -155,7 +156,7 @@ fn near(
     all.map(|(k, m)| Ok((m, plane(&film.read(k)?)))).collect()
 }
 
-/// What a thing looks like that covers so much of a picture, if that holds it.
+/// Template of a thing that covers so much of a picture, if its texture holds it.
 fn held(first: &Plane, still: &Still, start: &Pose, cover: &Cover) -> Option<Template> {
     let disc = (cover.count as f64 / std::f64::consts::PI).sqrt();
     let radius = ((RADIUS_PART * disc) as usize).clamp(LEAST_RADIUS_PX, MOST_RADIUS_PX);

@@ -25,7 +25,7 @@ const NEAR_COUNT: usize = 9;
 const MOVES_SIGMA: f64 = 4.0;
 /// Distance of the pixels that teach the noise.
 const NOISE_STRIDE: usize = 13;
-/// What is nearly as like a template, by this part, in this part of all pictures at one place, stands still there.
+/// Part of a template's likeness, and part of all pictures, from which on a thing at one place stands still there.
 const ALIKE_PART: f64 = 0.9;
 const STANDS_PART: f64 = 0.9;
 /// A person points beside what they mean by so many pixels at most.
@@ -111,7 +111,7 @@ impl Still {
         Ok(Self { planes, noise })
     }
 
-    /// What a thing at a place covers of a picture, within `reach` px: the connected pixels that differ from what is there else.
+    /// Pixels of a picture that a thing at a place covers, within `reach` px: connected ones that differ from the still background.
     pub fn cover(&self, picture: &Plane, at: [f64; 2], reach: usize) -> Cover {
         let middle = at.map(|v| v.round() as i64);
         let reach = reach as i64;
@@ -139,7 +139,7 @@ impl Still {
         connected(at, middle, reach, &most)
     }
 
-    /// What a thing covers, from places at which it was seen elsewhere: pixels that are there again, and that stand less still than
+    /// Pixels that a thing covers, from places at which it was seen elsewhere: pixels that are there again, and that stand less still than
     /// they move with it.
     pub fn grown(&self, picture: &Plane, cover: &Cover, seen: &[(Pose, Plane)]) -> Cover {
         let (middle, reach) = (cover.middle, cover.reach);

@@ -30,7 +30,7 @@ struct Arrived {
     lost: Vec<i64>,
     /// Its time follows that of the packet before it without a gap.
     follows: bool,
-    /// It is later than that by more than half a frame.
+    /// The packet is later than that by more than half a frame.
     is_late: bool,
     /// The coded film goes on with it; `None` where nothing tells.
     goes_on: Option<bool>,
@@ -50,13 +50,13 @@ pub(super) struct Given {
     pub is_late: bool,
     /// The coded film goes on with it.
     pub goes_on: bool,
-    /// It is itself damaged, as far as the file around it tells.
+    /// The packet itself is damaged, as far as the file around it tells.
     pub is_damaged: bool,
-    /// What is wrong inside it, a clause.
+    /// Damage inside the packet, a clause.
     pub problem: Option<String>,
-    /// It is the last one and less than there should be.
+    /// The packet is the last one and shorter than it should be.
     pub is_cut: bool,
-    /// It belongs to the picture of the packet before it.
+    /// The packet belongs to the picture of the packet before it.
     pub is_second_field: bool,
 }
 

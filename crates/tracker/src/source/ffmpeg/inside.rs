@@ -26,7 +26,7 @@ impl Inside {
         Some(Self { check, was_right: false })
     }
 
-    /// What is wrong with a packet, a clause, where one before it was right.
+    /// Damage inside a packet, a clause, where a packet before it was right.
     pub(super) fn problem(&mut self, packet: &[u8]) -> Option<String> {
         let problem = (self.check)(packet).err();
         self.was_right |= problem.is_none();

@@ -152,7 +152,7 @@ impl Lost {
         Some((self.steps.span() as f64 / steps, wide))
     }
 
-    /// The same where single stamps are off the grid, by the step that most frames have.
+    /// Step and gaps where single stamps are off the grid, by the step that most frames have.
     fn by_steps(&self) -> Option<(f64, Vec<Wide>)> {
         if self.steps.runs().len() == MOST_RUNS {
             return None;

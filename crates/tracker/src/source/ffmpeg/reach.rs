@@ -11,7 +11,7 @@ use super::units::Units;
 pub(super) enum Reach {
     /// None.
     Itself,
-    /// Those that are shown before the key frame that precedes them.
+    /// Pictures that are shown before the key frame that precedes them.
     Leading,
     /// All up to the next key frame, and those shown before that.
     All,

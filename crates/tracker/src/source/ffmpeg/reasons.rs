@@ -9,7 +9,7 @@ use crate::gaps::{Reason, keep_reason};
 /// Packets that are remembered: far more than a decoder has under way.
 const REMEMBERED: usize = 4096;
 
-/// What is wrong with packets, and with the frames made of them.
+/// Damage of packets, and of the frames made of them, in words.
 #[derive(Debug, Default)]
 pub(super) struct Reasons {
     /// Of packets, by their number in decoding order: a clause without a full stop.
@@ -18,7 +18,7 @@ pub(super) struct Reasons {
 }
 
 impl Reasons {
-    /// What is wrong with packet `number`.
+    /// Notes the damage of packet `number`.
     pub(super) fn of_packet(&mut self, number: u64, words: Option<String>) {
         self.of_packets.extend(words.map(|words| (number, words)));
         if self.of_packets.len() > REMEMBERED {

@@ -8,7 +8,8 @@ use ffmpeg_next::ffi;
 /// Bytes behind a slice: its length, and where slices have sums, a byte of status and the sum.
 const LENGTH: usize = 3;
 const LENGTH_AND_SUM: usize = LENGTH + 5;
-/// What the sum over a slice and its own sum begins with and comes to, in libavutil's order of bytes: version 3, version 4.
+/// Start of the sum over a slice and its stored sum, and its end if both agree, in libavutil's order of bytes: version 3,
+/// version 4.
 const REMAINDERS: [u32; 2] = [0, 0x7A8C_4079];
 /// First two bytes of a key frame's packet, at least: its first bit, coded with even odds, is 1.
 const KEY_FRAME: u16 = 0x7F80;

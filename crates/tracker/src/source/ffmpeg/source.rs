@@ -270,8 +270,8 @@ impl FfmpegSource {
         Ok(is_next)
     }
 
-    /// What an edit list hides at the ends is trimmed; what is hidden between shown frames is lost to who watches, and so
-    /// is a frame whose display time is damaged: it is further from its decoding time than any codec allows.
+    /// Notes a frame that is not shown. An edit list trims frames at the ends; a frame hidden between shown ones is lost to who
+    /// watches, and so is a frame whose display time is damaged: it is further from its decoding time than any codec allows.
     fn note_hidden(&mut self, given: &Given, key: i64) {
         if given.packet.has(ffi::AV_PKT_FLAG_DISCARD) {
             let dts = given.packet.get().dts;

@@ -82,7 +82,7 @@ enum Origin {
     Decoding {
         times: VecDeque<i64>,
         counted: Counted,
-        /// Those of the packets to come, where the file was looked through.
+        /// Decoding times of the packets to come, where the file was looked through.
         known: VecDeque<i64>,
     },
 }

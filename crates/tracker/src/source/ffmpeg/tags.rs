@@ -18,7 +18,7 @@ pub(super) const PICTURES: [ffi::AVCodecID; 5] = [
 
 /// The orientation that the pictures of a film state.
 pub(super) struct Tags {
-    /// What the first one says; nothing is not turned.
+    /// The first picture's orientation; a picture that states none is not turned.
     first: Option<Orientation>,
 }
 
@@ -28,8 +28,8 @@ impl Tags {
         PICTURES.contains(&codec).then_some(Self { first: None })
     }
 
-    /// What a picture says otherwise than the first one, a clause; none that is whole does. One that says nothing is like the
-    /// first: some cameras tag the first picture alone.
+    /// Difference of a picture's orientation from the first one's, a clause; no whole picture differs. One that states none is
+    /// like the first: some cameras tag the first picture alone.
     pub(super) fn problem(&mut self, packet: &[u8]) -> Option<String> {
         let own = orientation_told(packet);
         let first = *self.first.get_or_insert(own.unwrap_or_default());

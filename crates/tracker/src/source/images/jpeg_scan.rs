@@ -9,7 +9,7 @@ const FILLING: usize = 64;
 /// Components that a picture has at most: those of colours for print.
 const MOST_COMPONENTS: usize = 4;
 
-/// What the frame's header says of a component.
+/// A component as the frame's header describes it.
 #[derive(Clone, Copy, Default)]
 struct Component {
     id: u8,
@@ -18,7 +18,7 @@ struct Component {
     down: usize,
 }
 
-/// What the segments before a scan say.
+/// The tables and sizes of the segments before a scan.
 #[derive(Default)]
 struct Header {
     width: usize,
@@ -74,7 +74,7 @@ pub(crate) fn check(jpeg: &[u8]) -> Result<(), String> {
     Ok(())
 }
 
-/// What is in the segment whose length stands at a place.
+/// The contents of the segment whose length stands at byte `at`.
 fn segment(jpeg: &[u8], at: usize) -> Option<&[u8]> {
     let length = usize::from(u16::from_be_bytes(*jpeg.get(at..)?.first_chunk()?));
     jpeg.get(at + 2..at + length).filter(|_| length >= 2)

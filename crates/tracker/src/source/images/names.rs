@@ -19,7 +19,7 @@ const ENDINGS: [&str; 7] = ["png", "tif", "tiff", "bmp", "pgm", "jpg", "jpeg"];
 pub struct Numbered {
     /// Files, and gaps between them.
     pub files: Vec<Option<PathBuf>>,
-    /// What is odd about the numbering.
+    /// Warnings about the numbering.
     pub warnings: Vec<Message>,
 }
 

@@ -21,7 +21,7 @@ pub struct Picture {
     pub depth_bits: u32,
     /// Samples, row by row without gaps.
     pub samples: Vec<u8>,
-    /// What the samples were before they were made brightness, if they were anything else.
+    /// The samples' form before they were made brightness, if they were anything else.
     pub converted_from: Option<String>,
     /// How it was turned, as its file says.
     pub(crate) orientation: Orientation,

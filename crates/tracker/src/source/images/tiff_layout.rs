@@ -27,7 +27,7 @@ pub(super) struct Layout {
     pub photometric: u32,
     /// 1 unsigned, 2 signed, 3 floating point.
     sample_format: u32,
-    /// What the first sample beside brightness or colour is: 1 and 2 opacity, 0 unknown; none if there is none.
+    /// Meaning of the first sample beside brightness or colour: 1 and 2 opacity, 0 unknown; none if there is none.
     extra: Option<u32>,
     /// Rows of a strip, or of a tile.
     pub rows: u32,

@@ -60,7 +60,7 @@ pub struct Header {
     pub has_microseconds: bool,
     /// The rate that the recorder was set to, frames per second.
     pub rate_hz: Option<f64>,
-    /// What the user wrote.
+    /// The user's own description.
     pub description: Option<String>,
     /// The header's version.
     pub version: u32,

@@ -23,7 +23,7 @@ pub struct Bed {
     pub store: DetectionStore,
 }
 
-/// What the tracker made of it.
+/// The tracker's observations of a film, and the truth.
 pub struct Followed {
     pub score: Score,
     /// By frame, then node of the rig.
@@ -50,7 +50,7 @@ impl Followed {
     }
 }
 
-/// What makes detections of a truth.
+/// Faults with which detections are made from a truth.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Faults {
     /// Noise of each coordinate, px.

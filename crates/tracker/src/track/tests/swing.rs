@@ -13,7 +13,7 @@ use crate::stop::Stop;
 use crate::store::{DetectionStore, FrameStamp};
 use crate::track::track_recording;
 
-/// What is filmed.
+/// The motion that is filmed.
 #[derive(Debug, Clone)]
 pub struct Swing {
     pub frames: usize,

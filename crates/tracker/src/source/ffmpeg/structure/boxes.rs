@@ -9,7 +9,7 @@ use super::{Fit, Walk};
 /// Boxes of a fragmented film's fragment: its header, what it holds.
 const FRAGMENT: [u8; 4] = *b"moof";
 const BODY: [u8; 4] = *b"mdat";
-/// What may follow the last fragment and holds no pictures.
+/// Boxes that may follow the last fragment and hold no pictures.
 const NO_PICTURES: [[u8; 4]; 6] = [*b"mfra", *b"free", *b"skip", *b"udta", *b"meta", *b"uuid"];
 
 /// The boxes of a file, and where they stop to fit together, found before the first packet: there are few.
@@ -18,9 +18,9 @@ pub(super) struct Boxes {
     /// Places where the chain of boxes or of fragments is broken, rising, and how.
     breaks: Vec<(u64, Fit)>,
     next: usize,
-    /// What fragments hold, where there is one stream only: the reader gives packets of each, or it passed over it.
+    /// Bytes of the fragments' contents, where there is one stream only: the reader gives packets of each, or it passed over it.
     bodies: VecDeque<Range<u64>>,
-    /// It gave one of the first of these.
+    /// The reader gave a packet of one of the first of `bodies`.
     is_given: bool,
     /// The chain of a fragmented film ends in a box that may hold pictures, and does not end with the file: of fragments
     /// nothing tells how many there are.

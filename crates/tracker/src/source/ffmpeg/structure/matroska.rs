@@ -16,7 +16,7 @@ const IN_CLUSTER: [u32; 7] = [0xE7, 0x5854, 0xA7, 0xAB, 0xA3, 0xA0, 0xAF];
 /// Identities of a cluster's elements that are a number, of eight bytes at most.
 const NUMBERS: [u32; 3] = [0xE7, 0xA7, 0xAB];
 const LONGEST_NUMBER: u64 = 8;
-/// What a group of a block holds, met where its own header was lost: block, length, references, padding, additions.
+/// Elements of a block group, met where the group's own header was lost: block, length, references, padding, additions.
 const IN_GROUP: [u32; 6] = [0xA1, 0x9B, 0xFB, 0xFA, 0x75A2, 0x75A1];
 const TRACKS: u32 = 0x1654_AE6B;
 const TRACK: u32 = 0xAE;

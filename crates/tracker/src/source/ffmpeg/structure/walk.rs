@@ -11,7 +11,7 @@ pub(in super::super) enum Fit {
     Whole,
     /// Each is whole, but something between them is gone.
     Jump,
-    /// They do not: what lies between is damaged, and the packet before it may be.
+    /// The elements do not fit: bytes between them are damaged, and the packet before may be.
     Broken,
 }
 
