@@ -1,4 +1,7 @@
 //! Estimates the slack: the standard deviation allowed to the jump between a segment's end and the next one's start.
+//!
+//! The motion of a recording is cut into segments, each with a state of its own at its start ([`super::problem`]). A jump is
+//! the difference of a segment's start from where the one before it ends; where the equations are right, all jumps are 0.
 
 use nalgebra::{DVector, Matrix4, Vector4};
 
@@ -9,10 +12,17 @@ use super::system::{Problem, pseudo_inverse};
 /// Largest change of the slack, as a logarithm, at which the estimate has converged: a slack known to 2 % changes no standard
 /// error that is quoted to two digits.
 pub(super) const SLACK_TOLERANCE: f64 = 0.02;
-/// Maximum number of guesses at the slack; ten are enough where the data determine it.
+/// Maximum number of guesses at the slack: ten are enough where the data determine it, and else the last guess is given.
 const MAX_GUESSES: usize = 40;
 /// Change of the logarithm of a weight over which a derivative is taken: far above rounding, far below curvature.
 const STEP: f64 = 0.02;
+
+/// Greatest factor between two guesses at the slack.
+const MOST_CHANGE: f64 = 10.0;
+/// Least degrees of freedom by which a chi-square is divided, and by which the next guess is: the smaller one only keeps a
+/// quotient finite, the greater one keeps a guess from an estimate of nothing.
+const LEAST_FREEDOM: f64 = 1e-9;
+const LEAST_FREEDOM_OF_GUESS: f64 = 1e-3;
 
 /// Median; NaN of no values.
 fn median(mut values: Vec<f64>) -> f64 {
@@ -55,17 +65,17 @@ fn jumps_squared(
     for (k, jump) in problem.jumps(point, locals) {
         let (a, b) = (&locals[k].end_state, &locals[k].end_common);
         let moved = Vector4::from_iterator((b * parameters).iter().copied());
-        let d: Vector4<f64> = jump + states[k + 1] - a * states[k] - moved;
+        let jump_left: Vector4<f64> = jump + states[k + 1] - a * states[k] - moved;
         let (here, after) = (&spreads[k], &spreads[k + 1]);
         let cross = a * here.with_next;
-        let mut pull = &after.with_shared - a * &here.with_shared;
-        let mut common = pull.columns_mut(0, problem.common);
+        let mut jump_by_shared = &after.with_shared - a * &here.with_shared;
+        let mut common = jump_by_shared.columns_mut(0, problem.common);
         common -= b;
-        let through = &pull * &corner;
+        let by_covariance = &jump_by_shared * &corner;
         for i in 0..4 {
             let known = after.own[(i, i)] - 2.0 * cross[(i, i)] + (a * here.own * a.transpose())[(i, i)];
-            let variance = known + through.row(i).dot(&pull.row(i));
-            squares[i] += d[i] * d[i];
+            let variance = known + by_covariance.row(i).dot(&jump_by_shared.row(i));
+            squares[i] += jump_left[i] * jump_left[i];
             freedom[i] += (1.0 - variance / (slack[i] * slack[i])).clamp(0.0, 1.0);
         }
     }
@@ -97,22 +107,24 @@ pub(super) fn learned(
         let step = done.and_then(|done| problem.shared_step(point, &done).map(|shared| (done, shared)));
         let Some((done, shared)) = step else {
             if let Some(before) = solved {
-                // So tight that it is lost in rounding where the motion is not yet the right one.
+                // The weights of the jumps are so large that rounding makes the equations singular: the motion is not the right
+                // one yet.
                 return Some(before);
             }
             if slack == lowest {
                 return None;
             }
-            // So loose that the common unknowns are lost in rounding.
-            now.slack = std::array::from_fn(|i| (slack[i] / 10.0).max(lowest[i]));
+            // The weights are so small that rounding loses the common unknowns.
+            now.slack = std::array::from_fn(|i| (slack[i] / MOST_CHANGE).max(lowest[i]));
             continue;
         };
         let (squares, freedom) = jumps_squared(problem, point, locals, &done, &shared, slack);
-        now.chi2 = std::array::from_fn(|i| squares[i] / (freedom[i].max(1e-9) * slack[i] * slack[i]));
+        now.chi2 =
+            std::array::from_fn(|i| squares[i] / (freedom[i].max(LEAST_FREEDOM) * slack[i] * slack[i]));
         solved = Some(now);
         now.slack = std::array::from_fn(|i| {
-            let wanted = (squares[i] / freedom[i].max(1e-3)).sqrt();
-            wanted.clamp(slack[i] / 10.0, slack[i] * 10.0).max(lowest[i])
+            let wanted = (squares[i] / freedom[i].max(LEAST_FREEDOM_OF_GUESS)).sqrt();
+            wanted.clamp(slack[i] / MOST_CHANGE, slack[i] * MOST_CHANGE).max(lowest[i])
         });
         if apart(now.slack, slack) < SLACK_TOLERANCE {
             break;
@@ -125,8 +137,8 @@ pub(super) fn learned(
 /// others, whose slack was learned.
 ///
 /// With `H` the part of the hat matrix between jumps (each over its slack), `f = tr(1 - H)` over the given components
-/// and `K = sum (1 - H)^2` over pairs of them, the expected sum of squares of their jumps is `f - K + shown K`. `H`
-/// depends on the weights as `dH = (H - H^2) d ln w`, so `K = f + df/d ln w`.
+/// and `K = sum (1 - H)^2` over pairs of them, the expected sum of squares of their jumps, over the slack's square, is
+/// `f - K + ratio K`. `H` depends on the weights as `dH = (H - H^2) d ln w`, so `K = f + df/d ln w`.
 pub(super) fn jump_variance_ratio(
     problem: &Problem<'_>,
     point: &Point,
@@ -146,9 +158,9 @@ pub(super) fn jump_variance_ratio(
     let found = || {
         let (squares, freedom) = sums(0.0)?;
         let slope = (sums(STEP)?.1 - sums(-STEP)?.1) / (2.0 * STEP);
-        let pairs = freedom + slope;
+        let pair_sum = freedom + slope;
         // Nothing is known of jumps that no data contradict: they are taken to be as large as allowed.
-        (pairs > 0.0).then(|| (1.0 + (squares - freedom) / pairs).max(0.0))
+        (pair_sum > 0.0).then(|| (1.0 + (squares - freedom) / pair_sum).max(0.0))
     };
     let common = if given.contains(&true) { found().unwrap_or(1.0) } else { 1.0 };
     given.map(|g| if g { common } else { 1.0 })

@@ -309,7 +309,7 @@ fn detection(blob: &Blob, centre: &Centre, levels: &Levels, fits_discs: bool) ->
     Detection {
         x_px: centre.x_px,
         y_px: centre.y_px,
-        // From units of the square of a pixel's area to its height.
+        // From units of sqrt(area of a pixel) to its height.
         sigma_px: (centre.sigma_px * sides[0]) as f32,
         area_px: blob.area as f32,
         peak: centre.peak as f32,

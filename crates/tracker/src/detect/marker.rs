@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 /// A typical marker.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Marker {
-    /// Radius of the disc, px; as of all lengths, in units of the square of a pixel's area.
+    /// Radius of the disc, px; as of all lengths, in units of sqrt(area of a pixel).
     pub radius_px: f64,
     /// Half the range that holds most radii, as a part of the radius.
     pub radius_spread: f64,

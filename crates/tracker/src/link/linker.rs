@@ -13,16 +13,16 @@ use crate::rigid::index::DetectionIndex;
 struct Gate {
     /// Largest distance, px.
     reach_px: f64,
-    /// The second nearest is so many times as far,
+    /// Least distance of the second nearest marker over that of the nearest.
     ratio: f64,
-    /// and at least so far, px.
+    /// Least distance of the second nearest marker, px.
     apart_px: f64,
 }
 
 /// A marker seen once may have gone anywhere near, so that the next one must be by far the nearest.
 const FIRST: Gate = Gate { reach_px: 30.0, ratio: 3.0, apart_px: 4.0 };
-/// Beyond it, seen twice and seen three times: parts of the last step, and what noise does at least. Accelerations of a tenth of a
-/// step a frame leave half of these.
+/// Gates of a marker seen twice, and three times or more: a least distance (px) for noise, and a part of the last step. A step
+/// that changes by a tenth a frame uses less than half of the gate.
 const SECOND: (f64, f64) = (2.5, 0.5);
 const LATER: (f64, f64) = (2.0, 0.35);
 const RATIO: f64 = 2.0;
@@ -76,7 +76,7 @@ fn expected(points: &[Point]) -> (Vector2<f64>, Gate) {
     if n == 2 {
         return (p(1) + step, gate(SECOND));
     }
-    // Half way between the straight line and the parabola: noise is let through less, acceleration half.
+    // Half way between the straight line and the parabola: half of the acceleration, with less of the noise.
     let bend = step - (p(2) - p(3));
     (p(1) + step + 0.5 * bend, gate(LATER))
 }
@@ -99,7 +99,6 @@ impl Linker {
             gates.push(gate);
             index.within(place, gate.ratio * gate.reach_px + gate.apart_px, &mut near);
             for &d in &near {
-                // What runs together with another competes and is not taken.
                 let px = (index.place(d) - place).norm();
                 of_track[t].take(d, px);
                 of_detection[d].take(t, px);
@@ -107,6 +106,7 @@ impl Linker {
         }
         let mut owner = vec![None; detections.len()];
         for (t, (n, gate)) in of_track.iter().zip(&gates).enumerate() {
+            // A blob of several markers competes and is not taken.
             if n.near_px > gate.reach_px || !single(n.which) {
                 continue;
             }

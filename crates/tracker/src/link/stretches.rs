@@ -15,7 +15,7 @@ const FRAMES: usize = 20_000;
 const STRETCHES: usize = 10;
 /// Detections that are linked at most: some two seconds of work.
 const DETECTIONS: usize = 1_000_000;
-/// Frames in which they are counted first.
+/// Frames from which the number of detections a frame is estimated.
 const COUNTED: usize = 25;
 /// Detections of a frame beyond which it is full of glints, and ends all tracklets.
 const CROWD: usize = 400;

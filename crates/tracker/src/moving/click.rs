@@ -17,12 +17,12 @@ use crate::error::Result;
 
 /// Limit of a spot at the place that was pointed at, in units of the noise: what was pointed at need not stand out from all else.
 const PLACE_LIMIT: f32 = 3.0;
-/// Part of what was pointed at stands out by from which on a spot in another picture may be it.
+/// Signal to noise of a spot in another picture over that of the clicked one, from which on it may be the same thing.
 const FILM_PART: f64 = 0.3;
 /// Spots of a picture that are looked at, and how many of the look that was pointed at.
 const MOST_SPOTS: usize = 150;
 const MOST_ALIKE: usize = 30;
-/// A person points at a place with a standard deviation of so many pixels of the octave, and of the picture.
+/// Distance from the click at which a spot counts 1/e, half radii of the octave's markers and pixels.
 const REACH_CELLS: f64 = 2.2;
 const REACH_PX: f64 = 1.0;
 /// A person points at a marker's centre to so many of its radii, and to so many pixels.
@@ -32,6 +32,12 @@ const OFF_PX: f64 = 2.0;
 const CHOICES: usize = 6;
 const CHOICES_OF_OCTAVE: usize = 2;
 const CHOICE_PART: f64 = 0.1;
+/// Least signal to noise of a spot, weighted by its distance from the click.
+const LEAST_SCORE: f64 = 1.0;
+/// A spot of a track within this distance of the clicked spot is that spot, px.
+const SAME_PX: f64 = 0.5;
+/// Weight of a thing that is not compact at all, beside 1 of a compact one.
+const LEAST_COMPACT: f64 = 0.2;
 /// The look that was pointed at: factors 2.5 in peak and 3 in area, as logarithms.
 const LOOK: [f64; 2] = [0.92, 1.1];
 /// A streak has the same product of peak and length as the marker at rest, to a factor 2, as a logarithm.
@@ -118,7 +124,7 @@ fn choices(search: &Search, click: &Click) -> Result<Vec<Choice>> {
             let spot = spots.into_iter().max_by(|a, b| score(a).total_cmp(&score(b)))?;
             let limit = (FILM_PART * spot.snr).max(f64::from(PLACE_LIMIT)) as f32;
             let score = score(&spot);
-            (score > 1.0).then_some(Choice { model, against, spot, limit, score })
+            (score > LEAST_SCORE).then_some(Choice { model, against, spot, limit, score })
         })
         .collect();
     found.sort_by(|a, b| b.score.total_cmp(&a.score));
@@ -249,7 +255,7 @@ fn by_picture(film: &dyn Film, still: &Still, click: &Click) -> Result<Result<Ma
 fn judge(search: &Search, click: &Click, choice: &Choice, pictures: &[Vec<Spot>]) -> Result<Judged> {
     let model = choice.model;
     let radius = model.radius_px();
-    let is_clicked = |s: &Spot| (s.x - choice.spot.x).hypot(s.y - choice.spot.y) < 0.5;
+    let is_clicked = |s: &Spot| (s.x - choice.spot.x).hypot(s.y - choice.spot.y) < SAME_PX;
     let tracklets = link(pictures, radius, search.width, 0);
     let at_click = |t: &&Tracklet| {
         let nth = click.picture.checked_sub(t.first);
@@ -280,5 +286,5 @@ fn worth(search: &Search, click: &Click, spot: &Spot, track: &Track, model: Mode
     let (radius_px, compact) = compact(search.film, track, &model)?;
     let near = nearness(off(spot, click), radius_px);
     let moves = STILL + (1.0 - STILL) * track.quality;
-    Ok((track.count as f64 * moves * (0.2 + 0.8 * compact) * near, radius_px))
+    Ok((track.count as f64 * moves * (LEAST_COMPACT + (1.0 - LEAST_COMPACT) * compact) * near, radius_px))
 }

@@ -1,9 +1,9 @@
-//! Searches a frame's detections for a body: tests every pose under which its nodes would be seen.
+//! Searches a frame's detections for a body: tests the poses under which its nodes would be seen, up to a bound.
 //!
 //! Owns: [`Search`]. Must not: choose between hypotheses (`track` does).
 //!
-//! A pose follows from two joints, from a joint and one node, or from two nodes. Every pose that follows from
-//! the detections is tested on all nodes of the body and refitted on those that agree.
+//! A pose follows from two joints, from a joint and one node, or from two nodes. Each pose that follows from
+//! the detections, up to `MOST_TRIALS`, is tested on all nodes of the body and refitted on those that agree.
 
 use std::f64::consts::PI;
 
@@ -16,10 +16,10 @@ use super::index::DetectionIndex;
 use super::pose::{Pair, PoseFit, fit_pose, place, pose_at};
 use super::work::Work;
 
-/// Gate of a detection about its node, in standard uncertainties. With nine nodes and 1e5 frames a true one is lost to
-/// chance in one of 1e4 (Rayleigh: exp(-k^2 / 2) = 2.5e-6 at 5.1).
+/// Gate of a detection about its node, in standard uncertainties: of nine nodes in 1e5 frames two are beyond it by chance
+/// (Rayleigh: exp(-k^2 / 2) = 2.2e-6 at 5.1).
 pub const REACH_SIGMA: f64 = 5.1;
-/// Pairs of nodes from which a free body is sought.
+/// Pairs of nodes from which a free body is sought: all pairs of eleven nodes are 55.
 pub const PAIRS: usize = 60;
 /// Detections that pairs of nodes are sought among, at most: those whose centres are known best. Bodies have tens of nodes, and
 /// every scene that was followed without a bound has fewer (docs/validation/identity.md); noise has thousands, and its pairs millions.
@@ -70,7 +70,7 @@ impl Search<'_> {
     /// Standard uncertainty of detection `d` as node `j`, px.
     pub fn sigma(&self, j: usize, d: usize) -> f64 {
         let own = f64::from(self.index.get(d).sigma_px).max(1e-3);
-        // A part is compared as it is: it is no inlier, and one that is cut does not agree.
+        // A detection that may be a part of a marker has no wider gate, unless the node's area proves it whole.
         let doubted = !self.index.whole(d) && self.whole(j, d);
         let cut = if doubted { self.link.cut_px(j, self.index.get(d).area_px) } else { 0.0 };
         (own * own + cut * cut + self.link.slack_px[j].powi(2) + self.floor_px.powi(2)).sqrt()
@@ -292,43 +292,43 @@ impl Search<'_> {
     fn by_pairs(&self, found: &mut Found) {
         let link = self.link;
         let n = link.nodes.len();
-        let mut spans: Vec<(f64, usize, usize)> = Vec::new();
+        let mut node_distances: Vec<(f64, usize, usize)> = Vec::new();
         for i in 0..n {
             for j in i + 1..n {
-                spans.push(((link.template[i] - link.template[j]).norm(), i, j));
+                node_distances.push(((link.template[i] - link.template[j]).norm(), i, j));
             }
         }
-        spans.sort_by(|a, b| b.0.total_cmp(&a.0));
-        spans.truncate(self.pairs);
-        let mut stars: Vec<usize> =
+        node_distances.sort_by(|a, b| b.0.total_cmp(&a.0));
+        node_distances.truncate(self.pairs);
+        let mut seeds: Vec<usize> =
             (0..self.index.len()).filter(|&d| self.free[d] && self.index.whole(d)).collect();
-        if stars.len() > MOST_SEEDS {
+        if seeds.len() > MOST_SEEDS {
             found.is_bounded = true;
-            stars.sort_by(|&a, &b| self.index.get(a).sigma_px.total_cmp(&self.index.get(b).sigma_px));
-            stars.truncate(MOST_SEEDS);
-            stars.sort_unstable();
+            seeds.sort_by(|&a, &b| self.index.get(a).sigma_px.total_cmp(&self.index.get(b).sigma_px));
+            seeds.truncate(MOST_SEEDS);
+            seeds.sort_unstable();
         }
-        let pairs = stars.len() * stars.len().saturating_sub(1) / 2;
+        let pairs = seeds.len() * seeds.len().saturating_sub(1) / 2;
         if pairs > 0 && self.work.is_spent() {
             found.is_bounded = true;
             return;
         }
         self.work.spend(pairs / GLANCES);
-        let mut gaps: Vec<(f64, usize, usize)> = Vec::with_capacity(pairs);
-        for (k, &d) in stars.iter().enumerate() {
-            for &e in &stars[k + 1..] {
-                gaps.push(((self.index.place(d) - self.index.place(e)).norm(), d, e));
+        let mut detection_distances: Vec<(f64, usize, usize)> = Vec::with_capacity(pairs);
+        for (k, &d) in seeds.iter().enumerate() {
+            for &e in &seeds[k + 1..] {
+                detection_distances.push(((self.index.place(d) - self.index.place(e)).norm(), d, e));
             }
         }
-        gaps.sort_by(|a, b| a.0.total_cmp(&b.0));
-        for &(span, i, j) in &spans {
+        detection_distances.sort_by(|a, b| a.0.total_cmp(&b.0));
+        for &(span, i, j) in &node_distances {
             let sigma = self.usual_sigma(i).hypot(self.usual_sigma(j));
             let reach = self.reach_sigma * sigma;
             if span <= LEAST_SPAN_REACHES * reach {
                 continue;
             }
-            let first = gaps.partition_point(|g| g.0 < span - reach);
-            for &(gap, d, e) in gaps[first..].iter().take_while(|g| g.0 <= span + reach) {
+            let first = detection_distances.partition_point(|g| g.0 < span - reach);
+            for &(gap, d, e) in detection_distances[first..].iter().take_while(|g| g.0 <= span + reach) {
                 debug_assert!(gap >= span - reach);
                 if found.trials >= MOST_TRIALS || self.work.is_spent() {
                     found.is_bounded = true;

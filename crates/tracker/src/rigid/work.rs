@@ -4,12 +4,11 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Work that is saved up at most, and at the beginning, in places looked up: one detection that is sought near one place, some
-/// 0.1 us (docs/validation/robustness.md).
+/// Work that is saved up at most, and at the beginning, in look-ups: one detection that is sought near one place, some 0.1 us.
 pub const MOST_SAVED: u64 = 10_000_000;
-/// Work that one frame may take at most: a wish to stop is heard between two frames.
+/// Work after which a frame begins no further search, look-ups: a wish to stop, heard between two frames, then waits some 0.2 s.
 pub const MOST_OF_FRAME: u64 = 2_000_000;
-/// Work that each frame adds.
+/// Work that each frame adds, look-ups.
 pub const EACH_FRAME: u64 = 10_000;
 
 /// Work that may still be done.
@@ -28,12 +27,12 @@ impl Clone for Work {
 }
 
 impl Work {
-    /// So many places.
+    /// A budget of `places` look-ups.
     pub fn of(places: u64) -> Self {
         Self { left: AtomicU64::new(places), floor: AtomicU64::new(0) }
     }
 
-    /// For frame after frame of a recording.
+    /// The budget of a recording, which each frame adds to.
     pub fn saved() -> Self {
         Self::of(MOST_SAVED)
     }
@@ -50,7 +49,7 @@ impl Work {
         self.left.load(Ordering::Relaxed)
     }
 
-    /// Counts work that is done in any case.
+    /// Counts work that is done in any case; one thread at a time does.
     pub fn spend(&self, places: usize) {
         let left = self.left().saturating_sub(places as u64);
         self.left.store(left, Ordering::Relaxed);

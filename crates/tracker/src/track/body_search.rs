@@ -16,15 +16,16 @@ use crate::rigid::index::DetectionIndex;
 use crate::rigid::pose::place;
 use crate::rigid::search::{REACH_SIGMA, Search};
 
-/// Greatest expected number of false matches for a body found at its predicted pose.
+/// Greatest expected number of false matches for a body found at its predicted pose: in a recording of 1e3 frames with the body
+/// hidden in each, two false ones are expected. The made films of docs/validation/identity.md have none.
 const CHANCE_EXPECTED: f64 = 2e-3;
 /// Greatest expected number of false matches where every node was seen in the frame before and is seen again near by: a
 /// frame in which the body went and something else came is rare by itself.
 const CHANCE_NEAR: f64 = 1e-2;
-/// Greatest expected number of false matches for a single marker that hangs on nothing: only its motion tells it. It is the
-/// part of the frames in which it is hidden and something else may be taken for it, and only while its gate is wide:
+/// Greatest expected number of false matches for a single marker that hangs on nothing: only its motion tells it. The
+/// bound is the fraction of its hidden frames in which another mover may be taken for it, and only while its gate is wide:
 /// 40 px about a first place with one other mover in 0.3 Mpx are 0.02, a gap of four frames comes to 0.1, and once its
-/// rates are known 3 px are 1e-4. Tested on balls in a shaking picture, occluded a pendulum (`worst`) and `balltoss`.
+/// rates are known 3 px are 1e-4. Tested on balls in a shaking picture, on an occluded pendulum and on a ball toss.
 const CHANCE_SINGLE: f64 = 0.1;
 /// Around a place where something stands, a single marker is not told from it, px.
 const STANDING_PX: f64 = 6.0;
@@ -35,7 +36,7 @@ const SAME_POSE_PX: f64 = 5.0;
 /// Two markers that come nearer than this to where they are expected are not expected any better, px: what a step of a body that
 /// starts to move is off by.
 const LEAST_MISS_PX: f64 = 1.0;
-/// Number of doublings of a distance from there on up to the widest gate: so many chances has a pair to be near.
+/// Number of trials that a pair has to be near: the doublings of a distance from `LEAST_MISS_PX` up to the widest gate, 128 px.
 const NEARER: f64 = 7.0;
 
 /// Ratio of distances: a body is accepted over an indistinguishable one if it is 3 times closer to its own prediction.
@@ -44,7 +45,7 @@ const TWIN_RATIO: f64 = 3.0;
 /// Outcome of the search for one body.
 pub(super) struct SearchOutcome {
     pub(super) seen: BodySeen,
-    /// Hypotheses between which nothing decides, each with its expected number of false matches.
+    /// Hypotheses between which nothing decides, each with the expected number of false matches of the best.
     pub(super) undecided: Vec<(PoseHypothesis, f64)>,
     /// More stood out than is tried.
     pub(super) is_bounded: bool,
@@ -82,7 +83,7 @@ impl Bodies {
         if index.is_empty() {
             return SearchOutcome { seen: nothing(open.nodes), undecided: Vec::new(), is_bounded: false };
         }
-        let stands = |s: PoseHypothesis, is_bounded: bool| {
+        let accept = |s: PoseHypothesis, is_bounded: bool| {
             let seen = if self.may_be_twin(b, time, index, &s, known) {
                 nothing(s.picks.iter().map(Option::is_some).collect())
             } else {
@@ -96,27 +97,28 @@ impl Bodies {
         let moving: Vec<bool>;
         let free = if single {
             // Nothing but its motion tells it from what stands still.
-            let stands =
+            let is_standing =
                 |d: usize| self.priors.standing.iter().any(|p| (p - index.place(d)).norm() < STANDING_PX);
-            moving = (0..index.len()).map(|d| free[d] && !stands(d)).collect();
+            moving = (0..index.len()).map(|d| free[d] && !is_standing(d)).collect();
             &moving
         } else {
             free
         };
         if let Some(s) = self.find_near(b, time, index, free, anchors) {
-            return stands(s, false);
+            return accept(s, false);
         }
         if let Some(w) = forecast.filter(|w| single || w.angle_rad < PI) {
             // The usual case: every node near its expected place, and no other turn can look like it.
             let search = self.search(b, index, free, anchors, Some(w));
             let about = anchors.first().map_or(Vector2::zeros(), |a| a.local);
-            if 2.0 * w.angle_rad < self.self_symmetry_rad[b]
+            let is_narrow = 2.0 * w.angle_rad < self.self_symmetry_rad[b];
+            if is_narrow
                 && let Some(s) = search.refine(w.pose, about, w.angle_rad)
                 && (s.inliers == n || s.inliers >= 3)
                 && s.inliers >= 2
                 && self.chance(&search, &s, 1) < CHANCE_ANYWHERE
             {
-                return stands(s, false);
+                return accept(s, false);
             }
             let limit = match n {
                 1 if single => CHANCE_SINGLE,
@@ -124,7 +126,7 @@ impl Bodies {
                 _ => CHANCE_EXPECTED,
             };
             match self.resolve(&search, limit, &mut open) {
-                Ok((s, _)) => return stands(s, open.is_bounded),
+                Ok((s, _)) => return accept(s, open.is_bounded),
                 // What is open where it is expected is not looked for elsewhere.
                 Err(undecided) if single || (n == 1 && !undecided.is_empty()) => {
                     let is_bounded = open.is_bounded;
@@ -133,12 +135,12 @@ impl Bodies {
                 Err(_) => {}
             }
             if let Some(s) = self.find_last_node(b, time, index, free, anchors) {
-                return stands(s, open.is_bounded);
+                return accept(s, open.is_bounded);
             }
         }
         let search = self.search(b, index, free, anchors, None);
         match self.resolve(&search, CHANCE_ANYWHERE, &mut open) {
-            Ok((s, _)) => stands(s, open.is_bounded),
+            Ok((s, _)) => accept(s, open.is_bounded),
             Err(undecided) => {
                 let is_bounded = open.is_bounded;
                 SearchOutcome { seen: nothing(open.nodes), undecided, is_bounded }
@@ -183,8 +185,8 @@ impl Bodies {
         self.mechanism.links[b].template.iter().map(far).fold(0.0, f64::max)
     }
 
-    /// A body of which one node is left, held by a joint: where its motion so far says to within what a half hidden
-    /// marker would be off.
+    /// A body of which one node is left, held by a joint, where its motion so far predicts it within 1.5 px: a half hidden marker
+    /// is off by less.
     fn find_last_node(
         &self,
         b: usize,
@@ -224,8 +226,8 @@ impl Bodies {
             })
     }
 
-    /// Whether it would be chance alone that a twin comes to where body `b`, seen in the frame before, is expected,
-    /// just when `b` itself goes: both hang on nothing, and the twin may be in many more places.
+    /// Whether the twin is too unlikely to be what is seen: body `b`, seen in the frame before, is found where it is expected, both
+    /// hang on nothing, and the twin may be in many more places.
     fn would_be_chance(&self, b: usize, twin: usize, time: f64, s: &PoseHypothesis) -> bool {
         let hangs = |b: usize| self.mechanism.hinges.iter().any(|h| h.body == b);
         if hangs(b) || hangs(twin) || !self.motions[b].was_just_seen(time) {

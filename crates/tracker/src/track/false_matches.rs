@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 
 use nalgebra::Vector2;
 
-use super::motion_priors::MotionPriors;
+use super::motion_priors::{LEAST_REACH_PX, MotionPriors};
 use crate::detect::Detection;
 use crate::rigid::body::{Link, Mechanism};
 use crate::rigid::hypothesis::{Anchor, PoseHypothesis};
@@ -16,14 +16,15 @@ use crate::rigid::work::{MOST_OF_FRAME, Work};
 
 /// Greatest expected number of false matches for a body found anywhere in the frame.
 pub(super) const CHANCE_ANYWHERE: f64 = 1e-5;
-/// How exactly the only node seen of a body must be expected, px: within what a half hidden marker may be off.
+/// How exactly the only node seen of a body must be expected, px: a half hidden disc of 3.6 px radius is off by that (0.42 of
+/// its radius).
 const LONE_GATE_PX: f64 = 1.5;
-/// Gate of the only node seen of a body where its area shows that it is whole, px.
+/// Gate of the only node seen of a body where its area shows that it is whole, px: twice as wide, since it is not off.
 const WHOLE_GATE_PX: f64 = 3.0;
 
 /// Expected number of false matches as good as `s`: poses that unrelated detections would give to `search` in `trials` poses.
-/// Unrelated detections are taken as evenly spread at `density` per px^2: one of them agrees with a node with probability
-/// `density * pi * radius^2`.
+/// Unrelated detections are taken to lie all within the body's reach, evenly (`density` per px^2), which is the worst case: one
+/// of them agrees with a node with probability `density * pi * radius^2`.
 pub fn expected_false_matches(
     search: &Search<'_>,
     s: &PoseHypothesis,
@@ -35,13 +36,14 @@ pub fn expected_false_matches(
     let n = link.nodes.len();
     let others = search.free.iter().filter(|&&f| f).count().saturating_sub(s.inliers) as f64;
     let from = search.anchors.first().map_or(Vector2::zeros(), |a| a.local);
-    let reach = link.reach_px(from).max(30.0);
+    let reach = link.reach_px(from).max(LEAST_REACH_PX);
     let density = others.max(priors.clutter) / (PI * reach * reach);
     let whole =
         s.picks.iter().enumerate().filter_map(|(j, d)| d.filter(|&d| search.whole(j, d)).map(|d| (j, d)));
     let picked = whole.map(|(j, d)| search.sigma(j, d));
     let radius = REACH_SIGMA * picked.fold(0.0, f64::max);
     let hit = (density * PI * radius * radius).min(1.0);
+    // Nodes that fix the pose beside the anchors.
     let base = 2 - search.anchors.len().min(2);
     let gate = search.window.map_or(f64::INFINITY, |w| w.origin_px + w.angle_rad * reach + radius);
     // Pairs of unrelated detections that pass for two nodes of a body that hangs on nothing: the first lies anywhere in the
@@ -76,10 +78,18 @@ fn choose(n: usize, k: usize) -> f64 {
     (0..k).map(|i| (n - i) as f64 / (i + 1) as f64).product()
 }
 
+/// Standard uncertainty of a body's own nodes as detections, px: usual of a good centre.
+const IDEAL_SIGMA_PX: f64 = 0.05;
+
 /// Detections as a body's own nodes would give them, at their places in the body.
-fn drawn(link: &Link) -> Vec<Detection> {
-    let star = |t: &Vector2<f64>| Detection { x_px: t.x, y_px: t.y, sigma_px: 0.05, ..Default::default() };
-    link.template.iter().map(star).collect()
+fn ideal_detections(link: &Link) -> Vec<Detection> {
+    let ideal = |t: &Vector2<f64>| Detection {
+        x_px: t.x,
+        y_px: t.y,
+        sigma_px: IDEAL_SIGMA_PX as f32,
+        ..Default::default()
+    };
+    link.template.iter().map(ideal).collect()
 }
 
 /// A search for a body with no expectation of where it is.
@@ -100,7 +110,7 @@ fn anywhere<'a>(
 /// hangs on nothing) on places of nodes again; infinite if there is none.
 pub fn self_symmetry_rad(mechanism: &Mechanism, priors: &MotionPriors, body: usize) -> f64 {
     let link = &mechanism.links[body];
-    let stars = drawn(link);
+    let ideal = ideal_detections(link);
     let anchors: Vec<Anchor> = mechanism
         .hinges
         .iter()
@@ -109,8 +119,8 @@ pub fn self_symmetry_rad(mechanism: &Mechanism, priors: &MotionPriors, body: usi
         .map(|h| Anchor { local: h.local, place: h.local, sigma_px: h.sigma_px })
         .collect();
     let least = if anchors.is_empty() { 3 } else { 2 };
-    let free = vec![true; stars.len()];
-    anywhere(link, &anchors, &DetectionIndex::new(&stars), &free, priors, &Work::of(MOST_OF_FRAME))
+    let free = vec![true; ideal.len()];
+    anywhere(link, &anchors, &DetectionIndex::new(&ideal), &free, priors, &Work::of(MOST_OF_FRAME))
         .run()
         .hypotheses
         .iter()
@@ -120,8 +130,8 @@ pub fn self_symmetry_rad(mechanism: &Mechanism, priors: &MotionPriors, body: usi
         .fold(f64::INFINITY, f64::min)
 }
 
-/// For each body the others that look the same: one has all the nodes of the other at the same distances. Single
-/// nodes always do.
+/// For each body the others that look the same: one has all the nodes of the other at the same distances. Any two bodies of
+/// one node look the same.
 pub fn indistinguishable(mechanism: &Mechanism, priors: &MotionPriors) -> Vec<Vec<usize>> {
     let links = &mechanism.links;
     let work = Work::saved();
@@ -130,9 +140,9 @@ pub fn indistinguishable(mechanism: &Mechanism, priors: &MotionPriors) -> Vec<Ve
         if links[small].nodes.len() == 1 {
             return links[large].nodes.len() == 1;
         }
-        let stars = drawn(&links[large]);
-        let free = vec![true; stars.len()];
-        let found = anywhere(&links[small], &[], &DetectionIndex::new(&stars), &free, priors, &work).run();
+        let ideal = ideal_detections(&links[large]);
+        let free = vec![true; ideal.len()];
+        let found = anywhere(&links[small], &[], &DetectionIndex::new(&ideal), &free, priors, &work).run();
         // Where it could not be tried through they are not told apart.
         found.is_bounded || found.hypotheses.first().is_some_and(|s| s.inliers == links[small].nodes.len())
     };

@@ -23,7 +23,7 @@ pub struct FrameTracker {
     pub bodies: Bodies,
     /// For each body hypotheses that may be it and wait for their motion to decide.
     tentative: Vec<Vec<Tentative>>,
-    /// Frames in which more stood out than is tried.
+    /// Frames in which a search ended at its bound of work; `step_one`, which repairs a frame, does not count.
     pub bounded_frames: u64,
 }
 
@@ -70,7 +70,7 @@ impl FrameTracker {
                     continue;
                 }
                 let anchors = self.bodies.anchors(b, &seen);
-                // What its twin was found to be is no longer open.
+                // A second search may differ only if a joint's place or a look-alike body was found in between.
                 if round == 1 && anchors.is_empty() && self.bodies.indistinguishable[b].is_empty() {
                     continue;
                 }
@@ -95,11 +95,11 @@ impl FrameTracker {
             }
             stop.heed()?;
             let anchors = self.bodies.anchors(b, &seen);
-            let mut waiting = std::mem::take(&mut undecided[b]);
+            let mut hypotheses = std::mem::take(&mut undecided[b]);
             // Drop hypotheses that could be an indistinguishable body not found yet.
-            waiting.retain(|(s, _)| !self.bodies.may_be_twin(b, time, index, s, &seen));
+            hypotheses.retain(|(s, _)| !self.bodies.may_be_twin(b, time, index, s, &seen));
             if let Some(s) =
-                follow(&mut self.bodies, &mut self.tentative[b], b, time, index, &free, &anchors, waiting)
+                follow(&mut self.bodies, &mut self.tentative[b], b, time, index, &free, &anchors, hypotheses)
                 && !self.bodies.may_be_twin(b, time, index, &s, &seen)
             {
                 for d in s.picks.iter().flatten() {
@@ -117,6 +117,7 @@ impl FrameTracker {
         for b in 0..n {
             if let Some(f) = &seen[b].fit
                 && !given[b]
+                // `follow` gave a settled body its motion.
                 && !settled[b]
             {
                 self.bodies.motions[b].add(time, f);
@@ -126,7 +127,7 @@ impl FrameTracker {
         Ok(seen)
     }
 
-    /// Looks for one body with all others as `known` says.
+    /// Looks for one body with all others as `known` says: the repair of a frame by what both directions of time found.
     pub fn step_one(
         &mut self,
         b: usize,

@@ -8,7 +8,7 @@ use crate::rigid::body::Mechanism;
 use crate::rigid::forecast::PredictionError;
 
 /// Least reach of a body from its origin, px: a shorter one would turn a place's error into any angle.
-const LEAST_REACH_PX: f64 = 30.0;
+pub(super) const LEAST_REACH_PX: f64 = 30.0;
 /// Step of a body at its reach in the first frame that it is followed through, px.
 const FIRST_STEP_PX: f64 = 25.0;
 /// Step of the origin of a body of several nodes in that frame, px: its origin may be far from its markers.

@@ -11,27 +11,30 @@ use crate::rigid::forecast::Motion;
 use crate::rigid::hypothesis::{Anchor, PoseHypothesis};
 use crate::rigid::index::DetectionIndex;
 
-/// Number of undecided hypotheses followed at once.
-const TENTATIVE: usize = 8;
+/// Greatest number of undecided hypotheses of a body that are followed at once: a bound of work.
+const MOST_TENTATIVE: usize = 8;
 /// Frames in a row without its body after which a hypothesis is dropped.
 const MOST_MISSED_FRAMES: u32 = 3;
-/// Distance that a hypothesis must move for its motion to prove anything, px.
+/// Distance that a hypothesis must move for its motion to prove anything, px: what stands still scatters and shakes by less.
 const PROOF_PX: f64 = 3.0;
+
+/// Greatest expected number of false matches that a hypothesis begins with: with more it would never be believed.
+const MOST_CHANCE: f64 = 1e3;
 
 /// A hypothesis that could be chance, followed until it no longer can be.
 #[derive(Debug, Clone)]
 pub(super) struct Tentative {
     motion: Motion,
-    /// Expected number of false matches as good, so far.
+    /// Expected number of false matches as good: the product over the steps in which the hypothesis moved, which unrelated
+    /// detections would have to follow each time anew.
     chance: f64,
-    /// Where its nodes were when that was last lowered: what stands still proves nothing.
+    /// Places of its nodes when `chance` was last multiplied: what stands still proves nothing.
     proved: Vec<Vector2<f64>>,
     missed: u32,
 }
 
 /// Carries on the hypotheses of a body that nothing decided yet, and begins new ones; the one that stands, if
 /// now one does.
-#[allow(clippy::too_many_arguments, reason = "the bodies, what waits, and one frame's facts")]
 pub(super) fn follow(
     bodies: &mut Bodies,
     waiting: &mut Vec<Tentative>,
@@ -78,15 +81,15 @@ pub(super) fn follow(
     }
     for (s, chance) in undecided {
         let same = now.iter().flatten().any(|o| o.picks == s.picks);
-        if !same && kept.len() < TENTATIVE {
+        if !same && kept.len() < MOST_TENTATIVE {
             let mut motion = Motion::default();
             motion.add(time, &s.fit);
             let proved = link.places(&s.fit.pose);
-            kept.push(Tentative { motion, chance: chance.min(1e3), proved, missed: 0 });
+            kept.push(Tentative { motion, chance: chance.min(MOST_CHANCE), proved, missed: 0 });
             now.push(Some(s));
         }
     }
-    let (mut kept, mut now) = apart(kept, now);
+    let (mut kept, mut now) = without_duplicates(kept, now);
     // One that is beyond chance stands if all others are gone.
     if matches!((&kept[..], &now[..]), ([t], [Some(_)]) if t.chance < CHANCE_ANYWHERE) {
         bodies.motions[b] = kept.swap_remove(0).motion;
@@ -97,7 +100,7 @@ pub(super) fn follow(
 }
 
 /// Without those that came to see the same as another: of each such group the least likely by chance stays.
-fn apart(
+fn without_duplicates(
     kept: Vec<Tentative>,
     now: Vec<Option<PoseHypothesis>>,
 ) -> (Vec<Tentative>, Vec<Option<PoseHypothesis>>) {

@@ -8,7 +8,7 @@ pub(crate) struct Disc {
     /// Centre, recorded px.
     pub x_px: f64,
     pub y_px: f64,
-    /// Radius, in units of the square of a pixel's area.
+    /// Radius, in units of sqrt(area of a pixel).
     pub radius_px: f64,
 }
 

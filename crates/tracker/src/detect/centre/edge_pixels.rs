@@ -1,6 +1,8 @@
 //! Packs the pixels near the edge of a disc one after another.
 //!
-//! Owns: [`Patch`], [`Ring`]. Must not: judge them.
+//! Owns: [`Patch`], [`Ring`], [`EdgeLookup`]. Must not: decide which pixels count.
+//!
+//! Lengths are in units of sqrt(area of a pixel), so that a disc is round where pixels are not square.
 
 use super::edge_table::Spot;
 use crate::detect::simd::lanes::{Eight, Job, LANES, work};
@@ -12,15 +14,18 @@ pub(crate) struct Patch<'a> {
     pub height: usize,
     /// Values from the start of one row to the next.
     pub stride: usize,
-    /// Image coordinates of its first pixel, in units of the square of a pixel's area, as all places here are.
+    /// Image coordinates of its first pixel.
     pub x0: f64,
     pub y0: f64,
     /// Width and height of a pixel.
     pub sides: [f64; 2],
 }
 
-/// Numbers of the pixels in a vector, from its first.
-const STEPS: [f32; LANES] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
+/// Offsets of a vector's numbers from its first: columns where pixels are packed, rows where circles are cut.
+const OFFSETS: [f32; LANES] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
+
+/// Parts of a row between two circles: left and right of the inner one.
+const PARTS: usize = 2;
 
 /// The edge table's values for eight pixels of a ring, kept so that look-up and accumulation are two loops: a processor
 /// then overlaps more of the work.
@@ -33,8 +38,9 @@ pub(crate) struct EdgeLookup {
     pub(super) sums: [[f32; LANES]; 6],
 }
 
-/// Pixels of a ring about the edge of a disc, one array for each quantity: place relative to the first guess of the centre
-/// (in units of the square of a pixel's area), value (raw units), and 1 where the pixel counts, else 0.
+/// Pixels of a ring about the edge of a disc, one array for each quantity: place relative to the first guess of the centre,
+/// value (raw units; the disc fit turns those of dark markers round and cuts all at saturation), and 1 where the pixel counts,
+/// else 0.
 #[derive(Debug, Default)]
 pub(crate) struct Ring {
     pub x: Vec<f32>,
@@ -43,6 +49,7 @@ pub(crate) struct Ring {
     pub live: Vec<f32>,
     /// Number of pixels; those that fill up the last vector do not count.
     pub used: usize,
+    /// Saturated pixels, counted by the disc fit.
     pub saturated: u32,
     /// Lookups in the edge table, a vector of pixels each: scratch of the normal equations.
     pub eights: Vec<EdgeLookup>,
@@ -73,7 +80,7 @@ impl Ring {
     /// and then overwritten by those that follow.
     #[inline(always)]
     fn push<V: Eight>(&mut self, token: V::Token, [x, y]: [f32; 2], wide: f32, values: &[f32], count: usize) {
-        let (steps, y) = (V::load(token, &STEPS) * V::splat(token, wide), V::splat(token, y).array());
+        let (steps, y) = (V::load(token, &OFFSETS) * V::splat(token, wide), V::splat(token, y).array());
         for k in (0..count).step_by(LANES) {
             let (at, first) = (self.used + k, x + k as f32 * wide);
             let to = at..at + LANES;
@@ -105,21 +112,27 @@ impl Job for Choose<'_> {
         let (left, above) = (cx - patch.x0, cy - patch.y0);
         let first = ((above - outer).max(0.0) / high) as usize;
         let last = (((above + outer).max(0.0) / high) as usize + 1).min(patch.height);
-        ring.begin(last.saturating_sub(first) * (patch.width + 2 * LANES));
+        // Each of a row's two parts may write up to a vector beyond its end.
+        ring.begin(last.saturating_sub(first) * (patch.width + PARTS * LANES));
         let (zero, width) = (all(0.0), all(patch.width as f64));
-        // The first pixel behind a place.
-        let behind = |x: V| (x * all(1.0 / wide) + all(1.0)).max(zero).min(width).trunc().map(|i| i as usize);
+        // Index of the first pixel right of x.
+        let right_of =
+            |x: V| (x * all(1.0 / wide) + all(1.0)).max(zero).min(width).trunc().map(|i| i as usize);
         for eight in (first..last).step_by(LANES) {
-            let dy = all(eight as f64 * high - above) + V::load(token, &STEPS) * all(high);
+            let dy = all(eight as f64 * high - above) + V::load(token, &OFFSETS) * all(high);
             let half = |r: f64| (all(r * r) - dy * dy).max(zero).sqrt();
             let (far, near, middle) = (half(outer), half(inner), all(left));
-            let (a, b) = (behind(middle - far), behind(middle - near));
-            let (c, d) = (behind(middle + near), behind(middle + far));
+            let (left_outer, left_inner) = (right_of(middle - far), right_of(middle - near));
+            let (right_inner, right_outer) = (right_of(middle + near), right_of(middle + far));
             let dy = dy.array();
             for j in eight..last.min(eight + LANES) {
                 let k = j - eight;
-                // Left and right of the hole, or all of it.
-                let parts = if b[k] < c[k] { [(a[k], b[k]), (c[k], d[k])] } else { [(a[k], d[k]), (0, 0)] };
+                // Left and right of the inner circle, or the whole chord where the row misses that circle.
+                let parts = if left_inner[k] < right_inner[k] {
+                    [(left_outer[k], left_inner[k]), (right_inner[k], right_outer[k])]
+                } else {
+                    [(left_outer[k], right_outer[k]), (0, 0)]
+                };
                 for (from, to) in parts {
                     if from < to {
                         let values = &patch.values[j * patch.stride + from..];

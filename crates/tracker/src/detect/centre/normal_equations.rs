@@ -14,10 +14,13 @@ use crate::detect::simd::lanes::{Eight, Job, LANES, work};
 pub(crate) const STILL: usize = 5;
 pub(crate) const MOVING: usize = 7;
 
-/// Step (px) and maximum number of samples along the motion-blur path, whose mean stands for it: finer steps
-/// cannot be told from a line.
+/// Distance (px) and numbers of the discs along the path of a marker that moves during the exposure; their mean is the blurred
+/// disc. A path longer than 14.4 px has the greatest number, farther apart.
 const PATH_STEP_PX: f64 = 0.45;
+const LEAST_PATH_SAMPLES: usize = 3;
 const MAX_PATH_SAMPLES: usize = 32;
+/// Least distance of a pixel from the centre, squared: the direction there is not defined.
+const LEAST_DISTANCE_SQUARED: f32 = 1e-6;
 
 /// The model of a disc's pixels: the edge's coverage, the noise of a sample, and the value at which samples saturate.
 #[derive(Clone, Copy)]
@@ -40,7 +43,8 @@ impl DiscModel<'_> {
 }
 
 /// Sums of `line_k * line_l * weight` for k <= l, where a line holds the model's derivative by one parameter for each
-/// pixel, and the last line the residual: the upper triangle of the normal equations with their right-hand side.
+/// pixel (a column of the Jacobian), and the last line the residual: the upper triangle of the normal equations with their
+/// right-hand side.
 const PRODUCTS: usize = (MOVING + 1) * (MOVING + 2) / 2;
 
 /// Index of the product of lines k <= l of N parameters in that triangle, stored row by row.
@@ -76,7 +80,8 @@ pub(crate) struct Normal<const N: usize> {
 }
 
 impl<const N: usize> Normal<N> {
-    /// At a place, `[x, y, radius, base, height, path]`; single precision holds a place inside the patch to 1e-6 px.
+    /// The equations at the parameters `[x, y, radius, base, height, path]`: brightness outside, brightness inside less that, and
+    /// two numbers of the path; single precision holds a place inside the patch to 1e-6 px.
     pub fn at(model: &DiscModel<'_>, ring: &mut Ring, p: &[f64; N]) -> Self {
         work(Equations { model, ring, p })
     }
@@ -94,7 +99,7 @@ impl<const N: usize> Factor<N> {
     pub fn new(matrix: &[[f64; N]; N]) -> Option<Self> {
         let (mut lower, mut inverse) = ([[0.0; N]; N], [0.0; N]);
         for j in 0..N {
-            // What is left of column j, of which the first is D's.
+            // Column j less the columns before it; its entry j is D's.
             let mut left: [f64; N] = from_fn(|i| matrix[i][j]);
             for k in 0..j {
                 // lower[j][k] holds D L so far; L itself is needed once.
@@ -103,7 +108,7 @@ impl<const N: usize> Factor<N> {
                     left[i] -= lower[i][k] * l;
                 }
             }
-            // Nor where it is no number.
+            // NaN is refused, too.
             if left[j].is_nan() || left[j] <= 0.0 {
                 return None;
             }
@@ -176,7 +181,7 @@ impl<const N: usize> Job for Equations<'_, N> {
         let (places_x, places_y) = (eights(&ring.x), eights(&ring.y));
         let (values, lives) = (eights(&ring.value), eights(&ring.live));
         let found = &mut ring.eights[..n];
-        let (r, zero, one, least) = (all(r), all(0.0), all(1.0), all(1e-6));
+        let (r, zero, one, least) = (all(r), all(0.0), all(1.0), all(LEAST_DISTANCE_SQUARED));
         // Where the edge of a disc about (x, y) is, of all pixels.
         let look = |found: &mut [EdgeLookup], x: f32, y: f32| {
             for ((found, px), py) in found.iter_mut().zip(places_x).zip(places_y) {
@@ -194,9 +199,11 @@ impl<const N: usize> Job for Equations<'_, N> {
             }
         };
         if N == MOVING {
-            // A smeared disc is the mean of discs along its path, each by the part of the path to there.
+            // A smeared disc is the mean of discs along its path; the slope by the path is that by the place, times the part of
+            // the path up to there.
             let path = [p[N - 2], p[N - 1]];
-            let count = ((path[0].hypot(path[1]) / PATH_STEP_PX).ceil() as usize).clamp(3, MAX_PATH_SAMPLES);
+            let count = ((path[0].hypot(path[1]) / PATH_STEP_PX).ceil() as usize)
+                .clamp(LEAST_PATH_SAMPLES, MAX_PATH_SAMPLES);
             let share = all(1.0 / count as f32);
             found.iter_mut().for_each(|f| f.sums = Default::default());
             for k in 0..count {
@@ -221,7 +228,7 @@ impl<const N: usize> Job for Equations<'_, N> {
             [model.noise.read, model.noise.shot, model.noise.dark].map(|v| all(v as f32));
         let limit = all(limit);
         let mut sums = [zero; PRODUCTS];
-        let (mut squares, mut open) = (zero, zero);
+        let (mut squares, mut counted) = (zero, zero);
         for ((found, value), live) in found.iter().zip(values).zip(lives) {
             // Coverage, its slopes by x, y and radius, and by the path.
             let sum = if N == MOVING {
@@ -232,11 +239,11 @@ impl<const N: usize> Job for Equations<'_, N> {
             };
             let value = of(value);
             let full = sum[0] * height + base;
-            let model = full.min(limit);
+            let predicted = full.min(limit);
             // Saturated in the model and in the picture: nothing to learn.
             let known = of(live).where_below(full, value, limit);
-            let w = known.div(read + (model * sign - dark).max(zero) * shot);
-            let e = value - model;
+            let w = known.div(read + (predicted * sign - dark).max(zero) * shot);
+            let e = value - predicted;
             let mut line = [zero; MOVING + 1];
             line[0] = sum[1] * height;
             line[1] = sum[2] * height;
@@ -257,7 +264,7 @@ impl<const N: usize> Job for Equations<'_, N> {
             products::<V, 6, N>(&mut sums, w, &line);
             products::<V, 7, N>(&mut sums, w, &line);
             squares += known * e * e;
-            open += known;
+            counted += known;
         }
         // In one order for every processor.
         let total = |s: V| -> f64 {
@@ -274,7 +281,7 @@ impl<const N: usize> Job for Equations<'_, N> {
             gradient: from_fn(|k| product(k, N)),
             chi2: product(N, N),
             squares: total(squares),
-            count: total(open),
+            count: total(counted),
         }
     }
 }

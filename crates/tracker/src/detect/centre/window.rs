@@ -3,7 +3,7 @@
 //! Owns: [`Centre`], [`Window`]. Must not: decide what is a marker.
 //!
 //! A disc is a circle in the world, not in pixels that are wider than high: places are in recorded pixels, but lengths
-//! (radii, paths, uncertainties) are in units of the square of a pixel's area.
+//! (radii, paths, uncertainties) are in units of sqrt(area of a pixel).
 
 use super::disc::Disc;
 use super::disc_fit::{DiscFit, Fitted, LEAST_PATH_PX, Start};

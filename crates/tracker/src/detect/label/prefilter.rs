@@ -1,8 +1,10 @@
 //! Marks the row cells that may hold a pixel beyond the threshold, at the speed of memory (the prefilter); only those are
 //! labelled.
 //!
-//! Owns: [`Prefilter`], the trait [`Sample`]. Must not: say where in a cell. The extreme of many samples, or saturating
-//! differences or-ed together, and one test at the end.
+//! Owns: [`Prefilter`], the trait [`Sample`]. Must not: say where in a cell.
+//!
+//! A cell is tested once: the extreme of its samples is compared with the threshold, or saturating differences from the
+//! threshold are or-ed together and compared with 0.
 
 use std::array::from_fn;
 use std::marker::PhantomData;
@@ -66,7 +68,7 @@ macro_rules! sample {
 sample!(u8, beyond_u8);
 sample!(u16, beyond_u16);
 
-/// Bytes that are worked on together.
+/// Bytes of a vector of AVX2.
 const BLOCK: usize = 32;
 type Block = [u8; BLOCK];
 
@@ -199,12 +201,20 @@ fn pass_u16<'a>(pixels: &Pixels<'a>, plan: &Plan, polarity: Polarity, marks: &mu
     }
 }
 
-/// Bytes or words per vector.
+/// Bytes, or words in two vectors, that are worked on together: 32 bytes are a vector of AVX2.
 const VECTOR_LANES: usize = 32;
 
-/// For a packed format: at each byte of a cell's a big-endian word holds one whole sample or none; there are `N` words
-/// at even and as many at odd bytes. `keep` takes the neighbours' upper bits away, `limit` is the threshold shifted to
-/// where the sample lies; the lower bits that are left of its neighbour do not change the comparison.
+/// Masks and limits of packed samples. The big-endian word of 16 bits at a byte holds the whole sample that begins in this byte;
+/// where none begins, the word is left out. Of 12 bits, samples a, b begin in bytes 0 and 1 of three:
+///
+/// ```text
+/// byte      0        1        2
+///       aaaaaaaa aaaabbbb bbbbbbbb
+/// word at 0: aaaaaaaa aaaabbbb    word at 1: aaaabbbb bbbbbbbb
+/// ```
+///
+/// There are `N` words at even and as many at odd bytes of a cell. `keep` masks the bits before the sample, `limit` is the
+/// threshold shifted to the sample's place; bits of the next sample behind it do not change the comparison.
 #[derive(Debug, Clone, PartialEq)]
 struct Words<const N: usize> {
     keep: [[u16; N]; 2],
@@ -220,6 +230,12 @@ struct Coarse<const N: usize> {
     limit: [[u8; 2]; N],
 }
 
+/// Bits of a byte before the sample that begins in it; `None` where none begins.
+fn bits_before(byte: usize, bits: usize) -> Option<usize> {
+    let before = (byte * 8).next_multiple_of(bits) - byte * 8;
+    (before < 8).then_some(before)
+}
+
 impl<const N: usize> Coarse<N> {
     /// `None` where the upper bits of some sample say nothing.
     fn new(bits: usize, threshold: u16, polarity: Polarity) -> Option<Self> {
@@ -229,13 +245,10 @@ impl<const N: usize> Coarse<N> {
         };
         let mut this = Self { keep: [[0; 2]; N], limit: [[never; 2]; N] };
         for byte in 0..2 * N {
-            let within = (byte * 8).next_multiple_of(bits) - byte * 8;
-            if within >= 8 {
-                continue;
-            }
+            let Some(before) = bits_before(byte, bits) else { continue };
             // A sample beyond the threshold has upper bits that are beyond or at those of the threshold.
-            let upper = u8::try_from(threshold >> (bits + within - 8)).ok()?;
-            this.keep[byte / 2][byte % 2] = u8::MAX >> within;
+            let upper = u8::try_from(threshold >> (bits + before - 8)).ok()?;
+            this.keep[byte / 2][byte % 2] = u8::MAX >> before;
             this.limit[byte / 2][byte % 2] = match polarity {
                 Polarity::Bright => upper.checked_sub(1)?,
                 Polarity::Dark => upper.checked_add(1)?,
@@ -245,7 +258,7 @@ impl<const N: usize> Coarse<N> {
     }
 
     /// Whether any sample in `2 * N` bytes may be beyond.
-    // Written so that the compiler makes one vector of what is.
+    // Written so that the compiler makes one vector of all differences.
     #[inline(always)]
     fn any<const BRIGHT: bool>(&self, bytes: &[u8]) -> bool {
         let (keep, limit) = (self.keep.as_flattened(), self.limit.as_flattened());
@@ -273,13 +286,10 @@ impl<const N: usize> Words<N> {
         let coarse = Coarse::new(bits, threshold, polarity);
         let mut this = Self { keep: [[0; N]; 2], limit: [[never; N]; 2], coarse };
         for byte in 0..2 * N {
-            let within = (byte * 8).next_multiple_of(bits) - byte * 8;
-            if within >= 8 {
-                continue;
-            }
-            let shift = 16 - within - bits;
+            let Some(before) = bits_before(byte, bits) else { continue };
+            let shift = 16 - before - bits;
             let t = u32::from(threshold);
-            this.keep[byte % 2][byte / 2] = u16::MAX >> within;
+            this.keep[byte % 2][byte / 2] = u16::MAX >> before;
             this.limit[byte % 2][byte / 2] = match polarity {
                 Polarity::Bright => (t << shift).saturating_sub(1).min(0xffff) as u16,
                 Polarity::Dark => ((t + 1) << shift).min(0xffff) as u16,
@@ -359,7 +369,8 @@ impl<const N: usize, const BRIGHT: bool> Test for Packed<'_, N, BRIGHT> {
             return words.coarse.as_ref().is_none_or(|coarse| coarse.any::<BRIGHT>(&whole[..2 * N]))
                 && words.any::<BRIGHT>(whole);
         }
-        // Others from the sample before them that does; samples run on over the ends of rows that end inside a byte.
+        // Parts of cells are tested from the last sample before them that begins on a byte; samples run on over the ends of rows
+        // that end inside a byte.
         let mut from = start;
         while !from.is_multiple_of(8) {
             from -= self.bits;
@@ -367,7 +378,7 @@ impl<const N: usize, const BRIGHT: bool> Test for Packed<'_, N, BRIGHT> {
         let (mut from, to) = (from / 8, (start + (cell.end - cell.start) as usize * self.bits).div_ceil(8));
         while from < to {
             let count = (to - from).next_multiple_of(2).min(2 * N);
-            // At the end of the plane each is looked at.
+            // No byte is left behind the last word of the plane: the cell is marked untested.
             let Some(part) = line.bytes.get(from..from + count + 1) else { return true };
             if words.any_of_few::<BRIGHT>(part) {
                 return true;
@@ -393,7 +404,7 @@ fn pass_packed<'a, const N: usize>(
     }
 }
 
-/// Words in half of the bytes of a cell of packed samples.
+/// Number of words at the even bytes of a cell of packed samples.
 const fn words_of(bits: usize) -> usize {
     CELL_PX as usize * bits / 8 / 2
 }
@@ -443,6 +454,7 @@ mod tests {
             let top = if bits == 16 { 4095 } else { (1u32 << bits) - 1 } as u16;
             // An odd width, so that packed rows end inside bytes; a height that is no multiple of four.
             let (w, h) = (701usize, 7usize);
+            let last = (h as u32 - 1, (w as u32 - 1) / CELL_PX);
             for polarity in [Polarity::Bright, Polarity::Dark] {
                 let (ground, t) = match polarity {
                     Polarity::Bright => (top / 2, top / 2 + 1),
@@ -467,7 +479,7 @@ mod tests {
                         };
                         prefilter.find(&pixels, &Plan::uniform(w, h, farther, polarity), polarity);
                         assert!(
-                            prefilter.marks().all(|m| m == (6, 2)),
+                            prefilter.marks().all(|m| m == last),
                             "{format:?} {polarity:?} {x} {y} farther"
                         );
                     }

@@ -1,7 +1,7 @@
 //! Computes with eight single-precision numbers at once: on every processor, and by AVX2 where that is found at run time.
 //!
 //! Owns: [`Eight`], [`Job`], [`work`]. Must not: round differently from one processor to another; there are only operations
-//! that IEEE 754 defines to the bit.
+//! that IEEE 754 defines to the bit: none is fused, and minima and maxima are of numbers, never of NaN or of zeros of both signs.
 
 use std::ops::{Add, AddAssign, Mul, Sub};
 
@@ -25,7 +25,7 @@ pub(crate) trait Eight:
     fn pairs(token: Self::Token, entries: [&[f32; 2]; LANES]) -> (Self, Self);
     /// The eight numbers.
     fn array(self) -> [f32; LANES];
-    /// Whole parts; the numbers are from 0 to 2^31.
+    /// Whole parts; the numbers are at least 0 and below 2^31.
     fn trunc(self) -> [i32; LANES];
     /// Quotients, number by number.
     fn div(self, other: Self) -> Self;
@@ -196,7 +196,7 @@ mod avx2 {
                 let [a, b, c, d, e, f, g, h] = entries;
                 let outer = _mm256_set_m128(two(e, f), two(a, b));
                 let inner = _mm256_set_m128(two(g, h), two(c, d));
-                // Pairs 0, 1, 4, 5 and 2, 3, 6, 7: the even and the odd numbers of both, half by half.
+                // Pairs 0, 1, 4, 5 and 2, 3, 6, 7: of each half of 128 bits the first numbers, then the second ones.
                 (
                     Self(_mm256_shuffle_ps::<0b10_00_10_00>(outer, inner)),
                     Self(_mm256_shuffle_ps::<0b11_01_11_01>(outer, inner)),

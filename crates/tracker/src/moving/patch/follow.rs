@@ -28,7 +28,9 @@ const CERTAIN: f64 = 0.7;
 const CERTAIN_AGAIN: f64 = 0.8;
 /// Likeness of the places from which a template is learned anew.
 const RENEW: std::ops::Range<f64> = 0.8..0.9;
-/// Another place that is as like but for this much competes.
+/// Likeness from which on a picture shows the thing as the template has it.
+const ALIKE: f64 = 0.9;
+/// Difference of likeness up to which another place competes.
 const RIVAL: f64 = 0.08;
 /// A thing of which the noise leaves more open than this, px, is not held by its picture.
 const MOST_SIGMA_PX: f64 = 0.25;
@@ -42,6 +44,14 @@ const GATE_RADII: f64 = 0.6;
 const FIRST_GATE: f64 = 3.0;
 const GATE_GROWTH: f64 = 0.5;
 const MOST_GATE_PX: f64 = 48.0;
+/// Least part of the gate beside its radii, px, and how far the fit may end outside of it.
+const GATE_PX: f64 = 2.0;
+const GATE_MARGIN_PX: f64 = 1.0;
+/// The surface about the expected place reaches so many radii and pixels beyond the gate: the template and its spline's border.
+const REACH_PART: f64 = 1.2;
+const REACH_PX: f64 = 6.0;
+/// Two places are two from this many radii on.
+const APART_RADII: f64 = 0.25;
 /// Pictures in a row in which it is not seen before it is given up.
 const MISSES: usize = 40;
 /// Pictures in a row before the latest template is given up; the first one is sought for `MISSES`.
@@ -77,6 +87,7 @@ impl Look {
         Pose { angle: pose.angle - self.pose.angle, log_size: pose.log_size - self.pose.log_size, ..*pose }
     }
 
+    /// A pose of this template as one in terms of the first picture.
     fn common(&self, pose: &Pose) -> Pose {
         Pose { angle: pose.angle + self.pose.angle, log_size: pose.log_size + self.pose.log_size, ..*pose }
     }
@@ -116,7 +127,7 @@ pub fn follow_picture(
     };
     let alike: Vec<(Pose, Plane)> = near(film, still, &template, (picture, start))?
         .into_iter()
-        .filter(|(m, _)| m.likeness > RENEW.end)
+        .filter(|(m, _)| m.likeness > ALIKE)
         .map(|(m, p)| (m.pose, p))
         .collect();
     let usual = if alike.len() >= GROW_LEAST { usual(&first, &start, &alike) } else { None };
@@ -276,12 +287,12 @@ impl<'a> Follower<'a> {
 
     fn gate(&self, missed: usize) -> f64 {
         let radius = self.first.template.radius_px;
-        let steady = GATE_RADII * radius + 2.0;
+        let steady = GATE_RADII * radius + GATE_PX;
         let first = if self.past.len() < 2 { FIRST_GATE } else { 1.0 };
         (steady * (first + GATE_GROWTH * missed as f64)).min(MOST_GATE_PX)
     }
 
-    /// The pose that is expected in a picture: on a line through its last two places, or half a parabola through three.
+    /// The pose that is expected in a picture: on a line through its last two places.
     fn expected(&self, picture: usize) -> Pose {
         let n = self.past.len();
         let (at, last) = self.past[n - 1];
@@ -300,12 +311,12 @@ impl<'a> Follower<'a> {
     /// The certain place of a look, if there is one.
     fn find(&self, look: &Look, plane: &Plane, expected: &Pose, gate: f64, missed: usize) -> Option<Match> {
         let own = look.own(expected);
-        let reach = look.template.radius_px * own.log_size.exp() * 1.2 + gate + 6.0;
+        let reach = look.template.radius_px * own.log_size.exp() * REACH_PART + gate + REACH_PX;
         let surface = Surface::around(&plane.values, plane.size, [own.x, own.y], reach)?;
         let certain = |m: &Match| {
             m.likeness >= if missed == 0 { CERTAIN } else { CERTAIN_AGAIN }
                 && m.sigma_px <= MOST_SIGMA_PX
-                && m.pose.off(&own) <= gate + 1.0
+                && m.pose.off(&own) <= gate + GATE_MARGIN_PX
                 && (m.pose.log_size - own.log_size).abs() <= MOST_GROWTH * (1 + missed) as f64
         };
         let near = (self.past.len() >= YOUNG && missed == 0)
@@ -330,12 +341,12 @@ impl<'a> Follower<'a> {
             let start = Pose { angle: own.angle + turn, ..*own };
             let starts = search(&look.template, plane, &start, gate);
             found.extend(starts.into_iter().filter_map(|s| align(&look.template, surface, s)));
-            if turn == 0.0 && found.iter().any(|m| m.likeness > RENEW.end) {
+            if turn == 0.0 && found.iter().any(|m| m.likeness > ALIKE) {
                 break;
             }
         }
         let best = *found.iter().max_by(|a, b| a.likeness.total_cmp(&b.likeness))?;
-        let apart = 0.25 * look.template.radius_px;
+        let apart = APART_RADII * look.template.radius_px;
         let rival = |m: &Match| m.pose.off(&best.pose) > apart && m.likeness > best.likeness - RIVAL;
         (!found.iter().any(rival)).then_some(best)
     }

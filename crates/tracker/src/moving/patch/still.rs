@@ -21,6 +21,8 @@ const SIGMA_OF_DIFFERENCE: f64 = 1.048;
 const LEAST_NOISE: f64 = 1.0;
 /// A pixel is the thing's, whatever its own brightness, where so many of 5 x 5 about it differ.
 const NEAR_COUNT: usize = 9;
+/// A pixel is the thing's where so many of 5 x 5 about it move with it: more than half.
+const MOST_COUNT: usize = 13;
 /// A pixel that is seen again within so many standard deviations moves with the thing: one of the difference of two pixels is 1.4.
 const MOVES_SIGMA: f64 = 4.0;
 /// Distance of the pixels that teach the noise.
@@ -160,7 +162,7 @@ impl Still {
             again[k] = with < limit;
             moves[k] = again[k] && still > with;
         }
-        let most = |k: usize| 2 * around(k, side, 2).filter(|n| moves[*n]).count() > 25;
+        let most = |k: usize| around(k, side, 2).filter(|n| moves[*n]).count() >= MOST_COUNT;
         let whole: Vec<bool> = (0..side * side).map(|k| again[k] && most(k)).collect();
         connected(cover.at, middle, reach, &whole)
     }

@@ -63,7 +63,7 @@ struct Made {
     stopped: bool,
 }
 
-/// Of each picture the pose of the thing, its opacity, and whether it is there.
+/// For each picture the pose of the thing and its opacity.
 type Script<'a> = &'a dyn Fn(usize) -> (Pose, f64);
 
 impl Made {
