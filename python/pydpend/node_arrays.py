@@ -54,7 +54,7 @@ class Who:
 
 
 def assembled(tracks: RawTracks, bodies: Bodies = None, who: Who | None = None) -> Assembled:
-    """What `pydpend.Nodes` holds, of tracks in pixels with y down and times.
+    """Contents of `pydpend.Nodes`, from tracks in pixels with y down and times.
 
     Raises
     ------

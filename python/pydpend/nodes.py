@@ -206,7 +206,7 @@ class Nodes:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What was assumed where the nodes are not our tracker's, in sentences; empty where they are."""
+        """Assumptions where the nodes are not our tracker's, in sentences; empty where they are."""
         imported = self.meta.get("settings", {}).get("import", {})
         return tuple(str(note) for note in imported.get("notes", ()))
 

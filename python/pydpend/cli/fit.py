@@ -193,7 +193,7 @@ def describe(fit: DampingFit) -> list[str]:
 
 
 def _beside(ratio: RatioCheck) -> str:
-    """What the model's parts say of a ratio."""
+    """Words on a ratio by the model's parts."""
     parts = ratio.parts
     said = f"{parts.value:.6g} +- {parts.sigma:.1e}" if parts.sigma > 0 else f"{parts.value:.6g}"
     return f" (the parts: {said}, {ratio.sigmas:+.1f} sigma)"

@@ -1,4 +1,4 @@
-"""What a fit's ratios say of the constants that were given: of g, clock and length, and of the parts."""
+"""Test of the given constants by a fit's ratios: g, clock and length, and the parts."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class LengthCheck:
 
     @property
     def possible(self) -> tuple[str, ...]:
-        """Those of the three that may be what is wrong: gravity only within what there is of it on the ground."""
+        """Candidates among the three for what is wrong: gravity only within what there is of it on the ground."""
         low, high = EARTH_M_S2
         if low <= self.measured["g_m_s2"] <= high:
             return ("g_m_s2",) if not low <= self.given["g_m_s2"] <= high else ("g_m_s2", "clock", "l1_m")

@@ -1,4 +1,4 @@
-"""What ratios that contradict the model's parts make of the coefficients: fitted again under each explanation."""
+"""Coefficients where the ratios contradict the model's parts: fitted again under each explanation."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ STEPS = 12
 
 @dataclass(frozen=True, eq=False)
 class Carried:
-    """What is said of a fit's ratios, and what a contradiction adds to the coefficients' covariance (C, C)."""
+    """Words on a fit's ratios, and the part that a contradiction adds to the coefficients' covariance (C, C)."""
 
     consistency: Consistency | None
     covariance: Floats

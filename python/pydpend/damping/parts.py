@@ -187,7 +187,7 @@ OF_LENGTH = {"clock": "clock", "g": "g_m_s2", "l1": "l1_m"}
 """Causes that `LengthCheck.possible` speaks of, by its names."""
 
 IMPOSSIBLE = 20.0
-"""What a cause that cannot be loses of the logarithm of its likelihood."""
+"""Loss of log-likelihood of a cause that cannot be."""
 
 
 def predicted(changed: Changed) -> Floats:
@@ -303,7 +303,7 @@ def causes(model: Model, ratios: dict[str, float], covariance: Floats) -> tuple[
 
 
 def of_length(model: Model, length: LengthCheck) -> tuple[Cause, ...]:
-    """What may be wrong of g, clock and l1, by as much as the motion measures, as if there were two of them.
+    """Changes of g, clock and l1, by as much as the motion measures, as if there were two of them.
 
     A wrong clock and a wrong g change the coefficients alike.
     """

@@ -141,7 +141,7 @@ class Solution:
     jump_information: Floats
     """Part from the jumps, times their variance over the slack's square, with the model's errors."""
     jumps_shown: Floats
-    """Variance of the jumps over the slack's square, per component: 1 where the slack was learned, 0 to 1 at its floor."""
+    """Variance of the jumps over the slack squared, per component: 1 where the slack was learned, less at its floor."""
     gradient: Floats
     scores: Floats
     """Each segment's part of the gradient with the states eliminated, (K, G)."""

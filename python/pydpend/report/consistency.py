@@ -13,7 +13,7 @@ WORDS = {
     "m2": "mass on the lower joint",
     "l1": "distance of the joints",
 }
-"""What people read for the constants of the parts."""
+"""Words that people read for the constants of the parts."""
 
 
 def ratio_unit(name: str) -> str:
