@@ -26,7 +26,7 @@ RIGHT = 0.2
 """Slack over the noise of a segment's state up to which the model is right to within the noise."""
 
 WRONG = 1.0
-"""Slack over the noise's beyond which the model is not right, whatever chi-square is: the joints jump by as much as the noise lets them."""
+"""Slack over the noise of a segment's state beyond which the model is not right, whatever chi-square is."""
 
 
 @dataclass(frozen=True, eq=False)

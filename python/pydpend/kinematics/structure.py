@@ -1,4 +1,4 @@
-"""Structure of a mechanism: the links that angles are asked of, and the rig's joints between them and with the ground."""
+"""Structure of a mechanism: its links, and the rig's joints between them and with the ground."""
 
 from __future__ import annotations
 
