@@ -75,9 +75,18 @@ def check_once(setting: str, names: Sequence[str]) -> None:
             raise FitOptionError(fault(Setting(setting), f"{name} is given twice", "Give each name once"))
 
 
-def unit(name: str) -> str:
-    """Unit of a coefficient or ratio."""
-    return UNITS.get(name) or RATIO_UNITS[name]
+OVER_PSI = {"N m s": "1/s", "N m s2": "1", "N m": "1/s2"}
+"""Units of coefficients over psi."""
+
+OF_LOAD = ("rmu1", "rmu2")
+"""Coefficients of the laws in which the bearings' load is, and with it the masses."""
+
+
+def unit(name: str, *, scale_known: bool = True) -> str:
+    """Unit of a coefficient or ratio; of a coefficient over psi where the scale is not known."""
+    if name in RATIOS:
+        return RATIO_UNITS[name]
+    return UNITS[name] if scale_known else OVER_PSI.get(UNITS[name], UNITS[name])
 
 
 def parameters(model: Model) -> dict[str, float]:

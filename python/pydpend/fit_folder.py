@@ -128,6 +128,7 @@ class FitFolder:
         constants = {
             name: {"value": value, "sigma": sigmas[name]}
             for name, value in zip(CONSTANTS, model.constants().tolist(), strict=True)
+            if model.scale_known or name == "psi_kg_m2"
         }
         write_json(self.file(FitFile.MODEL), {"name": model.name, "constants": constants})
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -174,9 +173,7 @@ def test_a_single_pendulum_with_a_model_of_one_link(folder: Path, tmp_path: Path
     made = simulate(model, truth, [np.pi - 0.06, 0.0, 0.0, 0.0], np.arange(8001) / 500)
     motion = Motion(made.t_s, made.phi_rad, made.w_rad_s, made.a_rad_s2)
     both = measured(motion, 31, 0.02, stated=False)
-    one = written(
-        replace(both, phi_rad=both.phi_rad[:, :1], sigma_rad=both.sigma_rad[:, :1]), tmp_path / "one.csv"
-    )
+    one = written(LinkAngles(both.t_s, both.phi_rad[:, :1], both.sigma_rad[:, :1]), tmp_path / "one.csv")
     options = ["--laws", "paper", "--no-figures", "--quiet"]
     done = command("fit", one, "--model", bar, "-o", tmp_path / "out", *options)
     assert done.returncode == 0, done.stderr

@@ -54,7 +54,7 @@ class Options(FitOptions, ReadingOptions):
     calibration : str, optional
         Folder of hold recordings, or an encoder.json made by ``pydpend calibrate``.
     model : str
-        ``derived``, ``published`` or a pendulum.toml.
+        ``derived``, ``published``, a pendulum.toml, or ``ratios`` (no masses are known: all is over psi).
     zero : str
         Where the links hang: ``rest`` (found in the recording), ``vertical`` (the picture's, uncertain by the
         camera's roll: 1 deg, or ``vertical=0.5``), ``reference_frame``, degrees of each link in the rig's

@@ -36,7 +36,9 @@ def add_arguments(p: argparse.ArgumentParser) -> None:
     """The command's arguments."""
     add_angles_arguments(p, many=True)
     p.add_argument(
-        "--model", default="derived", help="derived (default), published, or a pendulum's TOML file"
+        "--model",
+        default="derived",
+        help="derived (default), published, a pendulum's TOML file, or ratios (no masses are known: all is over psi)",
     )
     add_fields(p, FitOptions, fields(FitOptions))
     p.add_argument("--no-figures", action="store_true", help="write no figures")

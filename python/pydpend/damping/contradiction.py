@@ -52,7 +52,7 @@ def carried(
     coefficients. ``huber``: the limit that the fit had.
     """
     none = np.zeros((len(names), len(names)))
-    if ratio_covariance is None or model.links == 1 or model.g_m_s2 <= 0:
+    if ratio_covariance is None or not model.scale_known or model.links == 1 or model.g_m_s2 <= 0:
         return Carried(None, none)
     psi = solution.parameters["psi"]
     ratios = {n: solution.parameters[n] / psi for n in ratios_of(2)}

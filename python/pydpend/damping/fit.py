@@ -13,6 +13,7 @@ from pydpend.argument_types import all_of_type, of_type
 from pydpend.coefficients import RATIOS, parameters, ratios_of
 from pydpend.damping import camera, shooting
 from pydpend.damping.compare import compare_terms
+from pydpend.damping.of_motion import pendulum_of_decay, without_load
 from pydpend.damping.plausible import check_followed, modes_hz
 from pydpend.damping.prediction import held_out
 from pydpend.damping.profile import fit_energy
@@ -52,7 +53,8 @@ def fit_damping(
         One recording, or several that are fitted jointly. Angles of one link are a single pendulum's, and need a
         one-link `model`.
     model : Model
-        The pendulum's constants.
+        The pendulum's constants, or `pydpend.model.of_ratios` where none is known: everything is over psi then, from
+        the motion alone.
     method : {"trajectory", "energy"}, optional
         ``"trajectory"`` (default) fits the equations of motion to the angles; ``"energy"`` is the paper's energy
         profile (Eqs. 35, 37, 38 corrected).
@@ -86,9 +88,14 @@ def fit_damping(
     given = [angles] if isinstance(angles, LinkAngles) else list(angles)
     if not given:
         raise FitError(fault("fit", "there is no recording", "Give at least one"))
+    check_distinct(given)
+    left_out: tuple[str, ...] = ()
+    if not model.scale_known:
+        model = pendulum_of_decay(given, chosen)
     single = chosen.pinned or model.links == 1 or any(a.links == 1 for a in given)
     names = chosen.coefficients(single=single)
-    check_distinct(given)
+    if not model.scale_known:
+        names, left_out = without_load(names, chosen)
     if single:
         given, model = reduced(given, model, chosen.pinned)
         if not names:
@@ -103,7 +110,8 @@ def fit_damping(
     try:
         if not chosen.is_trajectory:
             return _energy(recordings, model, names, chosen.ten_coefficients, progress)
-        return _trajectory(recordings, model, names, chosen, progress)
+        fit = _trajectory(recordings, model, names, chosen, progress)
+        return replace(fit, notes=(*fit.notes, *left_out))
     except np.linalg.LinAlgError as problem:
         raise FitError(undetermined(f"their equations have no solution ({problem})")) from problem
 

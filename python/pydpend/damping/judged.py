@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pydpend.coefficients import FULL, RATIOS, ratios_of
 from pydpend.damping import camera, maps, plausible, shooting
 from pydpend.damping.contradiction import carried
+from pydpend.damping.parts import length_check
 from pydpend.damping.recording import FittedZero, Recording
 from pydpend.damping.result import DampingFit
 from pydpend.damping.result_parts import estimates
@@ -96,6 +97,7 @@ def judge(found: Found, progress: Progress | None = None, *, checked: bool = Tru
     sigma = dict(zip(kept, np.sqrt(np.diag(cov)), strict=True))
     path = shooting.trace(tracks, solution.segments, solution.parameters, solution.clock_scale)
     fitted = fitted_model(found.model, solution.parameters)
+    known = found.model.scale_known
     held = [n for n in names if values[n] <= 0.0]
     duration = float(np.sum(np.diff(solution.segments.times_s, axis=1)))
     return DampingFit(
@@ -105,10 +107,10 @@ def judge(found: Found, progress: Progress | None = None, *, checked: bool = Tru
         within_noise=_within_noise(solution, strict, relative),
         chi2=strict.chi2,
         n=int(solution.counts.sum()),
-        coefficients=estimates(names, values, sigma),
+        coefficients=estimates(names, values, sigma, scale_known=known),
         ratios=estimates(ratios_of(links), values, sigma),
         shares=shares(names, values, cov[np.ix_(c_rows, c_rows)], unit_works(tracks, path, names)),
-        identifiability=identifiability(kept, cov, values, held, duration),
+        identifiability=identifiability(kept, cov, values, held, duration, scale_known=known),
         parameters=solution.parameters,
         names=kept,
         covariance=cov,
@@ -128,14 +130,29 @@ def judge(found: Found, progress: Progress | None = None, *, checked: bool = Tru
         iterations=solution.iterations,
         modes_hz=plausible.modes_hz(fitted)[:links],
         maps=None if found.bias is None else found.bias.result(),
+        scale_known=known,
         camera_sigma={n: of_camera[n] for n in names if n in of_camera},
         consistency=held_against.consistency,
         notes=(
             *_notes(recordings, solution),
             *camera.words({n: sigma[n] for n in names}, of_camera),
             *(note for r, zero in zip(recordings, zeros, strict=True) for note in zero.notes(r.angles.name)),
+            *_distance(found.model, values, of_ratios),
             *(() if held_against.consistency is None else held_against.consistency.sentences),
         ),
+    )
+
+
+def _distance(model: Model, ratios: dict[str, float], covariance: Floats | None) -> tuple[str, ...]:
+    """The distance of the joints that follows from the ratios, where no constants were given."""
+    if model.scale_known or model.links == 1 or covariance is None:
+        return ()
+    length = length_check(
+        replace(model, l1_m=model.g_m_s2 * ratios["a3"] / ratios["kappa"]), ratios, covariance
+    )
+    return (
+        f"the joints are {1e3 * length.measured['l1_m']:.5g} +- {1e3 * length.measured['l1_m'] * length.sigma:.1g} mm "
+        f"apart by the motion, if g is {model.g_m_s2:g} m/s2 and the clock is right: measure that",
     )
 
 

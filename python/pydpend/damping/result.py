@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -22,9 +22,10 @@ from pydpend.damping.result_parts import (
     Residuals,
     TenCoefficients,
     Term,
+    estimates,
 )
 from pydpend.documents import Table
-from pydpend.errors import FIT, FitError
+from pydpend.errors import FIT, FitError, fault
 from pydpend.fit_options import METHODS
 from pydpend.fit_status import FitStatus
 from pydpend.json_text import JsonResult, plain
@@ -92,6 +93,8 @@ class DampingFit(JsonResult, TableResult):
         Angle-bias maps, if asked for.
     ten : pydpend.damping.result.TenCoefficients or None
         The paper's ten coefficients, if asked for.
+    scale_known : bool
+        Whether the coefficients are in N m s and the like; else they are over psi, in 1/s, 1 and 1/s2 (`scaled`).
     camera_sigma : dict of str to float
         What of each coefficient's standard error is the cameras', SI: its square is a part of the whole's. Empty where
         no angles state the camera's part.
@@ -131,6 +134,7 @@ class DampingFit(JsonResult, TableResult):
     modes_hz: tuple[float, ...] = ()
     maps: AngleMaps | None = None
     ten: TenCoefficients | None = None
+    scale_known: bool = True
     camera_sigma: dict[str, float] = field(default_factory=dict)
     consistency: Consistency | None = None
     notes: tuple[str, ...] = ()
@@ -144,6 +148,53 @@ class DampingFit(JsonResult, TableResult):
         """The coefficients with their standard errors, for a notebook."""
         rows = ((n, f"{e.value:.4e}", f"{e.sigma:.1e}", e.unit) for n, e in self.coefficients.items())
         return html_table(repr(self)[1:-1], ("coefficient", "value", "standard error", "unit"), rows)
+
+    def scaled(self, psi_kg_m2: float, sigma_kg_m2: float = 0.0) -> DampingFit:
+        """The coefficients of a fit over psi in N m s, N m s2 and N m, now that psi is known.
+
+        A mass and a length tell it: with a lower link of mass m whose centre is d from the elbow, psi is
+        ``m g d / ratios["kappa"].value``.
+
+        Parameters
+        ----------
+        psi_kg_m2 : float
+            Half the moment of inertia of the upper link, with the lower one's mass at the elbow, kg m2.
+        sigma_kg_m2 : float
+            Its standard uncertainty, which goes into every coefficient's.
+
+        Returns
+        -------
+        DampingFit
+            The fit with its coefficients, their covariance and its parameters in SI. Shares, ratios, predictions and
+            energies (`energy`, over psi) stay as they are.
+
+        Raises
+        ------
+        FitError
+            If the fit has a scale already, or psi is not positive.
+        """
+        if self.scale_known or not (math.isfinite(psi_kg_m2) and psi_kg_m2 > 0 and sigma_kg_m2 >= 0):
+            problem = (
+                "the fit is not over psi" if self.scale_known else f"psi is {psi_kg_m2} +- {sigma_kg_m2}"
+            )
+            raise FitError(fault("scaled", problem, "Give a positive psi to a fit without masses"))
+        values = {n: psi_kg_m2 * e.value for n, e in self.coefficients.items()}
+        factor = np.array([psi_kg_m2 if n in self.coefficients else 1.0 for n in self.names])
+        common = np.array(
+            [sigma_kg_m2 * self.coefficients[n].value if n in values else 0.0 for n in self.names]
+        )
+        covariance = self.covariance * np.outer(factor, factor) + np.outer(common, common)
+        sigma = dict(zip(self.names, np.sqrt(np.diag(covariance)).tolist(), strict=True))
+        scales = {"psi", "zeta", *RATIOS, *values}
+        return replace(
+            self,
+            coefficients=estimates(values, values, sigma),
+            covariance=covariance,
+            parameters={n: v * psi_kg_m2 if n in scales else v for n, v in self.parameters.items()},
+            intervals={},
+            scale_known=True,
+            notes=(*self.notes, f"psi of {psi_kg_m2:.4g} +- {sigma_kg_m2:.1g} kg m2 was given afterwards"),
+        )
 
     def to_columns(self) -> dict[str, NDArray[Any]]:
         """The coefficients, then the ratios over psi, as columns of a table.
@@ -203,6 +254,7 @@ class DampingFit(JsonResult, TableResult):
             "covariance": {"names": list(self.names), "matrix": self.covariance.tolist()},
             "maps": None if self.maps is None else self.maps.to_dict(),
             "ten_coefficients": None if self.ten is None else self.ten.to_dict(),
+            "scale_known": self.scale_known,
             "camera_sigmas": self.camera_sigma,
             "consistency": None if self.consistency is None else self.consistency.to_dict(),
             "notes": list(self.notes),
@@ -283,6 +335,7 @@ class DampingFit(JsonResult, TableResult):
             ten=TenCoefficients.of_table(table.table("ten_coefficients"))
             if "ten_coefficients" in table
             else None,
+            scale_known=table.flag("scale_known") if "scale_known" in table else True,
             camera_sigma=_numbers_of(table, "camera_sigmas"),
             consistency=Consistency.of_table(table.table("consistency")) if "consistency" in table else None,
             notes=table.texts("notes"),

@@ -46,10 +46,17 @@ class Estimate:
 
 
 def estimates(
-    names: Iterable[str], values: Mapping[str, float], sigma: Mapping[str, float]
+    names: Iterable[str],
+    values: Mapping[str, float],
+    sigma: Mapping[str, float],
+    *,
+    scale_known: bool = True,
 ) -> dict[str, Estimate]:
     """Coefficients or ratios with their units; without a standard error in ``sigma`` one was held fixed: 0."""
-    return {n: Estimate(float(values[n]), float(sigma.get(n, 0.0)), unit(n)) for n in names}
+    return {
+        n: Estimate(float(values[n]), float(sigma.get(n, 0.0)), unit(n, scale_known=scale_known))
+        for n in names
+    }
 
 
 @dataclass(frozen=True, eq=False)

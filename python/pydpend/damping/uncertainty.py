@@ -60,7 +60,13 @@ def _prior(solution: Solution) -> Floats:
 
 
 def identifiability(
-    names: Sequence[str], cov: Floats, values: Mapping[str, float], held: Sequence[str], duration_s: float
+    names: Sequence[str],
+    cov: Floats,
+    values: Mapping[str, float],
+    held: Sequence[str],
+    duration_s: float,
+    *,
+    scale_known: bool = True,
 ) -> Identifiability:
     """Condition number, strong correlations and sentences for the coefficients and ratios ``names``."""
     sigma = np.sqrt(np.diag(cov))
@@ -81,13 +87,11 @@ def identifiability(
     for name, s in zip(names, sigma, strict=True):
         if name not in FULL:
             continue
-        value = values[name]
+        value, of = values[name], unit(name, scale_known=scale_known)
         if name in held:
-            sentences.append(f"{name} is zero within error (upper limit {2 * s:.1e} {unit(name)}).")
+            sentences.append(f"{name} is zero within error (upper limit {2 * s:.1e} {of}).")
         elif value < 2 * s:
-            sentences.append(
-                f"{name} is not determined: {value:.1e} +- {s:.1e} {unit(name)}; it may be zero."
-            )
+            sentences.append(f"{name} is not determined: {value:.1e} +- {s:.1e} {of}; it may be zero.")
         elif value < 5 * s:
             sentences.append(f"{name} is known to {100 * s / value:.0f} % only.")
     for name, s in zip(names, sigma, strict=True):
@@ -96,5 +100,7 @@ def identifiability(
     sentences.append(
         "The scale of the inertias is not observable in free motion: all coefficients are proportional to "
         "psi, which is the model's, and its relative uncertainty is a common factor on all of them."
+        if scale_known
+        else "All coefficients are over psi, half the upper link's inertia, which free motion does not tell."
     )
     return Identifiability(condition, pairs, duration_s, tuple(sentences))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pydpend.model.file import check_model_called, model_called, read_model
+from pydpend.model.file import check_model_called, model_called, of_ratios, read_model
 from pydpend.model.laws import FORCES, LAW_TABLE, UNITS, Damping, constants, parameters
 from pydpend.model.pendulum import CONSTANTS, Model, uniform_bar
 from pydpend.model.reduce import (
@@ -32,6 +32,7 @@ __all__ = [
     "from_parts",
     "jacobian",
     "model_called",
+    "of_ratios",
     "parameters",
     "published",
     "read_model",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -84,8 +85,23 @@ def read_model(path: AnyPath) -> Model:
     return _from_constants(data, path) if "constants" in data else _from_parts(data, path)
 
 
-NAMED: Mapping[str, Callable[[], Model]] = {"derived": lambda: derived("A"), "published": published}
-"""Models of the paper's pendulum by the word that an option has for them."""
+def of_ratios() -> Model:
+    """A pendulum of which nothing is known: a fit has all its constants over psi from the motion.
+
+    Returns
+    -------
+    Model
+        A model without a scale; its numbers are the paper's, and a fit begins from others.
+    """
+    return replace(derived("A").of_unknown_scale(), name="ratios")
+
+
+NAMED: Mapping[str, Callable[[], Model]] = {
+    "derived": lambda: derived("A"),
+    "published": published,
+    "ratios": of_ratios,
+}
+"""Models by the word that an option has for them: two of the paper's pendulum, and that of which nothing is known."""
 
 
 def model_called(word: str) -> Model:
@@ -227,6 +243,7 @@ def _from_constants(data: Table, path: Path) -> Model:
         lower_outer_m=pairs.get("lower_outer_m", (outer, 0.0))[0],
         covariance=np.diag([pairs[key][1] ** 2 for key in CONSTANTS]),
         name=_name(data, path),
+        scale_known=True,
     ).checked()
 
 
@@ -310,8 +327,6 @@ def _on_elbow(table: Mapping[str, Any]) -> bool:
 
 def _with_extent(model: Model, top: _Numbers) -> Model:
     """The lower link's ends: as given, else those of the uniform bar equal to the whole lower link."""
-    from dataclasses import replace
-
     m2 = model.m2_kg
     centre = model.kappa_j / (model.g_m_s2 * m2) if model.g_m_s2 > 0 and m2 > 0 else 0.0
     inner, outer = uniform_bar(m2, 2 * model.lambda_kg_m2 - m2 * centre**2, centre)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -54,6 +54,8 @@ class Model:
         Of the constants in the order of ``pydpend.model.CONSTANTS``, SI.
     name : str
         Name of the model, for messages.
+    scale_known : bool
+        Whether psi is this pendulum's; else all constants are over psi, which is 1 (`of_unknown_scale`).
 
     Raises
     ------
@@ -76,9 +78,10 @@ class Model:
     lower_outer_m: float = 0.0
     covariance: Array | None = field(default=None, compare=False, repr=False)
     name: str = "model"
+    scale_known: bool = True
 
     def __post_init__(self) -> None:
-        numbers = [f.name for f in fields(self) if f.name not in ("covariance", "name")]
+        numbers = [f.name for f in fields(self) if f.name not in ("covariance", "name", "scale_known")]
         for name in numbers:
             value = getattr(self, name)
             if not math.isfinite(value):
@@ -174,6 +177,27 @@ class Model:
             psi_kg_m2, psi_kg_m2, 0.0, 0.0, sigma_j, sigma_j, m1_kg, 0.0, 1.0, g_m_s2,
             covariance=cov, name=name,
         )  # fmt: skip
+
+    def of_unknown_scale(self) -> Model:
+        """The model as one of which only the ratios are known: all constants over psi, and no masses.
+
+        Returns
+        -------
+        Model
+            The same motion; coefficients fitted with it are over psi, in 1/s, 1 and 1/s2.
+        """
+        return replace(
+            self,
+            psi_kg_m2=1.0,
+            m1_kg=0.0,
+            m2_kg=0.0,
+            covariance=None,
+            scale_known=False,
+            **{
+                name: getattr(self, name) / self.psi_kg_m2
+                for name in ("lambda_kg_m2", "zeta_kg_m2", "a3_kg_m2", "sigma_j", "kappa_j")
+            },
+        )
 
     @property
     def links(self) -> int:

@@ -187,6 +187,7 @@ def published() -> Model:
         lower_outer_m=right.lower_outer_m,
         covariance=np.diag(variances),
         name="published (Table 7)",
+        scale_known=True,
     )
     said = model.problems()
     for name in ("psi_kg_m2", "sigma_j"):

@@ -137,7 +137,7 @@ def answer(fit: DampingFit, predictions: Mapping[str, Prediction], scale: Stored
         )
     if intervals:
         by += " The 95 % intervals are by profile likelihood, everything else fitted again."
-    blocks.append(Text(f"{by} {_scale(scale, links)}", quiet=True))
+    blocks.append(Text(f"{by} {_scale(fit, scale, links)}", quiet=True))
     return blocks
 
 
@@ -187,9 +187,14 @@ def _errors(rms_deg: Sequence[float]) -> str:
     return f"in windows of {TOLD_WINDOW_S} s with the state at the start fitted: RMS error {each}"
 
 
-def _scale(scale: StoredScale | None, links: int) -> str:
+def _scale(fit: DampingFit, scale: StoredScale | None, links: int) -> str:
     """The scale behind all coefficients together."""
     where = "upper joint" if links > 1 else "pivot"
+    if not fit.scale_known:
+        return (
+            f"All coefficients are over psi, half the moment of inertia about the {where}, which free motion does not "
+            "tell, and so are the energies: times psi in kg m² they are in N m s, N m s² and N m, and J."
+        )
     said = (
         f"All coefficients are in proportion to psi, half the moment of inertia about the {where}, which free motion "
         "does not tell"
