@@ -15,9 +15,11 @@ from pydpend.kinematics.markers import BodyMarkers, body_markers
 from pydpend.kinematics.pose import solve
 from pydpend.kinematics.rests import (
     HANGS_WITHIN_RAD,
+    alone,
     confirmed_sigma,
     hanging_rests,
     judge,
+    lone_sigma,
     off_the_swing,
     unconfirmed,
     unconfirmed_sigma,
@@ -127,8 +129,8 @@ def zero_for(
             notes += unconfirmed(judged)
             sigma = unconfirmed_sigma(value, sigma, down)
         else:
-            notes += off_the_swing(kept, value, sigma, swing)
-            sigma = confirmed_sigma(kept, value, sigma, swing)
+            notes += off_the_swing(kept, value, sigma, swing) + alone(kept, swing)
+            sigma = lone_sigma(kept, value, confirmed_sigma(kept, value, sigma, swing), swing, down)
         meta = {"from": "rest", "sigma_rad": sigma.tolist(), "rests": [j.to_dict() for j in judged]}
         return value, meta | _told(swing, value), notes
     if isinstance(zero, str) and zero == "reference_frame":

@@ -31,6 +31,11 @@ APART_SIGMAS = 2.0
 """A rest farther than so many standard uncertainties from the swing's zero is not known to hang: if it does, one in
 twenty is that far off by chance, and is only said to be less sure."""
 
+CONFIRMS_RAD = np.radians(1.5)
+"""A swing whose own zero is less sure than this does not confirm a rest before it: links that are held up to 3 deg
+(`APART_SIGMAS`) beside where they hang would pass. Drops of 12 s know the lower link's to 0.9 to 1.4 deg, those of 3 s
+to 1.9 to 4.3 deg (docs/explanation/angles.md)."""
+
 BEARINGS_RAD = np.radians(0.3)
 """Ordinary dry friction lets a link stop this far off hanging: no more need be said of it."""
 
@@ -217,6 +222,42 @@ def confirmed_sigma(kept: list[Rest], zero_rad: Floats, sigma_rad: Floats, swing
     if after and swing.dry:
         apart = np.maximum(apart, swing.sigma_rad)
     return np.asarray(np.hypot(sigma_rad, apart))
+
+
+def lone_sigma(kept: list[Rest], zero_rad: Floats, sigma_rad: Floats, swing: Swing, down: Down) -> Floats:
+    """Standard uncertainty (L,) of a zero by rests before the swing alone: more for links that it does not confirm.
+
+    Whether these hang there or are held, only swing and picture say. With their weighted mean off the zero by ``m``, and
+    ``s`` its standard uncertainty, it is the root of ``m^2 + s^2`` at least: at such a distance they expect the hanging
+    link. A picture that contradicts the swing is rolled, and is left out.
+    """
+    by_swing, by_picture = swing.off(zero_rad), down.off(zero_rad)
+    roll = np.hypot(np.radians(ROLL_SIGMA_DEG), down.sigma_rad)
+    between = np.abs(within_half_turn(by_picture - by_swing))
+    upright = between <= APART_SIGMAS * np.hypot(roll, swing.sigma_rad)
+    swings, pictures = swing.sigma_rad**-2, np.where(upright, roll**-2, 0.0)
+    mean = (swings * by_swing + pictures * np.where(upright, by_picture, 0.0)) / (swings + pictures)
+    doubt = np.hypot(mean, (swings + pictures) ** -0.5)
+    return np.asarray(np.where(_alone(kept, swing), np.maximum(sigma_rad, doubt), sigma_rad))
+
+
+def _alone(kept: list[Rest], swing: Swing) -> NDArray[np.bool_]:
+    """Whether of each link (L,) only rests before the swing say where it hangs, as the swing hardly knows it itself."""
+    before = all(rest.start_s <= swing.start_s for rest in kept)
+    return before & (swing.sigma_rad > CONFIRMS_RAD)
+
+
+def alone(kept: list[Rest], swing: Swing) -> list[str]:
+    """The note on a zero that is `_alone`."""
+    unsure = _alone(kept, swing)
+    if not unsure.any():
+        return []
+    links = " and ".join(f"phi{k + 1}" for k in np.flatnonzero(unsure))
+    return [
+        f"the zero of {links} is the rest in {_when(kept[0])} alone, and the swing after it confirms it only to "
+        f"{_each(swing.sigma_rad[unsure])} deg: the zero's uncertainty says so. Let the links hang at the end too, or film "
+        "more of the swing"
+    ]
 
 
 def _disagree(apart_rad: Floats, sigma_rad: Floats, swing: Swing) -> NDArray[np.bool_]:
