@@ -53,11 +53,3 @@ def of_type(name: str, value: object, *wanted: type, like: tuple[str, ...] = ())
     raise WrongTypeError(
         fault(Setting(name), f"{needed} is needed, and this is of type {type(value).__name__}", advice)
     )
-
-
-def all_of_type(name: str, values: object, *wanted: type) -> None:
-    """Check the type of each of several objects in a sequence."""
-    if isinstance(values, (str, bytes, os.PathLike)) or not hasattr(values, "__iter__"):
-        of_type(name, values, *wanted)
-    for value in values if hasattr(values, "__iter__") else ():
-        of_type(name, value, *wanted)

@@ -15,10 +15,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from pydpend.argument_types import of_type
 from pydpend.errors import ArgumentError, Setting, TableError, fault
 from pydpend.nodes import STATUS_WORDS, Nodes
 from pydpend.output import whole
+from pydpend.typed import typed
 
 LEAST_EVEN = 1e-6
 """A rate is one number, so steps of time may differ by so much of a step; time stamps in whole ticks do not."""
@@ -32,6 +32,7 @@ LAST_C3D_FRAME = 65534
 gives the first 65535 frames, c3d 0.6 fails)."""
 
 
+@typed()
 def export(nodes: Nodes, path: str | os.PathLike[str], *, px_per_m: float | None = None) -> None:
     """Writes nodes for another program, by the ending: `.c3d`, `.trc`, `.csv` (DLTdv xypts) or `.mat`.
 
@@ -52,7 +53,6 @@ def export(nodes: Nodes, path: str | os.PathLike[str], *, px_per_m: float | None
         If the form cannot hold the table (C3D and TRC need one rate, and C3D ends at frame 65534 counted from 1), or
         the file cannot be written.
     """
-    of_type("nodes", nodes, Nodes)
     target = Path(os.fsdecode(path))
     writer = WRITERS.get(target.suffix.lower())
     if writer is None:

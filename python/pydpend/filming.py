@@ -28,6 +28,7 @@ from pydpend.columns import PARQUET_FAULTS
 from pydpend.errors import FILM_TRUTH, FilmError, fault
 from pydpend.output import AnyPath
 from pydpend.tabular import TableResult
+from pydpend.typed import typed, typed_class
 
 StrPath: TypeAlias = AnyPath
 Codec: TypeAlias = Literal["h264", "ffv1", "mjpeg", "raw"]
@@ -88,6 +89,7 @@ class Truth(TableResult):
         }
 
 
+@typed_class()
 class Film:
     """A scene ready to be filmed; nothing in it changes.
 
@@ -143,6 +145,7 @@ class Film:
         scene: dict[str, Any] = _without_none(json.loads(self._film.scene()))
         return scene
 
+    @typed()
     def image(self, frame: int) -> NDArray[np.uint8] | NDArray[np.uint16]:
         """The recorded levels of a frame.
 
@@ -164,6 +167,7 @@ class Film:
         image: NDArray[np.uint8] | NDArray[np.uint16] = self._film.image(frame)
         return image
 
+    @typed()
     def expected(self, frame: int) -> NDArray[np.float32]:
         """The expected levels of a frame: no noise, no rounding, no saturation.
 
@@ -203,6 +207,7 @@ class Film:
             bodies=tuple(m["link"] for m in markers),
         )
 
+    @typed()
     def rig_toml(self, frame: int = 0) -> str:
         """The rig file as a perfect ``tracker setup`` would write it.
 
@@ -218,6 +223,7 @@ class Film:
         """
         return self._film.rig_toml(frame)
 
+    @typed()
     def write(
         self,
         output: StrPath,
@@ -275,6 +281,7 @@ class Film:
         self._film.write(encoding, written)
 
 
+@typed()
 def film(
     scene: StrPath | Mapping[str, Any],
     output: StrPath,

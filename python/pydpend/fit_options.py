@@ -14,6 +14,7 @@ from typing import Any, Self, TypedDict
 from pydpend.coefficients import FREE, FULL, JOINT_OF, PAPER, check_once, coefficients
 from pydpend.errors import FitOptionError, Message, Setting, Text, fault, listed, one_of
 from pydpend.option_fields import choices_of, method_of, option
+from pydpend.typed import typed, typed_class
 
 METHODS = ("trajectory", "energy")
 """The equations of motion fitted to the angles, or the paper's energy profile."""
@@ -50,6 +51,7 @@ class FitKeywords(TypedDict, total=False):
     stop_s: float | None
 
 
+@typed_class()
 @dataclass(frozen=True, kw_only=True)
 class FitOptions:
     """The options of a damping fit.
@@ -192,6 +194,7 @@ class FitOptions:
         """The further parameters to fit."""
         return tuple(name.strip() for name in _with_commas(self.free).split(",") if name.strip())
 
+    @typed()
     def coefficients(self, *, single: bool) -> tuple[str, ...]:
         """The coefficients to fit.
 

@@ -172,6 +172,17 @@ def seconds_of_arrow(column: pa.ChunkedArray) -> tuple[Floats, str] | None:
     return out, ""
 
 
+def times_given(t_s: object, error: type[PydpendError]) -> Floats:
+    """Seconds of an array of numbers or dates that a caller gives as ``t_s``. Raises ``error`` for anything else."""
+    try:
+        given = np.asarray(t_s)
+        if t_s is None or given.dtype.kind == "c":
+            raise TypeError
+        return seconds_of_numpy(given)
+    except (TypeError, ValueError):
+        raise error(fault("t_s", "it holds no times", "Give an array of seconds or of dates")) from None
+
+
 def seconds_of_numpy(values: NDArray[Any]) -> Floats:
     """Numbers as they are; ``datetime64`` and ``datetime`` as seconds from the first, ``timedelta64`` as seconds.
 

@@ -13,6 +13,7 @@ import numpy as np
 from pydpend.documents import Table, parse_json
 from pydpend.errors import PydpendError, Text
 from pydpend.output import write_text
+from pydpend.typed import typed
 
 
 class JsonResult(ABC):
@@ -46,6 +47,7 @@ class JsonResult(ABC):
         return json.dumps(self.to_dict(), indent=1, allow_nan=False) + "\n"
 
     @classmethod
+    @typed()
     def from_json(cls, text: str, source: str | None = None) -> Self:
         """The result that `to_json` gave as text; each value is checked.
 

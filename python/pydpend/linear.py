@@ -8,10 +8,10 @@ import numpy as np
 import numpy.typing as npt
 
 from pydpend import _native
-from pydpend.argument_types import of_type
 from pydpend.errors import SimulationError, fault
 from pydpend.model import Damping, Model, parameters
 from pydpend.tabular import TableResult, by_link
+from pydpend.typed import typed
 
 Array = npt.NDArray[np.float64]
 
@@ -35,6 +35,7 @@ class Modes:
     damping_ratio: Array
 
 
+@typed()
 def modes(model: Model, damping: Damping | None = None) -> Modes:
     """Modes of ``M a + C w + K phi = 0``: mass matrix at rest, viscous moments, weight moments.
 
@@ -53,9 +54,6 @@ def modes(model: Model, damping: Damping | None = None) -> Modes:
     pydpend.linear.Modes
         Frequencies (Hz), shapes and damping ratios.
     """
-    of_type("model", model, Model)
-    if damping is not None:
-        of_type("damping", damping, Damping)
     d = damping or Damping()
     mass = model.mass_matrix([0.0, 0.0])
     stiff = np.diag([model.sigma_j, model.kappa_j])
@@ -98,6 +96,7 @@ class Section(TableResult):
         return by_link({"time_s": self.t_s, "phi#_rad": self.phi_rad, "w#_rad_s": self.w_rad_s})
 
 
+@typed()
 def poincare(
     model: Model,
     damping: Damping,
@@ -140,8 +139,6 @@ def poincare(
     SimulationError
         As `simulate`, and for a link, direction or duration that cannot be.
     """
-    of_type("model", model, Model)
-    of_type("damping", damping, Damping)
     if link not in (1, 2) or direction not in (-1, 0, 1):
         raise SimulationError(
             fault("poincare", f"link {link}, direction {direction}", "Links are 1 and 2, directions -1, 0, 1")
@@ -182,6 +179,7 @@ class Exponent:
     growth_per_s: Array
 
 
+@typed()
 def lyapunov(
     model: Model,
     damping: Damping,
@@ -221,8 +219,6 @@ def lyapunov(
     SimulationError
         For dry friction, a bad state, or fewer than 40 intervals.
     """
-    of_type("model", model, Model)
-    of_type("damping", damping, Damping)
     counted = int(duration_s / interval_s)
     if counted < 40:
         raise SimulationError(

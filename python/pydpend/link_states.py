@@ -18,6 +18,7 @@ from pydpend.argument_types import of_type
 from pydpend.errors import AnglesError, fault
 from pydpend.kinematics import LinkAngles
 from pydpend.tabular import TableResult, by_link, html_rows
+from pydpend.typed import typed, typed_class
 
 Array = npt.NDArray[np.float64]
 
@@ -53,6 +54,7 @@ class Angles(Protocol):
         ...
 
 
+@typed_class()
 @dataclass(frozen=True, eq=False, repr=False)
 class LinkStates(TableResult):
     """Angles, rates and accelerations of L links at T times. Counter-clockwise positive, zero hanging; SI.
@@ -114,6 +116,7 @@ class LinkStates(TableResult):
         return by_link(columns | {f"sigma_{name}": sigmas[:, :, k] for k, name in enumerate(names)})
 
 
+@typed()
 def states(
     angles: Angles,
     *,
@@ -182,6 +185,7 @@ def states(
     )
 
 
+@typed()
 def savitzky_golay(angles: Angles, *, window: int = 31, degree: int = 4) -> LinkStates:
     """States by a polynomial through the samples around each: the simple alternative to `states`.
 

@@ -19,6 +19,7 @@ from pydpend.errors import ArgumentError, fault
 from pydpend.nodes import Rig
 from pydpend.output import AnyPath
 from pydpend.reading_options import DetectOptions, aspect_text
+from pydpend.typed import typed, typed_class
 
 DETECTION = np.dtype(
     [
@@ -46,6 +47,7 @@ def _detections(found: Found) -> NDArray[np.void]:
     return out
 
 
+@typed()
 def detect(
     image: NDArray[Any],
     *,
@@ -128,6 +130,7 @@ class NodeRow:
     status: NDArray[np.uint8]
 
 
+@typed_class()
 class Tracker:
     """The markers of a known rig followed image by image, for a camera's live loop.
 
@@ -169,6 +172,7 @@ class Tracker:
         options = DetectOptions(threshold=threshold, polarity=polarity, centroid=centroid)
         self._live = _native.LiveTracker(self.rig.to_json(), options.detected(), depth_bits)
 
+    @typed()
     def learn(self, images: Iterable[NDArray[Any]]) -> None:
         """Learns thresholds and noise from some images of the scene; else the first image tracked is all there is.
 
@@ -186,6 +190,7 @@ class Tracker:
         """
         self._live.learn(list(images))
 
+    @typed()
     def step(self, image: NDArray[Any], frame: int | None = None) -> NodeRow:
         """The nodes in the next image.
 

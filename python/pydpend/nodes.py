@@ -24,6 +24,7 @@ from pydpend.output import AnyPath, path_of
 from pydpend.raw_tracks import RawTracks
 from pydpend.rig import Joint, Node, Rig, rig_of
 from pydpend.tabular import html_table
+from pydpend.typed import typed, typed_class
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -47,6 +48,7 @@ __all__ = [
 ]
 
 
+@typed_class()
 @dataclass(frozen=True, eq=False)
 class Nodes:
     """T frames of N nodes. What is not seen is NaN.
@@ -83,6 +85,7 @@ class Nodes:
     meta: dict[str, Any] = field(default_factory=dict)
 
     @classmethod
+    @typed()
     def from_arrays(
         cls,
         t_s: ArrayLike,
@@ -222,6 +225,7 @@ class Nodes:
         """
         _native.check_table(self._columns(), self._meta_json())
 
+    @typed()
     def write(self, path: AnyPath, *, safe_csv: bool = False) -> None:
         """Writes the table, Parquet or CSV (with its `.json`) by the ending, replacing what is there.
 
@@ -331,6 +335,7 @@ def nodes_of(columns: Columns) -> Nodes:
     return Nodes(frame, t_s, xy_px, sigma_px, area_px, status, rig, meta)
 
 
+@typed()
 def read_nodes(path: AnyPath) -> Nodes:
     """Nodes from a table, Parquet or CSV; every value is checked.
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from pydpend import _native
 from pydpend.errors import ArgumentError, fault
 from pydpend.output import AnyPath
+from pydpend.typed import typed, typed_class
 
 
 @dataclass(frozen=True)
@@ -56,6 +57,7 @@ class Joint:
     y_px: float
 
 
+@typed_class()
 @dataclass(frozen=True)
 class Rig:
     """Nodes, bodies and joints, and the picture in which they stand so.
@@ -96,6 +98,7 @@ class Rig:
     camera: dict[str, Any] | None = None
 
     @staticmethod
+    @typed()
     def read(path: AnyPath) -> Rig:
         """A rig from its file (TOML), as `tracker setup` writes it.
 
@@ -117,6 +120,7 @@ class Rig:
         return Rig.from_json(_native.read_rig(os.fsdecode(path)))
 
     @staticmethod
+    @typed()
     def from_json(text: str) -> Rig:
         """A rig from the JSON of a table's metadata.
 
@@ -186,6 +190,7 @@ class Rig:
         """
         return _native.rig_toml(self.to_json())
 
+    @typed()
     def write(self, path: AnyPath) -> None:
         """Writes a rig file.
 
@@ -206,6 +211,7 @@ class Rig:
         """Names of the nodes, in the order of the arrays."""
         return tuple(n.name for n in self.nodes)
 
+    @typed()
     def indices(self, body: str) -> NDArray[np.intp]:
         """Indices of a body's nodes, in the order of the arrays.
 

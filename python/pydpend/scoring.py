@@ -13,6 +13,7 @@ from pydpend.errors import TableError
 from pydpend.filming import Film, StrPath
 from pydpend.json_text import JsonResult
 from pydpend.nodes import Nodes, read_nodes
+from pydpend.typed import typed
 
 
 @dataclass(frozen=True)
@@ -106,6 +107,7 @@ class Score(JsonResult):
         )
 
 
+@typed()
 def score(nodes: Nodes | StrPath, truth: Film | StrPath, limit_px: float = 2.0) -> Score:
     """The score of a node table against the truth: a table that :func:`pydpend.film` wrote, or the film itself.
 

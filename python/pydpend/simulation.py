@@ -14,10 +14,10 @@ import numpy as np
 import numpy.typing as npt
 
 from pydpend import _native
-from pydpend.argument_types import all_of_type, of_type
 from pydpend.errors import SimulationError, fault
 from pydpend.model import FORCES, LAW_TABLE, Damping, Model, parameters
 from pydpend.tabular import TableResult, by_link, html_rows
+from pydpend.typed import typed
 
 Array = npt.NDArray[np.float64]
 
@@ -127,6 +127,7 @@ class Simulation(TableResult):
         return by_link({"time_s": self.t_s} | both | {"energy_j": self.energy_j} | works)
 
 
+@typed()
 def simulate(
     model: Model,
     damping: Damping,
@@ -170,8 +171,6 @@ def simulate(
     SimulationError
         For a state that is not finite, times that do not increase, or a tolerance that is not reached.
     """
-    of_type("model", model, Model)
-    of_type("damping", damping, Damping)
     t = np.atleast_1d(np.asarray(t_s, dtype=np.float64))
     how = _native.IntegratorSettings(tolerance=tolerance, width_rad_s=smooth_width_rad_s, pinned=pinned)
     run: _native.SimulatedMotion = _call(
@@ -231,6 +230,7 @@ class Ensemble(TableResult):
         )
 
 
+@typed()
 def simulate_many(
     model: Model | Sequence[Model],
     damping: Damping | Sequence[Damping],
@@ -266,8 +266,6 @@ def simulate_many(
     SimulationError
         Naming the run, as `simulate`.
     """
-    all_of_type("model", [model] if isinstance(model, Model) else model, Model)
-    all_of_type("damping", [damping] if isinstance(damping, Damping) else damping, Damping)
     x = np.ascontiguousarray(states, dtype=np.float64)
     if x.ndim != 2 or x.shape[1] != 4 or not np.all(np.isfinite(x)):
         raise SimulationError(

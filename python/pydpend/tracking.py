@@ -32,6 +32,7 @@ from pydpend.progress import callback
 from pydpend.reading_options import OpenOptions, ReadingOptions, given
 from pydpend.tabular import TableResult
 from pydpend.terminal import shown
+from pydpend.typed import typed
 from pydpend.wanted import Numbers, Pairs, Places, wanted
 
 Path: TypeAlias = AnyPath
@@ -64,6 +65,7 @@ def _loss(nodes: Nodes) -> str | None:
     return "; ".join(said for said in (nodes.damage, early) if said is not None) or None
 
 
+@typed()
 def track(
     path: Path,
     rig: Rig | Path | None = None,
@@ -199,7 +201,7 @@ def track(
         raise stopped
     lost = _loss(nodes)
     if lost is not None:
-        warnings_of_python.warn(f"{shown(os.fsdecode(path))}: {lost}", RecordingWarning, stacklevel=2)
+        warnings_of_python.warn(f"{shown(os.fsdecode(path))}: {lost}", RecordingWarning, stacklevel=3)
     return nodes
 
 
@@ -221,6 +223,7 @@ class Setup(NamedTuple):
     picture: NDArray[np.uint8]
 
 
+@typed()
 def setup(
     path: Path,
     output: Path | None = None,
@@ -338,6 +341,7 @@ class OverlayFilm(TableResult):
         return {"frame": self.frame, "time_s": self.t_s}
 
 
+@typed()
 def overlay(
     recording: Path,
     nodes: Nodes | Path,
@@ -424,6 +428,7 @@ def overlay(
     return OverlayFilm(os.fsdecode(output), frame, t_s, play_fps)
 
 
+@typed()
 def info(
     path: Path,
     *,

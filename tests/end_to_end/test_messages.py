@@ -26,6 +26,7 @@ from pydpend.plots import folder as figures
 from pydpend.plots.moving import check_film
 
 from tests.support import two_links
+from tests.support.drawn_nodes import some_nodes
 
 ROOT = Path(__file__).parent.parent.parent
 TRACKER = ROOT / "target" / "release" / "tracker"
@@ -364,7 +365,7 @@ def test_old_names_are_taken_with_a_note(tmp_path: Path, capsys: pytest.CaptureF
         pydpend.analyse.read_config(config)
     with pytest.raises(PydpendError, match="Give estimator='linkage'"):
         # The old name, wrong on purpose.
-        dp.angles(None, method="linkage")  # type: ignore[arg-type]
+        dp.angles(some_nodes(), method="linkage")  # type: ignore[arg-type]
 
 
 def test_what_does_nothing_with_these_inputs_is_refused(

@@ -33,6 +33,7 @@ GROUPS: tuple[tuple[str, ...], ...] = (
         "_native",
         "kinds",
         "argument_types",
+        "typed",
         "json_text",
         "tabular",
         "documents",

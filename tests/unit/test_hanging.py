@@ -205,7 +205,10 @@ def test_a_hold_that_no_swing_speaks_of_is_refused_by_the_picture(
     with pytest.raises(AnglesError, match="deg from the picture's vertical") as refused:
         filmed(t, phi)
     # Of three seconds the swing tells it itself, if the motion is regular enough.
-    seen = "too little of a free swing is seen to say that the links hang there", "the swing goes about a direction"
+    seen = (
+        "too little of a free swing is seen to say that the links hang there",
+        "the swing goes about a direction",
+    )
     assert any(said in str(refused.value) for said in (seen if throw_s == 3.0 else seen[:1]))
     assert "Give zero='vertical'" in str(refused.value)
 
@@ -282,7 +285,9 @@ def test_a_lone_rest_before_a_short_swing_is_no_surer_than_swing_and_picture(
     # The picture tells the vertical to 2 deg at best, a swing to 1.5 deg or worse is to be added: 1.2 deg.
     assert 1.2 < sigma[1] < 3.0 + 1.5 * abs(beside_deg)
     assert any(
-        re.search(r"^the zero of .*phi2 is the rest in 0-[\d.]+ s alone, and the swing after it confirms", note)
+        re.search(
+            r"^the zero of .*lower is the rest in 0-[\d.]+ s alone, and the swing after it confirms", note
+        )
         for note in found.meta["notes"]
     )
 
@@ -293,7 +298,7 @@ def test_a_lone_rest_is_doubted_link_by_link_and_a_rest_at_the_end_is_not() -> N
 
     def stated(kept: list[Rest], sigma_deg: tuple[float, float], off_deg: float, tilt_deg: float) -> Floats:
         swing = Swing(np.radians([-off_deg] * 2), np.radians(sigma_deg), np.ones(2), 0.9, False, 2.0)
-        down = Down(np.radians([-tilt_deg] * 2), np.radians([0.0, np.sqrt(3.0)]))
+        down = Down(np.radians([-tilt_deg] * 2), np.radians([0.0, np.sqrt(3.0)]), ("upper", "lower"))
         return np.degrees(lone_sigma(kept, np.zeros(2), np.full(2, 1e-4), swing, down))
 
     # Swing and picture are of 2 deg each, and their mean of 2 / sqrt(2) deg.

@@ -9,7 +9,6 @@ from typing import Unpack
 import numpy as np
 from numpy.typing import NDArray
 
-from pydpend.argument_types import all_of_type, of_type
 from pydpend.coefficients import RATIOS, parameters, ratios_of
 from pydpend.damping import camera, shooting
 from pydpend.damping.compare import compare_terms
@@ -31,10 +30,12 @@ from pydpend.fit_options import FitKeywords, FitOptions
 from pydpend.information import undetermined
 from pydpend.kinematics import LinkAngles
 from pydpend.model import Model
+from pydpend.typed import typed
 
 Floats = NDArray[np.float64]
 
 
+@typed()
 def fit_damping(
     angles: LinkAngles | Sequence[LinkAngles],
     model: Model,
@@ -81,8 +82,6 @@ def fit_damping(
         For recordings without a free decay, models the recordings refute, and angles that do not determine the
         coefficients.
     """
-    all_of_type("angles", [angles] if isinstance(angles, LinkAngles) else angles, LinkAngles)
-    of_type("model", model, Model)
     chosen = FitOptions.of(options, method=method, laws=laws, **keywords)
     chosen.check_own_prediction()
     given = [angles] if isinstance(angles, LinkAngles) else list(angles)

@@ -30,6 +30,7 @@ from pydpend.fit_options import METHODS
 from pydpend.fit_status import FitStatus
 from pydpend.json_text import JsonResult, plain
 from pydpend.tabular import TableResult, html_table
+from pydpend.typed import typed
 
 Floats = NDArray[np.float64]
 
@@ -149,6 +150,7 @@ class DampingFit(JsonResult, TableResult):
         rows = ((n, f"{e.value:.4e}", f"{e.sigma:.1e}", e.unit) for n, e in self.coefficients.items())
         return html_table(repr(self)[1:-1], ("coefficient", "value", "standard error", "unit"), rows)
 
+    @typed()
     def scaled(self, psi_kg_m2: float, sigma_kg_m2: float = 0.0) -> DampingFit:
         """The coefficients of a fit over psi in N m s, N m s2 and N m, now that psi is known.
 

@@ -16,7 +16,6 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from pydpend.argument_types import all_of_type
 from pydpend.documents import Table, read_json
 from pydpend.encoder.holds import Hold
 from pydpend.errors import CALIBRATE, EncoderError, fault
@@ -24,6 +23,7 @@ from pydpend.json_text import JsonResult
 from pydpend.kinds import expect
 from pydpend.output import AnyPath, path_of, write_text
 from pydpend.tabular import TableResult
+from pydpend.typed import typed, typed_class
 
 Floats = NDArray[np.float64]
 
@@ -45,6 +45,7 @@ LEAST_DOF = 3
 """With fewer degrees of freedom the holds' own noise says how well the line is known, not their scatter."""
 
 
+@typed_class()
 @dataclass(frozen=True, eq=False, repr=False)
 class Calibration(JsonResult, TableResult):
     """The line between an encoder's volts and its angle, ``V = offset_v + slope_v_per_rad * phi`` (Fig. 10).
@@ -125,6 +126,7 @@ class Calibration(JsonResult, TableResult):
             (self.slope_v_per_rad - factor * b, self.slope_v_per_rad + factor * b),
         )
 
+    @typed()
     def angle_rad(self, volts: Floats) -> Floats:
         """Angle of a reading; no wrap is undone.
 
@@ -140,6 +142,7 @@ class Calibration(JsonResult, TableResult):
         """
         return np.asarray((np.asarray(volts) - self.offset_v) / self.slope_v_per_rad)
 
+    @typed()
     def systematic_rad(self, volts: Floats) -> Floats:
         """Standard uncertainty of an angle from the line alone: common to all readings, not noise.
 
@@ -268,6 +271,7 @@ class Calibration(JsonResult, TableResult):
             out[key] = np.array([getattr(h, key) for h in self.holds])
         return out | {"residual_v": self.residual_v}
 
+    @typed()
     def write(self, path: AnyPath) -> None:
         """Writes the JSON; a file that is there is replaced.
 
@@ -289,6 +293,7 @@ class Calibration(JsonResult, TableResult):
             ) from problem
 
 
+@typed()
 def read_calibration(path: AnyPath) -> Calibration:
     """A calibration as :meth:`Calibration.write` wrote it.
 
@@ -311,6 +316,7 @@ def read_calibration(path: AnyPath) -> Calibration:
     return Calibration.of_table(read_json(path_of(path), EncoderError, Calibration._advice))
 
 
+@typed()
 def calibrate(
     holds: Sequence[Hold],
     *,
@@ -342,7 +348,6 @@ def calibrate(
         For fewer than two holds, holds all at one angle or far off a line, a voltage that does not change with the
         angle, and holds outside the range or at its rails.
     """
-    all_of_type("holds", holds, Hold)
     if len(holds) < 2:
         raise EncoderError(
             fault(

@@ -8,7 +8,6 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pydpend.argument_types import of_type
 from pydpend.documents import Table
 from pydpend.encoder.camera import camera_in
 from pydpend.encoder.sync import Course, Synchronisation, synchronise
@@ -17,6 +16,7 @@ from pydpend.json_text import JsonResult, plain
 from pydpend.kinematics.table import LinkAngles
 from pydpend.series import correlation_time, highpass_noise
 from pydpend.tabular import TableResult
+from pydpend.typed import typed
 
 Floats = NDArray[np.float64]
 
@@ -267,6 +267,7 @@ class Comparison(JsonResult, TableResult):
         }
 
 
+@typed()
 def compare(
     video: LinkAngles,
     encoder: LinkAngles,
@@ -300,8 +301,6 @@ def compare(
     EncoderError
         If the recordings share no motion, or are the same.
     """
-    of_type("video", video, LinkAngles)
-    of_type("encoder", encoder, LinkAngles)
     sync = synchronise(video, encoder, link, clocks=clocks)
     course = Course.of(video, link)
     seen = encoder.seen[:, 0]

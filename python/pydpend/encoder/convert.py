@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pydpend.argument_types import of_type
 from pydpend.encoder.calibration import Calibration
 from pydpend.encoder.signal import EncoderSignal
 from pydpend.errors import CALIBRATE, EncoderError, Setting, fault
 from pydpend.kinematics.table import LinkAngles
 from pydpend.kinematics.unwrap import unwrap
+from pydpend.typed import typed
 
 Floats = NDArray[np.float64]
 
@@ -21,6 +21,7 @@ MOST_LEFT_OUT = 0.5
 """With more than this part of the readings unusable there is no signal to speak of."""
 
 
+@typed()
 def encoder_angles(signal: EncoderSignal, calibration: Calibration | None = None) -> LinkAngles:
     """The encoder's angle over time: one link, rad, unwrapped.
 
@@ -45,9 +46,6 @@ def encoder_angles(signal: EncoderSignal, calibration: Calibration | None = None
         For volts without a calibration, more than half of the readings unusable, or a gap in which an encoder of a
         single turn may have lost one.
     """
-    of_type("signal", signal, EncoderSignal)
-    if calibration is not None:
-        of_type("calibration", calibration, Calibration)
     if signal.unit == "rad":
         if calibration is not None:
             raise EncoderError(

@@ -15,6 +15,7 @@ from pydpend.encoder.signal import EncoderSignal, read_encoder
 from pydpend.errors import EncoderError, Setting, fault, listed
 from pydpend.kinds import expect
 from pydpend.series import correlation_time
+from pydpend.typed import typed
 
 ENDINGS = (".csv", ".tdms", ".npy", ".parquet", ".txt")
 """Endings of files that count as recordings in a folder of holds."""
@@ -85,6 +86,7 @@ def angles_from_names(names: Sequence[str]) -> list[float] | None:
     return out if sure else None
 
 
+@typed()
 def read_holds(
     paths: Sequence[str | Path] | str | Path,
     angles_deg: Sequence[float] | None = None,

@@ -14,10 +14,11 @@ from pydpend.columns import Columns, read_columns
 from pydpend.documents import unreadable
 from pydpend.encoder.scales import Unit, in_base, in_seconds
 from pydpend.errors import EncoderError, Setting, fault
-from pydpend.instants import refuse_stamps, seconds_of_numpy, since_1970
+from pydpend.instants import refuse_stamps, seconds_of_numpy, since_1970, times_given
 from pydpend.kinds import expect
 from pydpend.output import AnyPath, path_of
 from pydpend.tabular import TableResult
+from pydpend.typed import typed, typed_class
 from pydpend.units import is_of_time
 
 Floats = NDArray[np.float64]
@@ -26,6 +27,7 @@ TIME_COLUMN = "time_s"
 KNOWN_COLUMNS = ("voltage_v", "phi1_rad", "phi1_deg")
 
 
+@typed_class("t_s")
 @dataclass(frozen=True, eq=False, repr=False)
 class EncoderSignal(TableResult):
     """A recording of an encoder: T readings over time.
@@ -64,7 +66,7 @@ class EncoderSignal(TableResult):
         return f"<EncoderSignal {self.name}: {self.t_s.size} readings in {self.unit}, {span}>"
 
     def __post_init__(self) -> None:
-        t = seconds_of_numpy(np.asarray(self.t_s))
+        t = times_given(self.t_s, EncoderError)
         value = np.ascontiguousarray(self.value, dtype=np.float64)
         if t.ndim != 1 or t.shape != value.shape or t.size == 0:
             raise EncoderError(
@@ -97,6 +99,7 @@ class EncoderSignal(TableResult):
         return {TIME_COLUMN: self.t_s, "voltage_v" if self.unit == "v" else "phi1_rad": self.value}
 
 
+@typed()
 def read_encoder(
     path: AnyPath,
     *,

@@ -15,12 +15,12 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from pydpend.argument_types import of_type
 from pydpend.documents import Table
 from pydpend.errors import EncoderError, fault, one_of
 from pydpend.json_text import JsonResult, plain
 from pydpend.kinematics.table import LinkAngles
 from pydpend.series import correlation_time, highpass_noise
+from pydpend.typed import typed
 
 Floats = NDArray[np.float64]
 
@@ -186,6 +186,7 @@ class Synchronisation(JsonResult):
             table.number("rival_offset_s") if "rival_offset_s" in table else None,
         )
 
+    @typed()
     def video_time(self, t_s: Floats) -> Floats:
         """The video's time at encoder times.
 
@@ -256,6 +257,7 @@ class Course:
         return np.asarray(~hole & ~outside)
 
 
+@typed()
 def synchronise(
     video: LinkAngles,
     encoder: LinkAngles,
@@ -287,8 +289,6 @@ def synchronise(
     EncoderError
         If they do not overlap or nothing moves.
     """
-    of_type("video", video, LinkAngles)
-    of_type("encoder", encoder, LinkAngles)
     course = Course.of(video, link)
     seen = encoder.seen[:, 0]
     t, phi = encoder.t_s[seen], encoder.phi_rad[seen, 0]

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
-from pydpend.argument_types import of_type
 from pydpend.errors import CHECK, AnglesError, Setting, Text, fault, one_of
 from pydpend.kinematics.body_view import BodyView
 from pydpend.kinematics.camera import CameraPart, camera_part, known
@@ -24,6 +23,7 @@ from pydpend.kinematics.structure import Structure
 from pydpend.kinematics.table import Floats, LinkAngles
 from pydpend.kinematics.unwrap import unwrap
 from pydpend.nodes import Nodes
+from pydpend.typed import typed
 
 if TYPE_CHECKING:
     from pydpend.nodes import Rig
@@ -32,6 +32,7 @@ Method = Literal["rigid", "linkage", "pairwise"]
 ESTIMATORS: tuple[Method, ...] = get_args(Method)
 
 
+@typed("zero", "method")
 def angles(
     nodes: Nodes,
     estimator: Method = "rigid",
@@ -96,7 +97,6 @@ def angles(
         raise AnglesError(
             fault("method", "the option has another name now", "Give " + Setting("estimator", method))
         )
-    of_type("nodes", nodes, Nodes)
     markers = body_markers(nodes, bodies, mirrored)
     _check_length(estimator, len(markers), link_length_m, link_length_sigma_m)
     label = name if name is not None else _label(nodes)
@@ -181,6 +181,7 @@ def _with_time(t_s: Floats, phi: Floats, sigma: Floats, time_sigma_s: float) -> 
     return out
 
 
+@typed()
 def find_linkage(nodes: Nodes, *, bodies: Sequence[str] | None = None, mirrored: bool = False) -> Linkage:
     """Joints and shape of the links: pivot, elbow, places of the markers, length in px, with uncertainties.
 
@@ -203,7 +204,6 @@ def find_linkage(nodes: Nodes, *, bodies: Sequence[str] | None = None, mirrored:
     AnglesError
         If the links turn too little to find the joints.
     """
-    of_type("nodes", nodes, Nodes)
     poses = [fit_pose(m) for m in body_markers(nodes, bodies, mirrored)]
     _check_chain(Structure.of(nodes.rig, [p.markers.name for p in poses]), "find_linkage")
     return fit_linkage(poses[0], poses[1] if len(poses) > 1 else None).linkage

@@ -19,7 +19,6 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from pydpend.argument_types import of_type
 from pydpend.arrays import read_npy
 from pydpend.columns import Columns, read_columns
 from pydpend.documents import parse_json, read_text
@@ -29,12 +28,14 @@ from pydpend.kinds import expect
 from pydpend.kinematics.names import OURS, ColumnNames, LinkJoint, noise_beside, numbered_names, stems_of
 from pydpend.kinematics.table import CAMERA_NUMBERS, Floats, LinkAngles, check_table
 from pydpend.output import AnyPath, path_of, whole, write_text
+from pydpend.typed import typed
 from pydpend.units import is_of_time, unit_at_end, unit_called
 
 META_KEY = "pydpend_angles"
 """Key of the JSON that :func:`write_angles` puts into a Parquet file's metadata."""
 
 
+@typed()
 def read_angles(
     path: AnyPath,
     *,
@@ -380,6 +381,7 @@ def written_files(path: AnyPath) -> tuple[Path, ...]:
     return (table, table.with_name(table.name + ".json")) if table.suffix == ".csv" else (table,)
 
 
+@typed()
 def write_angles(angles: LinkAngles, path: AnyPath) -> None:
     """Writes the table as Parquet or CSV, by the ending; empty (null) where a link was not seen.
 
@@ -398,7 +400,6 @@ def write_angles(angles: LinkAngles, path: AnyPath) -> None:
     AnglesError
         For another ending or a path that cannot be written.
     """
-    of_type("angles", angles, LinkAngles)
     path = path_of(path)
     told = {"links": list(angles.link_names), "joints": [asdict(j) for j in angles.joints]}
     meta = json.dumps({**angles.meta, **told, "name": angles.name}, sort_keys=True)

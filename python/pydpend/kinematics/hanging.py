@@ -129,7 +129,7 @@ def zero_for(
             notes += unconfirmed(judged)
             sigma = unconfirmed_sigma(value, sigma, down)
         else:
-            notes += off_the_swing(kept, value, sigma, swing) + alone(kept, swing)
+            notes += off_the_swing(kept, value, sigma, swing) + alone(kept, swing, down)
             sigma = lone_sigma(kept, value, confirmed_sigma(kept, value, sigma, swing), swing, down)
         meta = {"from": "rest", "sigma_rad": sigma.tolist(), "rests": [j.to_dict() for j in judged]}
         return value, meta | _told(swing, value), notes

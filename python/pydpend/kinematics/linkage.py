@@ -19,6 +19,7 @@ from pydpend.kinematics.markers import BodyMarkers
 from pydpend.kinematics.pose import Pose, evenly, rotate
 from pydpend.kinematics.scale import pooled_scale2
 from pydpend.kinematics.table import Floats
+from pydpend.typed import typed
 
 FIT_FRAMES = 4000
 """The shape is fitted to at most this many frames, evenly spread: its error is then far below a marker's."""
@@ -90,6 +91,7 @@ class Linkage:
         """Standard uncertainties of the pivot's x and y, px, (2,)."""
         return np.sqrt(np.diag(self.covariance_px2)[:2])
 
+    @typed()
     def metres_per_px(self, length_m: float, sigma_m: float = 0.0) -> tuple[float, float]:
         """The scale of the picture from the true distance of pivot and elbow.
 

@@ -227,9 +227,9 @@ def confirmed_sigma(kept: list[Rest], zero_rad: Floats, sigma_rad: Floats, swing
 def lone_sigma(kept: list[Rest], zero_rad: Floats, sigma_rad: Floats, swing: Swing, down: Down) -> Floats:
     """Standard uncertainty (L,) of a zero by rests before the swing alone: more for links that it does not confirm.
 
-    Whether these hang there or are held, only swing and picture say. With their weighted mean off the zero by ``m``, and
-    ``s`` its standard uncertainty, it is the root of ``m^2 + s^2`` at least: at such a distance they expect the hanging
-    link. A picture that contradicts the swing is rolled, and is left out.
+    Whether these hang there or are held, only swing and picture say. With their weighted mean off the zero by ``m``,
+    and ``s`` its standard uncertainty, it is the root of ``m^2 + s^2`` at least: at such a distance they expect the
+    hanging link. A picture that contradicts the swing is rolled, and is left out.
     """
     by_swing, by_picture = swing.off(zero_rad), down.off(zero_rad)
     roll = np.hypot(np.radians(ROLL_SIGMA_DEG), down.sigma_rad)
@@ -244,19 +244,19 @@ def lone_sigma(kept: list[Rest], zero_rad: Floats, sigma_rad: Floats, swing: Swi
 def _alone(kept: list[Rest], swing: Swing) -> NDArray[np.bool_]:
     """Whether of each link (L,) only rests before the swing say where it hangs, as the swing hardly knows it itself."""
     before = all(rest.start_s <= swing.start_s for rest in kept)
-    return before & (swing.sigma_rad > CONFIRMS_RAD)
+    return np.asarray(before & (swing.sigma_rad > CONFIRMS_RAD))
 
 
-def alone(kept: list[Rest], swing: Swing) -> list[str]:
+def alone(kept: list[Rest], swing: Swing, down: Down) -> list[str]:
     """The note on a zero that is `_alone`."""
     unsure = _alone(kept, swing)
     if not unsure.any():
         return []
-    links = " and ".join(f"phi{k + 1}" for k in np.flatnonzero(unsure))
+    links = " and ".join(name for name, doubt in zip(down.links, unsure, strict=True) if doubt)
     return [
         f"the zero of {links} is the rest in {_when(kept[0])} alone, and the swing after it confirms it only to "
-        f"{_each(swing.sigma_rad[unsure])} deg: the zero's uncertainty says so. Let the links hang at the end too, or film "
-        "more of the swing"
+        f"{_each(swing.sigma_rad[unsure])} deg: the zero's uncertainty says so. Let the links hang at the end too, or "
+        "film more of the swing"
     ]
 
 

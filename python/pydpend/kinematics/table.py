@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pydpend.errors import AnglesError, Setting, Text, fault
-from pydpend.instants import seconds_of_numpy
+from pydpend.instants import times_given
 from pydpend.kinematics.names import NUMBERED, ColumnNames, LinkJoint, numbered_names
 from pydpend.tabular import TableResult, html_table
+from pydpend.typed import typed, typed_class
 
 Floats = NDArray[np.float64]
 
@@ -27,6 +28,7 @@ PER_LINK = ("sigma_rad", "reference_frame_rad")
 """Entries of ``meta["zero"]`` that have a value for each link."""
 
 
+@typed_class("t_s")
 @dataclass(frozen=True, eq=False, repr=False)
 class LinkAngles(TableResult):
     """Angles of L links at T instants.
@@ -73,7 +75,7 @@ class LinkAngles(TableResult):
     joints: tuple[LinkJoint, ...] = ()
 
     def __post_init__(self) -> None:
-        t = seconds_of_numpy(np.asarray(self.t_s))
+        t = times_given(self.t_s, AnglesError)
         phi = np.ascontiguousarray(self.phi_rad, dtype=np.float64)
         sigma = np.ascontiguousarray(self.sigma_rad, dtype=np.float64)
         if t.ndim != 1 or t.size == 0:
@@ -225,6 +227,7 @@ class LinkAngles(TableResult):
         """The number of angles or readings left out on the way here; ``meta["notes"]`` says which and why."""
         return int(self.meta.get("left_out", 0))
 
+    @typed()
     def select(self, *links: str) -> LinkAngles:
         """The angles of some of the links.
 
@@ -268,6 +271,7 @@ class LinkAngles(TableResult):
             joints=tuple(j for j in self.joints if set(j.links) <= set(links)),
         )
 
+    @typed()
     def between(self, start_s: float | None = None, stop_s: float | None = None) -> LinkAngles:
         """The rows with ``start_s <= t <= stop_s``.
 

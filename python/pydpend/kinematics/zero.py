@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pydpend.argument_types import of_type
 from pydpend.errors import AnglesError, Setting, fault
 from pydpend.kinematics.table import Floats, LinkAngles
 from pydpend.series import correlation_time
+from pydpend.typed import typed
 
 REST_WITHIN_RAD = np.radians(0.1)
 """At rest, means over :data:`BLOCK_S` stay within this range (or six of their standard errors)."""
@@ -63,6 +63,7 @@ class Rest:
     sigma_rad: Floats
 
 
+@typed()
 def find_rest(angles: LinkAngles, at_least_s: float = REST_AT_LEAST_S) -> list[Rest]:
     """The stretches in which every link keeps still, in the order of time.
 
@@ -80,7 +81,6 @@ def find_rest(angles: LinkAngles, at_least_s: float = REST_AT_LEAST_S) -> list[R
     list of pydpend.kinematics.Rest
         Empty if there is none.
     """
-    of_type("angles", angles, LinkAngles)
     t, phi = angles.t_s, angles.phi_rad
     step = angles.step_s
     if not np.isfinite(step):

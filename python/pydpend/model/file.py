@@ -18,6 +18,7 @@ from pydpend.kinds import expect
 from pydpend.model.pendulum import CONSTANTS, Model, uniform_bar
 from pydpend.model.reduce import ModelWarning, constants_of, derived, from_parts, published
 from pydpend.output import AnyPath, path_of
+from pydpend.typed import typed
 
 # Every number may be plain or [value, standard uncertainty]; its key ends in its unit.
 _UNITS = {
@@ -53,6 +54,7 @@ _KIND = {
 }
 
 
+@typed()
 def read_model(path: AnyPath) -> Model:
     """A pendulum from a TOML file of parts or of reduced constants (docs/reference/model.md has the form).
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, fields
 from pydpend._native import Law, laws
 from pydpend.errors import ModelError, fault
 from pydpend.model.pendulum import Model
+from pydpend.typed import typed_class
 
 LAW_TABLE: dict[str, Law] = {law.name: law for law in laws()}
 """The laws by the names of their coefficients, in the order of powers and works: the compiled half's one table
@@ -17,6 +18,7 @@ FORCES = tuple(name for name, law in LAW_TABLE.items() if law.is_force)
 """Coefficients of the laws that are forces, and so have a work."""
 
 
+@typed_class()
 @dataclass(frozen=True)
 class Damping:
     """One coefficient per law of damping, SI, 0 where the law is off (Table 5 corrected).

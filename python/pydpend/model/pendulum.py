@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from pydpend.errors import ModelError, fault
 from pydpend.tabular import html_table
+from pydpend.typed import typed, typed_class
 
 Array = npt.NDArray[np.float64]
 
@@ -27,6 +28,7 @@ CONSTANTS = (
 """The constants with a covariance, in its order."""
 
 
+@typed_class()
 @dataclass(frozen=True, repr=False)
 class Model:
     """A planar double pendulum in SI units; angles counter-clockwise positive, zero hanging.
@@ -131,6 +133,7 @@ class Model:
         return html_table(self.name, ("constant, SI", "value", "standard uncertainty"), rows)
 
     @classmethod
+    @typed()
     def one_link(
         cls,
         psi_kg_m2: float,
@@ -274,6 +277,7 @@ class Model:
             raise ModelError(fault(self.name, problem, "Check its inertias and distances"))
         return self
 
+    @typed()
     def coupling(self, phi_rad: npt.ArrayLike) -> Array:
         """Coupling of the rates, ``zeta + a3 cos(phi2 - phi1)`` (Eq. 26).
 
@@ -290,6 +294,7 @@ class Model:
         phi = np.asarray(phi_rad, dtype=np.float64)
         return np.asarray(self.zeta_kg_m2 + self.a3_kg_m2 * np.cos(phi[..., 1] - phi[..., 0]))
 
+    @typed()
     def mass_matrix(self, phi_rad: npt.ArrayLike) -> Array:
         """The mass matrix M of ``T = w' M w / 2`` (Eq. 26).
 
@@ -310,6 +315,7 @@ class Model:
         out[..., 0, 1] = out[..., 1, 0] = cross
         return out
 
+    @typed()
     def kinetic(self, phi_rad: npt.ArrayLike, w_rad_s: npt.ArrayLike) -> Array:
         """Kinetic energy (Eq. 26).
 
@@ -330,6 +336,7 @@ class Model:
         own = self.psi_kg_m2 * w1**2 + self.lambda_kg_m2 * w2**2
         return np.asarray(own + self.coupling(phi_rad) * w1 * w2)
 
+    @typed()
     def potential(self, phi_rad: npt.ArrayLike) -> Array:
         """Potential energy (Eq. 27), zero hanging.
 
@@ -349,6 +356,7 @@ class Model:
             2 * self.sigma_j * np.sin(phi[..., 0] / 2) ** 2 + 2 * self.kappa_j * np.sin(phi[..., 1] / 2) ** 2
         )
 
+    @typed()
     def energy(self, phi_rad: npt.ArrayLike, w_rad_s: npt.ArrayLike) -> Array:
         """Total energy (Eq. 22), zero hanging at rest.
 

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from pydpend.components import Configuration, Part, configuration, covariance, total, values
 from pydpend.errors import ModelError, fault
 from pydpend.model.pendulum import CONSTANTS, Model, uniform_bar
+from pydpend.typed import typed
 
 G_MM_S2 = 9810.0
 """Gravity as the paper's kappa implies it (erratum 28), mm/s2."""
@@ -118,6 +119,7 @@ def constants_of(
     return constants, cov, q
 
 
+@typed()
 def derived(config: str = "A", *, trackers: bool = False, given: Mapping[str, float] | None = None) -> Model:
     """The constants of a configuration from its parts (Table 8), corrected (ERRATA section 0), with covariance.
 
