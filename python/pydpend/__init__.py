@@ -50,6 +50,7 @@ from pydpend.nodes import Nodes, Rig, read_nodes
 from pydpend.scoring import Score, score
 from pydpend.simulation import Simulation, simulate, simulate_many
 from pydpend.tracking import OverlayFilm, Setup, info, overlay, setup, track
+from pydpend.tracks import read_tracks
 
 __version__: str = _native.VERSION
 
@@ -114,6 +115,7 @@ __all__ = [
     "read_holds",
     "read_model",
     "read_nodes",
+    "read_tracks",
     "savitzky_golay",
     "score",
     "setup",

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from pydpend.errors import Message, PydpendError, Setting, fault
 from pydpend.units import unit_at_end
 
-_EMPTY = frozenset({"", "nan", "na", "n/a", "null", "none"})
+EMPTY = frozenset({"", "nan", "na", "n/a", "null", "none"})
 """Fields (lower case, stripped) that mean "no value"."""
 
 _HEADER_WITHIN = 200
@@ -93,7 +93,7 @@ class Cells:
                     continue
             lines.append(line)
             for column, field in zip(out, here, strict=True):
-                column.append("" if field.lower() in _EMPTY else field)
+                column.append("" if field.lower() in EMPTY else field)
         if self.delimiter == ",":
             self._refuse_cut_numbers(dict(zip(index, out, strict=True)), set(index[:count]), lines)
         return Fields(dict(zip(wanted, out[:count], strict=True)), lines, units, units_line)
@@ -250,7 +250,7 @@ def take_apart(
     naming: Setting | None = None,
 ) -> Cells:
     """The text of a file and its header, the first line that holds every required name."""
-    text = _decoded(data).replace("\r\n", "\n").replace("\r", "\n")
+    text = decoded(data).replace("\r\n", "\n").replace("\r", "\n")
     if "\0" in text[:4096]:
         raise error(
             fault(
@@ -265,11 +265,12 @@ def take_apart(
 
 def names_on_first_line(data: bytes) -> list[str]:
     """The fields of a text's first line, parted by commas."""
-    line = _decoded(data).lstrip().replace("\r", "\n").partition("\n")[0]
+    line = decoded(data).lstrip().replace("\r", "\n").partition("\n")[0]
     return _names(line, ",")
 
 
-def _decoded(data: bytes) -> str:
+def decoded(data: bytes) -> str:
+    """The text of bytes in UTF-8, UTF-16 with or without its mark, or Latin-1."""
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return data.decode("utf-16", "replace")
     head = data[:512]
@@ -348,7 +349,7 @@ def _is_in_seconds(name: str) -> bool:
 
 def _is_word(field: str) -> bool:
     """Whether a field is neither a number nor empty, as the units under a header are."""
-    return field.lower() not in _EMPTY and not re.match(r"[+-]?[.,]?\d", field) and not _is_number(field)
+    return field.lower() not in EMPTY and not re.match(r"[+-]?[.,]?\d", field) and not _is_number(field)
 
 
 def _is_number(field: str) -> bool:

@@ -99,6 +99,8 @@ CALIBRATE = Step("pydpend calibrate", "dp.calibrate")
 """Makes the encoder's calibration."""
 ANALYSE = Step("pydpend analyse", "pydpend.analyse.analyse")
 """Does everything from films to a report."""
+IMPORT = Step("pydpend import {file} -o {out}", "dp.read_tracks({name})")
+"""Makes nodes of another program's tracks; its names are to be filled in."""
 FIT = Step("pydpend fit", "dp.fit_damping")
 """Fits the damping."""
 PREDICT = Step("pydpend predict", "pydpend.damping.predict")

@@ -1,12 +1,19 @@
-"""The kind of a file or folder by what is in it; `tracker::kind` of the compiled half decides, for both programs."""
+"""The kind of a file or folder by what is in it, for both programs.
+
+`tracker::kind` of the compiled half decides; what that does not know may be another program's tracks (`track_forms`).
+"""
 
 from __future__ import annotations
 
 import os
+import shlex
+from dataclasses import replace
+from pathlib import Path
 from typing import Literal, TypeAlias
 
 from pydpend import _native
-from pydpend.errors import Message, PydpendError, Setting
+from pydpend.errors import IMPORT, Message, PydpendError, Setting, fault
+from pydpend.track_forms import NOUNS, Form, form_of
 
 Kind: TypeAlias = Literal[
     "film",
@@ -28,14 +35,22 @@ Kind: TypeAlias = Literal[
     "npz",
     "compressed",
     "unknown",
+    "tracks",
 ]
-"""Of each, `Kind` in ``crates/tracker/src/kind.rs`` says what it is."""
+"""Of each but ``tracks``, another program's, `Kind` in ``crates/tracker/src/kind`` says what it is."""
 
 
 def kind_of(path: str | os.PathLike[str]) -> Kind:
     """The kind of a file or folder; ``unknown`` where nobody can tell, or there is none."""
     kind: Kind = _native.kind_of(os.fspath(path))
-    return kind
+    return kind if tracks_form(path) is None else "tracks"
+
+
+def tracks_form(path: str | os.PathLike[str]) -> Form | None:
+    """The form of another program's tracks; None for what is none, and for node tables."""
+    if _native.kind_of(os.fspath(path)) not in ("unknown", "spreadsheet"):
+        return None
+    return form_of(path)
 
 
 def misplaced(path: str | os.PathLike[str], wanted: tuple[Kind, ...]) -> Message | None:
@@ -43,8 +58,17 @@ def misplaced(path: str | os.PathLike[str], wanted: tuple[Kind, ...]) -> Message
 
     Where nothing is wanted, a command is.
     """
-    said: Message | None = _native.misplaced(os.fspath(path), list(wanted))
-    return said
+    form = tracks_form(path)
+    if form is None:
+        said: Message | None = _native.misplaced(os.fspath(path), list(wanted))
+        return said
+    if "tracks" in wanted:
+        return None
+    name = os.fspath(path)
+    out = shlex.quote(str(Path(name).with_suffix(".parquet")))
+    command = IMPORT.command.format(file=shlex.quote(name), out=out)
+    call = IMPORT.call.format(name=repr(name))
+    return fault(name, f"it is {NOUNS[form]}", "Next: " + replace(IMPORT, command=command, call=call))
 
 
 def expect(

@@ -37,7 +37,7 @@ LEAST_SIGMA_PX = 1e-3
 UNEVEN = 1e-3
 """Steps of time that differ by more than this part of the middle one are told."""
 
-SINGLE_POINT = "no bodies are given, so each node is one by itself and has no angle of its own"
+SINGLE_POINT = "no bodies are given: each node is a body by itself"
 
 
 @dataclass(frozen=True)
@@ -251,7 +251,7 @@ def _meta(tracks: RawTracks, rig: Rig, notes: list[str]) -> dict[str, Any]:
         "schema_version": 1,
         "tool": f"pydpend {_native.VERSION}",
         "source": {
-            "name": os.path.basename(tracks.source) or tracks.form,
+            "name": ", ".join(map(os.path.basename, tracks.source.split(", "))) or tracks.form,
             "container": tracks.form,
             "codec": "",
             "width": width,

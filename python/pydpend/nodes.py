@@ -17,7 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 from pydpend import _native
 from pydpend.bare_nodes import bare_tracks, is_bare
 from pydpend.crossing import Columns, HeldColumns
-from pydpend.errors import ArgumentError, TableError, fault
+from pydpend.errors import ArgumentError, Step, TableError, fault
+from pydpend.kinds import kind_of, misplaced
 from pydpend.marker_status import AMBIGUOUS, MISSING, REACQUIRED, SEEN, STATUS_WORDS, UNDECODED
 from pydpend.node_arrays import Bodies, Who, assembled
 from pydpend.output import AnyPath, path_of
@@ -109,7 +110,7 @@ class Nodes:
             Names of the nodes (N); n0, n1, ... by default.
         bodies : dict of str to sequence of str, or sequence of str, optional
             Nodes of each body, in the order from the pivot outwards, or the body of each node (N). A node of no body is
-            one by itself, which has no angle of its own.
+            one by itself.
         sigma_px : array_like, optional
             Standard uncertainty of each coordinate in px, above 0, for all, each node (N,) or each place (T, N). By
             default how the places scatter about smooth motion.
@@ -361,6 +362,9 @@ def read_nodes(path: AnyPath) -> Nodes:
         If the rig in it is wrong.
     """
     file = path_of(path)
+    said = misplaced(file, ("nodes",)) if kind_of(file) == "tracks" else None
+    if said is not None:
+        raise TableError(said)
     if is_bare(file):
         return nodes_of_tracks(bare_tracks(file))
     return nodes_of(_native.read_table(os.fsdecode(path)))
@@ -369,6 +373,6 @@ def read_nodes(path: AnyPath) -> Nodes:
 def nodes_of_tracks(tracks: RawTracks, bodies: Bodies = None) -> Nodes:
     """Nodes of tracks in pixels. Raises TableError if they have no times, and naming what else is wrong."""
     if tracks.t_s is None:
-        advice = "Write the time of each frame in s"
-        raise TableError(fault(tracks.source, "there is no column time_s", advice))
+        step = Step("pydpend import FILE --fps RATE -o nodes.parquet", "dp.read_tracks(path, fps=...)")
+        raise TableError(fault(tracks.source, "there is no column time_s", "Give the rate: " + step))
     return Nodes(*assembled(tracks, bodies, Who(tracks.source)))

@@ -32,9 +32,13 @@ COMMANDS: tuple[str, ...] = (
     "predict",
     "plot",
     "animate",
+    "import",
     "export",
     "completions",
 )
+
+MODULES = {"import": "import_tracks"}
+"""Modules of commands whose names are words of Python."""
 
 
 def _version() -> str:
@@ -90,7 +94,7 @@ def _parsers() -> tuple[Parser, dict[str, argparse.ArgumentParser]]:
     top.add_argument("--version", action="version", version=f"pydpend {_version()}")
     commands = top.add_subparsers(dest="command", metavar="COMMAND", required=True, parser_class=Parser)
     for name in COMMANDS:
-        module = importlib.import_module(f"pydpend.cli.{name}")
+        module = importlib.import_module(f"pydpend.cli.{MODULES.get(name, name)}")
         sub = commands.add_parser(
             name,
             help=module.HELP,
