@@ -10,7 +10,7 @@ import numpy as np
 import pydpend as dp
 import pytest
 from numpy.typing import NDArray
-from pydpend.kinematics.estimate import Method
+from pydpend.kinematics.estimators import Method
 
 Floats = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from pydpend.errors import AnglesError
 from pydpend.kinematics import LinkAngles, angles, find_linkage, find_rest, pair_angles
-from pydpend.kinematics.estimate import Method
+from pydpend.kinematics.estimators import Method
 from pydpend.kinematics.markers import body_markers
 
 from tests.support import two_links as rig

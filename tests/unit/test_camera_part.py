@@ -12,9 +12,10 @@ import pytest
 from numpy.typing import NDArray
 from pydpend._native import CAMERA_BY_EYE, plane_places, plane_slopes
 from pydpend.errors import AnglesError
-from pydpend.kinematics.estimate import ESTIMATORS, Method, _estimate
+from pydpend.kinematics.estimators import ESTIMATORS, Method, Wishes, estimate
 from pydpend.kinematics.files import NO_CAMERA_PART
 from pydpend.kinematics.markers import body_markers
+from pydpend.kinematics.structure import Structure
 from pydpend.nodes import Nodes
 
 from tests.support import aimed, two_links
@@ -31,7 +32,9 @@ def with_camera(nodes: Nodes, numbers: Floats, covariance: Floats | None = None)
 
 def turns(nodes: Nodes, estimator: Method) -> tuple[Floats, Floats]:
     """Turns (T, 2) before any zero, and their derivatives by the camera's numbers (T, 2, 5)."""
-    raw, seen = _estimate(nodes, body_markers(nodes), estimator, False, (None, 0.0))
+    markers = body_markers(nodes)
+    structure = Structure.of(nodes.rig, [m.name for m in markers])
+    raw, seen = estimate(nodes, markers, structure, Wishes(estimator, mirrored=False))
     return raw.theta, seen.slopes
 
 

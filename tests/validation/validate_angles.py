@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 from pydpend.kinematics import angles
-from pydpend.kinematics.estimate import Method
+from pydpend.kinematics.estimators import Method
 
 from tests.end_to_end.test_angles_film import measured
 from tests.support import two_links

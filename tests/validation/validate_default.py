@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from pydpend.kinematics import angles
-from pydpend.kinematics.estimate import Method
+from pydpend.kinematics.estimators import Method
 
 from tests.support import two_links
 from tests.unit.test_angles import tumbling

@@ -143,8 +143,9 @@ def angles(r: Recording, options: Options, here: Path, into: Path) -> str:
     else:
         estimator: Any = options.estimator
         nodes = _nodes(here, r)
-        if all(nodes.rig.indices(body).size < 2 for body in nodes.rig.bodies):
-            raise DoesNotApply("no body has two markers, so there is no link and no angle")
+        single = all(nodes.rig.indices(body).size < 2 for body in nodes.rig.bodies)
+        if single and not nodes.rig.joints:
+            raise DoesNotApply("no body has two markers or a joint, so there is no link and no angle")
         found = estimate(
             nodes,
             estimator,

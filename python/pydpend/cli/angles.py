@@ -43,6 +43,12 @@ def add_arguments(p: argparse.ArgumentParser) -> None:
         metavar="A,B",
         help="names of the links from the pivot outwards (default: all bodies of the rig)",
     )
+    p.add_argument(
+        "--pivot",
+        action="append",
+        metavar="[LINK=]X,Y[,SIGMA]",
+        help="where a link of one marker hangs, px in the picture, and how well that is known (1 px); again for others",
+    )
     p.add_argument("--mirrored", action="store_true", help="the film is mirror-inverted or taken from behind")
     p.add_argument("--link-length-m", type=float, metavar="M", help="pivot to elbow in metres, for the scale")
     p.add_argument(
@@ -78,6 +84,7 @@ def run(args: argparse.Namespace) -> int:
         bodies=args.bodies.split(",") if args.bodies else None,
         mirrored=args.mirrored,
         link_length_m=args.link_length_m,
+        pivot=_pivots(args.pivot),
         gaps=args.gaps,
     )
     write_angles(found, args.output)
@@ -121,6 +128,16 @@ def run(args: argparse.Namespace) -> int:
     for note in (*nodes.notes, *found.meta["notes"]):
         print(f"note: {note}", file=sys.stderr)
     return 1 if found.left_out else 0
+
+
+def _pivots(words: list[str] | None) -> Any:
+    from pydpend.number_words import numbers
+
+    if not words:
+        return None
+    named = [word.rpartition("=") for word in words]
+    places = {link: numbers(place, "pivot") for link, _, place in named}
+    return places[""] if list(places) == [""] else places
 
 
 def _zero(text: str) -> Any:

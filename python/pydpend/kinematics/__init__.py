@@ -12,11 +12,13 @@ from __future__ import annotations
 from pydpend.kinematics.estimate import angles, find_linkage
 from pydpend.kinematics.files import read_angles, write_angles, written_files
 from pydpend.kinematics.hanging import parse_zero, roll_sigma
-from pydpend.kinematics.linkage import Linkage, Shape
+from pydpend.kinematics.linkage import Linkage
 from pydpend.kinematics.misfit import misfits
 from pydpend.kinematics.names import LinkJoint
 from pydpend.kinematics.pairwise import PairAngles, pair_angles
 from pydpend.kinematics.pose import Pose, fit_pose
+from pydpend.kinematics.shape import Shape
+from pydpend.kinematics.structure import Structure
 from pydpend.kinematics.swing import Swing, find_swing
 from pydpend.kinematics.table import LinkAngles
 from pydpend.kinematics.zero import Rest, find_rest
@@ -29,6 +31,7 @@ __all__ = [
     "Pose",
     "Rest",
     "Shape",
+    "Structure",
     "Swing",
     "angles",
     "find_linkage",

@@ -87,6 +87,11 @@ class BodyView:
     def of(cls, nodes: Nodes, pose: Pose, mirrored: bool) -> BodyView:
         """A body with its poses in a recording."""
         used = pose.markers.without(~pose.used)
+        if pose.is_alone:
+            # It has no shape that could tell of the camera, and no turn of its own.
+            seen = np.where(used.seen[:, 0], 0.0, np.nan)
+            still = np.zeros((1, 2, CAMERA_NUMBERS))
+            return cls(nodes, used, seen, pose.template_px, mirrored=mirrored, template_moves=still)
         return cls(nodes, used, pose.theta_rad, pose.template_px, mirrored=mirrored)
 
     def _slopes(self, recorded_px: Floats) -> Floats:
@@ -156,6 +161,8 @@ class BodyView:
 
     def evidence(self, centre_px: Floats) -> Evidence:
         """Information of residuals about poses at ``centre_px`` (T, 2), with the shape from the frames that count."""
+        if self.template_px.shape[0] == 1:
+            return Evidence(np.zeros((CAMERA_NUMBERS, CAMERA_NUMBERS)), np.zeros(CAMERA_NUMBERS), 0.0, 0)
         rows = self._key_frames(centre_px)
         moves = self.shape_moves(rows)
         information, score = np.zeros((CAMERA_NUMBERS, CAMERA_NUMBERS)), np.zeros(CAMERA_NUMBERS)

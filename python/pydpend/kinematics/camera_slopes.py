@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -11,11 +11,13 @@ from numpy.typing import NDArray
 
 from pydpend.kinematics.body_view import BodyView, chunks
 from pydpend.kinematics.camera import central_differences
-from pydpend.kinematics.linkage import FIT_FRAMES, Frames, Shape, fit_shape
-from pydpend.kinematics.linkage_frames import LinkageAngles, angles_of
+from pydpend.kinematics.first_shape import FIT_FRAMES
+from pydpend.kinematics.linkage import Given, eliminated, inverted, normal_priors
+from pydpend.kinematics.linkage_frames import LinkageAngles
 from pydpend.kinematics.markers import BodyMarkers, body_markers
 from pydpend.kinematics.pairwise import pair_angles
 from pydpend.kinematics.pose import evenly, solve
+from pydpend.kinematics.shape import Frames, Shape, State, information, predicted, regular, shape_response
 from pydpend.kinematics.table import CAMERA_NUMBERS, Floats
 
 NEAR_ZERO_RAD = np.radians(0.3)
@@ -61,38 +63,50 @@ def _pairwise(view: BodyView) -> Floats:
     return np.concatenate(parts)
 
 
-def linkage_slopes(views: Sequence[BodyView], weight: Floats, linked: LinkageAngles) -> Floats:
-    """Derivatives (T, L, 5) of the linkage's angles, its shape fitted again, by central differences.
+def linkage_slopes(
+    views: Sequence[BodyView], linked: LinkageAngles, given: Mapping[str, Given] | None = None
+) -> Floats:
+    """Derivatives (T, L, 5) of the linkage's angles by the camera's numbers, its shape fitted again.
 
-    ``weight`` (T, N): of all markers, the upper link's first. The mean over the frames is that of the rigid poses':
-    where the shape stands in the reference picture is theirs.
+    ``given``: joints that are known. The mean over the frames is that of the rigid poses': where the shape stands in
+    the reference picture is theirs.
     """
-    theta = linked.theta_rad
+    shape, theta = linked.linkage.shape, linked.theta_rad
+    frames = Frames.of([view.markers for view in views], shape)
+    w = frames.w.copy()
+    w[:, : len(shape.of_link)] = np.where(linked.used, w[:, : len(shape.of_link)], 0.0)
     posed = np.stack([np.isfinite(view.theta_rad) for view in views], axis=1)
     rows = np.flatnonzero((np.isfinite(theta) & posed).all(axis=1))
     rows = rows[evenly(rows.size, FIT_FRAMES)]
-    shapes: dict[tuple[int, bool], Shape] = {}
-
-    def shape_of(number: int, step: float) -> Shape:
-        key = (number, step > 0)
-        if key not in shapes:
-            moved = [_moved(view, rows, number, step) for view in views]
-            shapes[key] = fit_shape(moved, linked.linkage.shape, theta[rows])[0].shape
-        return shapes[key]
-
+    normal = normal_priors(shape, given)
+    right = np.zeros((len(normal), CAMERA_NUMBERS))
+    for part in chunks(rows.size):
+        some = rows[part]
+        _, slopes = predicted(shape, linked.state.at(some))
+        told = eliminated(shape, w[some], theta[some], slopes, _all_moves(views, shape, some))
+        normal, right = normal + told.normal, right + told.right
+    follows = inverted(shape, normal) @ right
     out = np.full((*theta.shape, CAMERA_NUMBERS), np.nan)
     for part in chunks(theta.shape[0]):
-
-        def turned(number: int, step: float, part: slice = part) -> Floats:
-            frames = Frames.of([_moved(view, part, number, step) for view in views])
-            used = Frames(frames.xy, np.where(linked.used[part], weight[part], 0.0))
-            return angles_of(shape_of(number, step), used, theta[part])
-
-        out[part] = central_differences(turned)
+        state = State(np.nan_to_num(theta[part]), np.nan_to_num(linked.state.place[part]))
+        _, slopes = predicted(shape, state)
+        inverse = np.asarray(np.linalg.inv(regular(information(w[part], slopes))))
+        moves = _all_moves(views, shape, part) * w[part][..., None, None]
+        direct = inverse @ np.einsum("tkdu,tkdc->tuc", slopes, moves)
+        response = shape_response(shape, state.theta, w[part], slopes, inverse)
+        out[part] = (direct + response @ follows)[:, : shape.links]
+    out = np.where(np.isfinite(theta)[..., None], out, np.nan)
     rigid = rigid_slopes(views)
     both = np.isfinite(rigid) & np.isfinite(out)
     apart = np.where(both, out - rigid, 0.0).sum(axis=0) / np.maximum(both.sum(axis=0), 1)
     return np.asarray(out - apart)
+
+
+def _all_moves(views: Sequence[BodyView], shape: Shape, rows: NDArray[np.int64] | slice) -> Floats:
+    """Derivatives (n, N + C, 2, 5) of all places of some frames by the camera's numbers; closures stay."""
+    moves = np.concatenate([view.moves(rows) for view in views], axis=1)
+    still = np.zeros((len(moves), len(shape.closures), 2, CAMERA_NUMBERS))
+    return np.concatenate([moves, still], axis=1)
 
 
 def zero_slopes(

@@ -2,37 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from collections.abc import Mapping, Sequence
+from typing import Literal
 
 import numpy as np
 
-from pydpend.errors import CHECK, AnglesError, Setting, Text, fault, one_of
-from pydpend.kinematics.body_view import BodyView
-from pydpend.kinematics.camera import CameraPart, camera_part, known
-from pydpend.kinematics.camera_slopes import linkage_slopes, pairwise_slopes, rigid_slopes, zero_slopes
+from pydpend.errors import CHECK, AnglesError, Setting, fault
+from pydpend.kinematics.camera_slopes import zero_slopes
+from pydpend.kinematics.estimators import Method, Wishes, estimate, poses_of
 from pydpend.kinematics.hanging import VERTICAL, Raw, zero_for
-from pydpend.kinematics.linkage import Linkage, Shape, first_shape
-from pydpend.kinematics.linkage_frames import checked_sigma, fit_linkage
-from pydpend.kinematics.markers import BodyMarkers, body_markers, sigma_to_image, to_image
-from pydpend.kinematics.names import ColumnNames
-from pydpend.kinematics.pairwise import pair_angles
-from pydpend.kinematics.pose import Pose, fit_pose
+from pydpend.kinematics.linkage import Linkage
+from pydpend.kinematics.linkage_frames import fit_linkage
+from pydpend.kinematics.markers import BodyMarkers, body_markers
+from pydpend.kinematics.pivots import with_pivots
 from pydpend.kinematics.structure import Structure
 from pydpend.kinematics.table import Floats, LinkAngles
 from pydpend.kinematics.unwrap import unwrap
 from pydpend.nodes import Nodes
 from pydpend.typed import typed
 
-if TYPE_CHECKING:
-    from pydpend.nodes import Rig
 
-Method = Literal["rigid", "linkage", "pairwise"]
-ESTIMATORS: tuple[Method, ...] = get_args(Method)
-
-
-@typed("zero", "method")
+@typed("zero", "method", "pivot")
 def angles(
     nodes: Nodes,
     estimator: Method = "rigid",
@@ -42,6 +32,7 @@ def angles(
     mirrored: bool = False,
     link_length_m: float | None = None,
     link_length_sigma_m: float = 0.0,
+    pivot: Sequence[float] | Mapping[str, Sequence[float]] | None = None,
     gaps: Literal["error", "stop"] = "error",
     name: str | None = None,
     method: None = None,
@@ -70,6 +61,10 @@ def angles(
         Distance of pivot and elbow, m; it puts the scale into ``meta["linkage"]``.
     link_length_sigma_m : float
         Standard uncertainty of that distance, m.
+    pivot : sequence of float or dict of str to sequence of float, optional
+        Where a link of one marker hangs, if that was not found: place (x, y) in the picture, px (x right, y down), and
+        as a third number its standard uncertainty, 1 px if not given (a place pointed at); of several links by their
+        names. It is taken together with what the motion says.
     gaps : {"error", "stop"}
         What to do where a link was hidden for so long that a turn may be lost (more than ``pi / |w|``): refuse, or
         leave the link's angles out from there on and say so in ``meta["notes"]``.
@@ -100,7 +95,10 @@ def angles(
     markers = body_markers(nodes, bodies, mirrored)
     _check_length(estimator, len(markers), link_length_m, link_length_sigma_m)
     label = name if name is not None else _label(nodes)
-    raw, seen = _estimate(nodes, markers, estimator, mirrored, (link_length_m, link_length_sigma_m))
+    nodes, given = with_pivots(nodes, markers, pivot, mirrored)
+    structure = Structure.of(nodes.rig, [m.name for m in markers])
+    wishes = Wishes(estimator, mirrored, link_length_m, link_length_sigma_m, given)
+    raw, seen = estimate(nodes, markers, structure, wishes)
     notes: list[str] = list(raw.meta.pop("notes", ()))
     ending = nodes.meta.get("ending")
     if isinstance(ending, dict) and ending.get("kind") != "complete":
@@ -122,9 +120,11 @@ def angles(
     for key in ("source", "time"):
         if nodes.meta.get(key) is not None:
             meta[key] = nodes.meta[key]
-    sigma = _with_time(nodes.t_s, phi, white, _time_sigma_s(nodes))
+    sigma, covariance = _with_time(nodes, phi, white, raw)
     links, joints = raw.structure.links, raw.structure.between()
-    return LinkAngles(nodes.t_s, phi, sigma, nodes.frame, meta, label, camera.columns_rad, links, joints)
+    return LinkAngles(
+        nodes.t_s, phi, sigma, nodes.frame, meta, label, camera.columns_rad, links, joints, covariance
+    )
 
 
 def _check_hanging(structure: Structure, zero: object, label: str) -> None:
@@ -144,41 +144,31 @@ def _check_hanging(structure: Structure, zero: object, label: str) -> None:
         )
 
 
-def _check_chain(structure: Structure, wish: Text) -> None:
-    """Raises AnglesError where what is wished needs a pendulum of one or two links."""
-    if len(structure.links) > 2 or not structure.is_chain:
-        raise AnglesError(
-            fault(
-                wish,
-                f"the links {', '.join(structure.links)} are no pendulum of one or two",
-                "Use "
-                + Setting("estimator", "rigid")
-                + " without it, or name the pendulum's with "
-                + Setting("bodies"),
-            )
-        )
-
-
 def _time_sigma_s(nodes: Nodes) -> float:
     """Standard uncertainty of each frame's time in s, as the table says; 0 where it says nothing."""
     time = nodes.meta.get("time")
     return float(time.get("sigma_s", 0.0)) if isinstance(time, dict) else 0.0
 
 
-def _with_time(t_s: Floats, phi: Floats, sigma: Floats, time_sigma_s: float) -> Floats:
-    """Standard uncertainties (T, L), rad, of angles whose times have one too, each frame's own.
+def _with_time(nodes: Nodes, phi: Floats, white: Floats, raw: Raw) -> tuple[Floats, Floats | None]:
+    """Standard uncertainties (T, L) of angles, rad, with that of their times, and their covariance (T, L, L), if any.
 
-    A link that turns with w is at another angle by ``w dt``.
+    A link that turns with w is at another angle by ``w dt``, all of a frame with the same dt. ``white``: their noise.
     """
-    if time_sigma_s == 0.0:
-        return sigma
-    out = sigma.copy()
-    for k in range(phi.shape[1]):
-        seen = np.flatnonzero(np.isfinite(phi[:, k]))
-        if seen.size > 1:
-            rate = np.gradient(phi[seen, k], t_s[seen])
-            out[seen, k] = np.hypot(sigma[seen, k], rate * time_sigma_s)
-    return out
+    rate = np.zeros_like(phi)
+    time_sigma_s = _time_sigma_s(nodes)
+    if time_sigma_s > 0:
+        for k in range(phi.shape[1]):
+            seen = np.flatnonzero(np.isfinite(phi[:, k]))
+            if seen.size > 1:
+                rate[seen, k] = np.gradient(phi[seen, k], nodes.t_s[seen])
+    late = rate * time_sigma_s
+    sigma = np.hypot(white, late)
+    if raw.covariance_rad2 is None:
+        return sigma, None
+    grown = np.where(raw.sigma > 0, white / raw.sigma, 1.0)
+    covariance = raw.covariance_rad2 * grown[:, :, None] * grown[:, None, :]
+    return sigma, covariance + late[:, :, None] * late[:, None, :]
 
 
 @typed()
@@ -204,9 +194,8 @@ def find_linkage(nodes: Nodes, *, bodies: Sequence[str] | None = None, mirrored:
     AnglesError
         If the links turn too little to find the joints.
     """
-    poses = [fit_pose(m) for m in body_markers(nodes, bodies, mirrored)]
-    _check_chain(Structure.of(nodes.rig, [p.markers.name for p in poses]), "find_linkage")
-    return fit_linkage(poses[0], poses[1] if len(poses) > 1 else None).linkage
+    poses = poses_of(body_markers(nodes, bodies, mirrored))
+    return fit_linkage(poses, Structure.of(nodes.rig, [p.markers.name for p in poses])).linkage
 
 
 def _check_length(estimator: Method, links: int, length_m: float | None, length_sigma_m: float) -> None:
@@ -232,142 +221,6 @@ def _check_length(estimator: Method, links: int, length_m: float | None, length_
 def _label(nodes: Nodes) -> str:
     source = nodes.meta.get("source")
     return str(source.get("name", "nodes")) if isinstance(source, dict) else "nodes"
-
-
-@dataclass(frozen=True, eq=False)
-class _Seen:
-    """The bodies through the camera: how their turns follow its numbers, (T, L, 5), and their poses."""
-
-    views: list[BodyView]
-    poses: list[Pose]
-    slopes: Floats
-
-    def part(self, rig: Rig, at_zero: Floats, sigma: Floats) -> tuple[CameraPart, Floats]:
-        """The camera's part in the angles, and their noise (T, L).
-
-        ``at_zero`` (L, 5): derivatives of their zero. ``sigma`` (T, L): their noise as the residuals say. Where these
-        are the camera's, that is not noise: what they are with the camera that they ask for is.
-        """
-        evidence = [v.evidence(p.centre_px) for v, p in zip(self.views, self.poses, strict=True)]
-        camera = known(rig, evidence)
-        white = sigma.copy()
-        if camera.significant:
-            for k, (view, pose) in enumerate(zip(self.views, self.poses, strict=True)):
-                square = fit_pose(view.moved(camera.asked))
-                both = np.isfinite(pose.sigma_rad) & np.isfinite(square.sigma_rad)
-                less = square.sigma_scale / pose.sigma_scale
-                white[:, k] *= np.where(both, square.sigma_rad / pose.sigma_rad, less)
-        names = ColumnNames(tuple(view.markers.name for view in self.views))
-        return camera_part(rig, camera, self.slopes, at_zero, white, names), white
-
-
-def _estimate(
-    nodes: Nodes,
-    markers: list[BodyMarkers],
-    estimator: Method,
-    mirrored: bool,
-    length: tuple[float | None, float],
-) -> tuple[Raw, _Seen]:
-    """Turns by an estimator; ``length``: distance of pivot and elbow and its standard uncertainty, m."""
-    rig, (length_m, length_sigma_m) = nodes.rig, length
-    structure = Structure.of(rig, [m.name for m in markers])
-    if estimator not in ESTIMATORS:
-        raise AnglesError(one_of("estimator", estimator, ESTIMATORS))
-    if estimator == "linkage" or length_m is not None:
-        _check_chain(
-            structure, Setting("estimator", estimator) if length_m is None else Setting("link_length_m")
-        )
-    poses = [fit_pose(m) for m in markers]
-    views = [BodyView.of(nodes, pose, mirrored) for pose in poses]
-    if estimator == "pairwise":
-        pairs = [pair_angles(m) for m in markers]
-        scales = [pose.sigma_scale for pose in poses]
-        meta = {
-            "bodies": [
-                {
-                    "name": m.name,
-                    "nodes": list(m.nodes),
-                    "median_scatter_rad": float(np.nanmedian(p.scatter_rad)),
-                    "median_sigma_rad": s * float(np.nanmedian(p.sigma_rad)),
-                    "sigma_scale": s,
-                }
-                for m, p, s in zip(markers, pairs, scales, strict=True)
-            ],
-            "notes": [
-                "the scatter of the pairs (Eq. 32) is not the error of their mean; sigma is the latter"
-            ],
-        }
-        theta = np.stack([p.mean_rad for p in pairs], axis=1)
-        sigma = np.stack([p.sigma_rad * s for p, s in zip(pairs, scales, strict=True)], axis=1)
-        seen = _Seen(views, poses, pairwise_slopes(views))
-        return Raw(theta, sigma, [m.reference_px for m in markers], None, meta, structure), seen
-    meta = {"bodies": [_body_meta(p) for p in poses]}
-    lower = poses[1] if len(poses) > 1 else None
-    if estimator == "rigid":
-        theta = np.stack([p.theta_rad for p in poses], axis=1)
-        sigma = np.stack([p.sigma_rad for p in poses], axis=1)
-        shape = None
-        if length_m is not None:
-            linked = fit_linkage(poses[0], lower)
-            shape = linked.linkage.shape
-            meta["linkage"] = _linkage_meta(linked.linkage, rig, mirrored, length_m, length_sigma_m)
-        else:
-            shape = _shape_or_none(poses) if structure.is_chain else None
-        seen = _Seen(views, poses, rigid_slopes(views))
-        return Raw(theta, sigma, [p.template_px for p in poses], shape, meta, structure), seen
-    linked = fit_linkage(poses[0], lower)
-    meta["linkage"] = _linkage_meta(linked.linkage, rig, mirrored, length_m, length_sigma_m)
-    sigma, meta["notes"] = checked_sigma(linked, poses)
-    shape = linked.linkage.shape
-    templates = [shape.upper_px] if lower is None else [shape.upper_px, shape.lower_px]
-    weight = np.concatenate([pose.markers.weight for pose in poses], axis=1)
-    seen = _Seen(views, poses, linkage_slopes(views, weight, linked))
-    return Raw(linked.theta_rad, sigma, templates, shape, meta, structure), seen
-
-
-def _shape_or_none(poses: list[Pose]) -> Shape | None:
-    """The joints of one or two links from the motion; ``None`` of more, or if they turn too little to show them."""
-    if len(poses) > 2:
-        return None
-    try:
-        return first_shape(poses[0], poses[1] if len(poses) > 1 else None)
-    except AnglesError:
-        return None
-
-
-def _body_meta(pose: Pose) -> dict[str, Any]:
-    dropped = (pose.markers.seen & ~pose.used).sum(axis=0)
-    return {
-        "name": pose.markers.name,
-        "nodes": list(pose.markers.nodes),
-        "sigma_scale": pose.sigma_scale,
-        "covered_factor": pose.covered_factor,
-        "frames_without_angle": int(np.isnan(pose.theta_rad).sum()),
-        "doubtful_frames": int(pose.doubtful.sum()),
-        "markers_left_out": {
-            n: int(c) for n, c in zip(pose.markers.nodes, dropped.tolist(), strict=True) if c
-        },
-    }
-
-
-def _linkage_meta(
-    linkage: Linkage, rig: Rig, mirrored: bool, length_m: float | None, length_sigma_m: float
-) -> dict[str, Any]:
-    """Places in recorded pixels, lengths and the scale in square ones."""
-    meta: dict[str, Any] = {
-        "pivot_px": to_image(linkage.shape.pivot_px, rig, mirrored).tolist(),
-        "pivot_sigma_px": sigma_to_image(linkage.pivot_sigma_px, rig).tolist(),
-        "sigma_scale": linkage.sigma_scale,
-    }
-    if linkage.shape.links == 2:
-        elbow = linkage.shape.pivot_px + linkage.shape.elbow_px
-        meta["elbow_in_reference_frame_px"] = to_image(elbow, rig, mirrored).tolist()
-        meta["link_length_px"] = linkage.length_px
-        meta["link_length_sigma_px"] = linkage.length_sigma_px
-        if length_m is not None:
-            scale, sigma = linkage.metres_per_px(length_m, length_sigma_m)
-            meta["scale_m_per_px"], meta["scale_sigma_m_per_px"] = scale, sigma
-    return meta
 
 
 def _unwrapped(

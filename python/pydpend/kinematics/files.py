@@ -117,7 +117,18 @@ def read_angles(
     check_table(str(path), (t, phi, read.sigma_rad, read.frame), ColumnNames(read.names), place)
     if table is None or not table.has_instants:
         refuse_stamps(str(path), t, AnglesError, lambda row: place(row, "time_s"))
-    return LinkAngles(t, phi, read.sigma_rad, read.frame, meta, label, camera, read.names, read.joints)
+    return LinkAngles(
+        t,
+        phi,
+        read.sigma_rad,
+        read.frame,
+        meta,
+        label,
+        camera,
+        read.names,
+        read.joints,
+        read.covariance_rad2,
+    )
 
 
 def _from_first(t: Floats, table: Columns, column: str) -> tuple[Floats, list[str]]:
@@ -148,6 +159,7 @@ class _Read:
     frame: NDArray[np.int64] | None = None
     joints: tuple[LinkJoint, ...] = ()
     camera_rad: Floats | None = None
+    covariance_rad2: Floats | None = None
     table: Columns | None = None
     theirs: dict[str, str] = field(default_factory=dict)
 
@@ -172,6 +184,34 @@ def _read_camera(path: Path, table: Columns, stems: list[str]) -> Floats | None:
         )
     columns = np.stack([table.values[name] for name in names], axis=1)
     return columns.reshape(table.rows, len(stems), CAMERA_NUMBERS)
+
+
+def _read_covariance(
+    path: Path, table: Columns, stems: list[str], sigma_rad: list[Floats | None]
+) -> Floats | None:
+    """The covariance (T, L, L) of the links' noise; None where a table has none.
+
+    Raises :class:`AnglesError` where some are missing.
+    """
+    names = {
+        (a, b): f"covariance_{stems[a]}_{stems[b]}_rad2"
+        for a, b in itertools.combinations(range(len(stems)), 2)
+    }
+    missing = [name for name in names.values() if name not in table.values]
+    sigmas = [s for s in sigma_rad if s is not None]
+    if len(missing) == len(names) or len(sigmas) < len(stems):
+        return None
+    if missing:
+        there = next(name for name in names.values() if name in table.values)
+        raise AnglesError(
+            fault(str(path), f"{there} is there and {missing[0]} is not", "Keep all covariances, or none")
+        )
+    out = np.zeros((table.rows, len(stems), len(stems)))
+    for k, s in enumerate(sigmas):
+        out[:, k, k] = s**2
+    for (a, b), name in names.items():
+        out[:, a, b] = out[:, b, a] = table.values[name]
+    return out
 
 
 def _check_units(path: Path, table: Columns, theirs: Mapping[str, str]) -> None:
@@ -249,6 +289,7 @@ def _read_table(path: Path, columns: dict[str, str]) -> _Read:
         _frames(path, table, theirs.get("frame")),
         joints,
         _read_camera(path, table, stems),
+        _read_covariance(path, table, stems, sigmas),
         table,
         theirs,
     )

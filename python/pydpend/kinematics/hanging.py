@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from pydpend.errors import AnglesError, Setting, fault
-from pydpend.kinematics.linkage import Shape
+from pydpend.kinematics.linkage_frames import LinkageAngles, turns_by
 from pydpend.kinematics.markers import BodyMarkers, body_markers
 from pydpend.kinematics.pose import solve
 from pydpend.kinematics.rests import (
@@ -24,6 +24,7 @@ from pydpend.kinematics.rests import (
     unconfirmed,
     unconfirmed_sigma,
 )
+from pydpend.kinematics.shape import Shape
 from pydpend.kinematics.structure import Structure
 from pydpend.kinematics.swing import Swing, find_swing
 from pydpend.kinematics.table import Floats, LinkAngles
@@ -42,7 +43,8 @@ VERTICAL = "vertical"
 class Raw:
     """Turns from the rig's reference picture before unwrapping, (T, L), and what they came from.
 
-    ``structure``: what hangs on what.
+    ``structure``: what hangs on what. ``linked``: the linkage, where angles of some links are by it;
+    ``covariance_rad2`` (T, L, L): of all angles' noise, where it is.
     """
 
     theta: Floats
@@ -51,6 +53,8 @@ class Raw:
     shape: Shape | None
     meta: dict[str, Any]
     structure: Structure
+    linked: LinkageAngles | None = None
+    covariance_rad2: Floats | None = None
 
 
 def parse_zero(text: str) -> str | list[float] | None:
@@ -221,8 +225,12 @@ def _zero_from_reference(
             )
         )
     poses = [solve(m.xy_px, m.weight, p) for m, p in zip(others, raw.templates, strict=True)]
-    turns = np.stack([unwrap(reference.t_s, p.theta)[0] for p in poses], axis=1)
-    sigma = np.stack([p.information**-0.5 for p in poses], axis=1)
+    theta = np.stack([p.theta for p in poses], axis=1)
+    sigma = np.stack([p.information for p in poses], axis=1) ** -0.5
+    for k, other in enumerate(others):
+        if len(other.nodes) == 1 and raw.linked is not None:
+            theta[:, k], sigma[:, k] = turns_by(raw.linked.linkage, others, other.name)
+    turns = np.stack([unwrap(reference.t_s, column)[0] for column in theta.T], axis=1)
     rests = find_rest(LinkAngles(reference.t_s, turns, sigma, name="reference recording"))
     down = picture_down(raw.shape, reference, markers, mirrored)
     swing = None

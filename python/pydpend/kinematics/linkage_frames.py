@@ -2,26 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pydpend.errors import Setting
-from pydpend.kinematics.linkage import (
-    FIT_FRAMES,
+from pydpend.errors import AnglesError, Setting, fault
+from pydpend.kinematics.first_shape import FIT_FRAMES, first_shape, first_state, known_links, posed
+from pydpend.kinematics.linkage import Given, Linkage, fit_shape
+from pydpend.kinematics.markers import BodyMarkers
+from pydpend.kinematics.names import ColumnNames
+from pydpend.kinematics.pose import Pose, evenly
+from pydpend.kinematics.scale import hidden_factor, inflation, partly_hidden, pooled_scale2, reject_limit
+from pydpend.kinematics.shape import (
     Frames,
-    Linkage,
     Shape,
-    first_shape,
-    fit_shape,
+    State,
     information,
     predicted,
     regular,
     remaining,
+    shape_response,
 )
-from pydpend.kinematics.pose import Pose, evenly, rotate
-from pydpend.kinematics.scale import hidden_factor, inflation, partly_hidden, pooled_scale2, reject_limit
+from pydpend.kinematics.structure import Structure
 from pydpend.kinematics.table import Floats
 
 _STEPS = 6
@@ -30,61 +34,86 @@ _STEPS = 6
 _TIE = 0.8
 """Two markers whose misfits are within this ratio are both left out: which is wrong cannot be told."""
 
+_SETTLED = 1e-7
+"""A step of a frame's unknowns, rad or px, after which no more is taken: the next one would be its square."""
+
 _CHUNK = 8192
 
 
 @dataclass(frozen=True, eq=False)
 class LinkageAngles:
-    """Angles of both links in T frames by the linkage; NaN where they cannot be had.
+    """Angles of the links in T frames by the linkage; NaN where they cannot be had.
 
-    ``theta_rad``, ``sigma_rad`` (T, L); ``used`` (T, N): markers used, the upper link's first; ``chi2``,
-    ``dof`` (T,) of the residuals with the stated sigmas. ``sigma_scale`` (L,): factor by which the residuals make
-    the stated sigmas larger, as each angle feels it; it is in ``sigma_rad``.
+    ``state``: angles (T, L), and places of the trees that hang on nothing. ``covariance_rad2`` (T, L, L): of the
+    angles' noise. ``used`` (T, N): markers used, the first link's first; ``chi2``, ``dof`` (T,) of the residuals with
+    the stated sigmas. ``sigma_scale`` (L,): factor by which the residuals make the stated sigmas larger, as each angle
+    feels it; it is in ``covariance_rad2``.
     """
 
     linkage: Linkage
-    theta_rad: Floats
-    sigma_rad: Floats
+    state: State
+    covariance_rad2: Floats
     used: NDArray[np.bool_]
     chi2: Floats
     dof: NDArray[np.int64]
     sigma_scale: Floats
 
+    @property
+    def theta_rad(self) -> Floats:
+        """The angles (T, L)."""
+        return self.state.theta
 
-def fit_linkage(upper: Pose, lower: Pose | None) -> LinkageAngles:
+    @property
+    def sigma_rad(self) -> Floats:
+        """Their standard uncertainties (T, L)."""
+        return np.asarray(np.sqrt(np.einsum("taa->ta", self.covariance_rad2)))
+
+
+def fit_linkage(
+    poses: list[Pose], structure: Structure, given: Mapping[str, Given] | None = None
+) -> LinkageAngles:
     """Shape from the whole recording, then the angles of every frame.
 
     Raises :class:`~pydpend.errors.AnglesError` if the links turn too little to find the joints.
     """
-    poses = [upper] if lower is None else [upper, lower]
-    shape = first_shape(upper, lower)
-    theta = np.stack([p.theta_rad for p in poses], axis=1)
-    rows = np.flatnonzero(np.isfinite(theta).all(axis=1))
+    structure = structure.as_pendulum()
+    shape = first_shape(poses, structure, {name: g.place_px for name, g in (given or {}).items()})
+    clean = Frames.of([p.markers.without(~p.used) for p in poses], shape)
+    state = first_state(shape, clean, *posed(shape, poses))
+    known = known_links(shape, clean.w[:, : len(shape.of_link)] > 0) & np.isfinite(state.theta)
+    rows = np.flatnonzero(known.all(axis=1))
+    if not rows.size:
+        problem = "there is no frame in which all of " + ", ".join(structure.links) + " can be told"
+        raise AnglesError(fault("nodes", problem, "Name fewer links with " + Setting("bodies")))
     rows = rows[evenly(rows.size, FIT_FRAMES)]
-    clean = [p.markers.without(~p.used) for p in poses]
-    linkage, _ = fit_shape([m.at(rows) for m in clean], shape, theta[rows])
-    frames = Frames.of([p.markers for p in poses])
-    start = _start(linkage.shape, frames, theta)
-    return _all_frames(linkage, frames, start)
+    linkage, _ = fit_shape(clean.at(rows), shape, state.at(rows), given)
+    frames = Frames.of([p.markers for p in poses], linkage.shape)
+    return _all_frames(linkage, frames, first_state(linkage.shape, frames, *posed(linkage.shape, poses)))
 
 
-def angles_of(shape: Shape, frames: Frames, start: Floats) -> Floats:
-    """Angles (T, L) of frames by the linkage of a shape, from angles nearby; NaN where these are."""
-    known = np.isfinite(start)
-    return np.where(known, _solve(shape, frames, start).theta, np.nan)
+def turns_by(linkage: Linkage, markers: list[BodyMarkers], link: str) -> tuple[Floats, Floats]:
+    """Turns (T,) of a link in another recording by the shape of this one, and their standard uncertainties (T,)."""
+    links = linkage.shape.structure.links
+    frames = Frames.of([m for m in markers if m.name in links], linkage.shape)
+    total = frames.w.shape[0]
+    nothing = np.full((total, len(links)), np.nan)
+    start = first_state(linkage.shape, frames, nothing, np.full((total, len(links), 2), np.nan))
+    found, k = _all_frames(linkage, frames, start), links.index(link)
+    return found.theta_rad[:, k], found.sigma_rad[:, k]
 
 
 def checked_sigma(linked: LinkageAngles, poses: list[Pose]) -> tuple[Floats, list[str]]:
-    """The linkage's standard errors held against the rigid poses, and a note where they had to grow.
+    """The linkage's covariance (T, L, L) held against the rigid poses, and a note where it had to grow.
 
     A camera that shakes, play in a joint or a lens moves the linkage's angles but hardly the rigid ones. If
     the linkage is right, the two differ with variance ``sigma_rigid^2 - sigma_linkage^2`` (Hausman,
     Econometrica 46 (1978) 1251). What they differ by beyond that is the linkage's error and goes into its
     sigma.
     """
-    alone = float(np.sqrt(np.mean([p.sigma_scale**2 for p in poses])))
+    alone = float(np.sqrt(np.mean([p.sigma_scale**2 for p in poses if not p.is_alone] or [1.0])))
     sigma = linked.sigma_rad.copy()
     notes = []
+    names = ColumnNames(linked.linkage.shape.structure.links)
     for k, pose in enumerate(poses):
         apart = np.angle(np.exp(1j * (linked.theta_rad[:, k] - pose.theta_rad)))
         known = np.isfinite(apart) & np.isfinite(sigma[:, k])
@@ -101,127 +130,115 @@ def checked_sigma(linked: LinkageAngles, poses: list[Pose]) -> tuple[Floats, lis
             before = float(np.sqrt(np.median(sigma[known, k] ** 2)))
             sigma[:, k] = np.sqrt((sigma[:, k] / linked.sigma_scale[k] * alone) ** 2 + bias2)
             notes.append(
-                f"phi{k + 1} by the linkage is off by {np.degrees(np.sqrt(bias2)):.2g} deg beyond its noise of "
+                f"{names.stem(k)} by the linkage is off by {np.degrees(np.sqrt(bias2)):.2g} deg beyond its noise of "
                 f"{np.degrees(before):.2g} deg (the camera moves, a joint has play or the lens distorts); its sigma "
                 f"includes that, {Setting('estimator', 'rigid')} is free of it"
             )
-    return sigma, notes
+    grown = sigma / linked.sigma_rad
+    return linked.covariance_rad2 * grown[:, :, None] * grown[:, None, :], notes
 
 
-def _start(shape: Shape, frames: Frames, theta: Floats) -> Floats:
-    """Fills angles that the rigid pose could not give: one marker and a joint have a direction too."""
-    theta = theta.copy()
-    k1 = shape.upper_px.shape[0]
-    if shape.links == 2:
-        # No upper marker: the elbow is where the lower link's pose puts it.
-        rows = np.flatnonzero(
-            np.isnan(theta[:, 0]) & ~np.isnan(theta[:, 1]) & ~(frames.w[:, :k1] > 0).any(axis=1)
-        )
-        if rows.size:
-            w = frames.w[rows, k1:]
-            back = frames.xy[rows, k1:] - rotate(theta[rows, 1][:, None], shape.lower_px[None])
-            elbow = np.einsum("tk,tkd->td", w, back) / w.sum(axis=1)[:, None] - shape.pivot_px
-            theta[rows, 0] = _turn(elbow, np.broadcast_to(shape.elbow_px, elbow.shape), np.ones(rows.size))
-    rows = np.flatnonzero(np.isnan(theta[:, 0]))
-    theta[rows, 0] = _about(frames.xy[rows, :k1] - shape.pivot_px, shape.upper_px, frames.w[rows, :k1])
-    if shape.links == 2:
-        rows = np.flatnonzero(np.isnan(theta[:, 1]) & ~np.isnan(theta[:, 0]))
-        elbow = shape.pivot_px + rotate(theta[rows, 0], shape.elbow_px[None])
-        theta[rows, 1] = _about(frames.xy[rows, k1:] - elbow[:, None, :], shape.lower_px, frames.w[rows, k1:])
-    return theta
-
-
-def _about(seen: Floats, template: Floats, w: Floats) -> Floats:
-    """The turn about a known point that brings the template onto the seen places; NaN without any."""
-    if not seen.shape[0]:
-        return np.zeros(0)
-    sine = (w * (template[None, :, 0] * seen[..., 1] - template[None, :, 1] * seen[..., 0])).sum(axis=1)
-    cosine = (w * (template[None] * seen).sum(axis=2)).sum(axis=1)
-    return np.where((w > 0).any(axis=1), np.arctan2(sine, cosine), np.nan)
-
-
-def _turn(seen: Floats, template: Floats, w: Floats) -> Floats:
-    return _about(seen[:, None, :], template[0][None, :], w[:, None]) if seen.shape[0] else np.zeros(0)
-
-
-def _all_frames(linkage: Linkage, frames: Frames, start: Floats) -> LinkageAngles:
-    total, links = start.shape
-    theta, sigma = np.full((total, links), np.nan), np.full((total, links), np.nan)
-    used = np.zeros(frames.w.shape, dtype=bool)
+def _all_frames(linkage: Linkage, frames: Frames, start: State) -> LinkageAngles:
+    shape = linkage.shape
+    total, links, markers = len(start.theta), shape.links, len(shape.of_link)
+    theta, place = start.theta.copy(), start.place.copy()
+    covariance = np.full((total, links, links), np.nan)
+    known = np.zeros((total, links), dtype=bool)
+    used = np.zeros((total, markers), dtype=bool)
     chi2, dof = np.zeros(total), np.zeros(total, dtype=np.int64)
     scatter, freedom = np.zeros((total, links)), np.zeros((total, links))
-    k1 = linkage.shape.upper_px.shape[0]
-    hidden = partly_hidden(frames.w[:, :k1])
-    if links == 2:
-        hidden |= partly_hidden(frames.w[:, k1:])
+    joints = np.zeros((total, links, links))
+    hidden = np.zeros(total, dtype=bool)
+    for k in range(links):
+        hidden |= partly_hidden(frames.w[:, :markers][:, shape.of_link == k])
     limit = reject_limit(hidden) * linkage.sigma_scale**2
     for first in range(0, total, _CHUNK):
         rows = np.arange(first, min(first + _CHUNK, total))
         part = Frames(frames.xy[rows], frames.w[rows].copy())
-        angle = start[rows]
         active = np.arange(rows.size)
         while active.size:
-            found = _solve(linkage.shape, part.at(active), angle[active])
-            angle[active], d2, now = found.theta, found.d2, rows[active]
-            sigma[now], chi2[now], dof[now] = found.sigma, found.chi2, found.dof
+            now = rows[active]
+            found = _solve(shape, part.at(active), State(theta[now], place[now]))
+            theta[now], place[now], d2 = found.state.theta, found.state.place, found.d2
+            covariance[now], known[now] = found.covariance, found.known
+            chi2[now], dof[now] = found.chi2, found.dof
             scatter[now], freedom[now] = found.scatter, found.freedom
             worst = d2.max(axis=1)
             bad = worst > limit[now]
             active, d2, worst = active[bad], d2[bad], worst[bad]
             drop = d2 >= _TIE * worst[:, None]
-            part.w[active] = np.where(drop, 0.0, part.w[active])
-            angle[active] = np.where(np.isnan(angle[active]), start[rows[active]], angle[active])
-        theta[rows], used[rows] = angle, part.w > 0
-    parameters = 2 * (1 + frames.w.shape[1] + (links - 1)) - links
-    seen = np.isfinite(sigma)
+            part.w[active, :markers] = np.where(drop, 0.0, part.w[active, :markers])
+            again = rows[active]
+            theta[again] = np.where(np.isnan(theta[again]), start.theta[again], theta[again])
+        used[rows] = part.w[:, :markers] > 0
+        joints[rows] = _by_joints(linkage, part, State(theta[rows], place[rows]))
+    parameters = 2 * len(shape.vectors_px) - len(shape.free_turns())
+    factor = np.empty((total, links))
     scale = np.empty(links)
     for a in range(links):
-        whole, part = seen[:, a] & ~hidden, seen[:, a] & hidden
-        scale2 = pooled_scale2(scatter[whole, a], freedom[whole, a], parameters, float(dof[seen[:, a]].sum()))
-        factor = hidden_factor(scatter[:, a], freedom[:, a], part, scale2)
+        whole, part_hidden = known[:, a] & ~hidden, known[:, a] & hidden
+        counted = float(dof[known[:, a]].sum())
+        scale2 = pooled_scale2(scatter[whole, a], freedom[whole, a], parameters, counted)
+        more = hidden_factor(scatter[:, a], freedom[:, a], part_hidden, scale2)
         scale[a] = np.sqrt(scale2)
-        each = scale[a] * np.where(hidden, factor, 1.0)
-        sigma[:, a] *= each * inflation(chi2 / each**2, dof)
-    theta = np.where(seen, theta, np.nan)
-    return LinkageAngles(linkage, theta, sigma, used, chi2, dof, scale)
+        each = scale[a] * np.where(hidden, more, 1.0)
+        factor[:, a] = each * inflation(chi2 / each**2, dof)
+    covariance = covariance * factor[:, :, None] * factor[:, None, :] + joints
+    theta = np.where(known, theta, np.nan)
+    covariance = np.where(known[:, :, None] & known[:, None, :], covariance, np.nan)
+    return LinkageAngles(linkage, State(theta, place), covariance, used, chi2, dof, scale)
+
+
+def _by_joints(linkage: Linkage, frames: Frames, state: State) -> Floats:
+    """The part (T, L, L) of the angles' covariance by how well joints and shape are known: one error of all frames."""
+    shape, links = linkage.shape, linkage.shape.links
+    theta = np.nan_to_num(state.theta)
+    _, slopes = predicted(shape, State(theta, np.nan_to_num(state.place)))
+    inverse = np.asarray(np.linalg.inv(regular(information(frames.w, slopes))))
+    moves = shape_response(shape, theta, frames.w, slopes, inverse)[:, :links]
+    return np.asarray(np.matmul(moves @ linkage.covariance_px2, np.swapaxes(moves, 1, 2)))
 
 
 @dataclass(frozen=True, eq=False)
 class _Solved:
-    """Angles (T, L) of some frames and how well the markers agree with them.
+    """States of some frames and how well the markers agree with them.
 
-    Also normalised misfits d2 (T, N), chi2 and dof (T,), standard errors (T, L), and what
-    :func:`~pydpend.kinematics.pose.pooled_scale2` is made of, for each angle (T, L).
+    ``known`` (T, L): which angles the markers tell. Also normalised misfits d2 (T, N), chi2 and dof (T,), the angles'
+    covariance (T, L, L) with the stated sigmas, and what :func:`~pydpend.kinematics.scale.pooled_scale2` is made of,
+    for each angle (T, L).
     """
 
-    theta: Floats
+    state: State
+    known: NDArray[np.bool_]
     d2: Floats
     chi2: Floats
     dof: NDArray[np.int64]
-    sigma: Floats
+    covariance: Floats
     scatter: Floats
     freedom: Floats
 
 
-def _solve(shape: Shape, frames: Frames, theta: Floats) -> _Solved:
-    links = theta.shape[1]
-    theta = np.where(np.isnan(theta), 0.0, theta)
-    k1 = shape.upper_px.shape[0]
+def _solve(shape: Shape, frames: Frames, start: State) -> _Solved:
+    links, markers, unknowns = shape.links, len(shape.of_link), shape.unknowns
+    state = State(np.nan_to_num(start.theta), np.nan_to_num(start.place))
     for _ in range(_STEPS):
-        places, slopes = predicted(shape, theta)
+        places, slopes = predicted(shape, state)
         residual = np.where((frames.w > 0)[..., None], frames.xy - places, 0.0)
         v = regular(information(frames.w, slopes))
         weighted = residual * frames.w[..., None]
-        pull = np.stack([np.einsum("tkd,tkd->t", weighted, slopes[..., a]) for a in range(links)], axis=1)
+        pull = np.stack([np.einsum("tkd,tkd->t", weighted, slopes[..., a]) for a in range(unknowns)], axis=1)
         step = np.linalg.solve(v, pull[..., None])[..., 0]
-        theta = theta + np.clip(step, -0.5, 0.5)
-        if np.abs(step).max(initial=0.0) < 1e-10:
+        step[:, :links] = np.clip(step[:, :links], -0.5, 0.5)
+        state = state.moved(step)
+        if np.abs(step).max(initial=0.0) < _SETTLED:
             break
-    places, slopes = predicted(shape, theta)
-    residual = np.where((frames.w > 0)[..., None], frames.xy - places, 0.0)
-    v = regular(information(frames.w, slopes))
-    inverse = np.asarray(np.linalg.inv(v))
-    left, spread = remaining(frames.w, slopes, inverse)
+    places, slopes = predicted(shape, state)
+    inverse = np.asarray(np.linalg.inv(regular(information(frames.w, slopes))))
+    # The closures hold the angles; what disagrees is told by the markers.
+    w, slopes = frames.w[:, :markers], slopes[:, :markers]
+    seen = w > 0
+    residual = np.where(seen[..., None], frames.xy[:, :markers] - places[:, :markers], 0.0)
+    left, spread = remaining(w, slopes, inverse)
     determinant = left[..., 0, 0] * left[..., 1, 1] - left[..., 0, 1] * left[..., 1, 0]
     trace = left[..., 0, 0] + left[..., 1, 1]
     rx, ry = residual[..., 0], residual[..., 1]
@@ -229,19 +246,19 @@ def _solve(shape: Shape, frames: Frames, theta: Floats) -> _Solved:
         determinant > 1e-6, determinant, 1.0
     )
     # With no freedom in one direction the residual lies in the other one.
-    d2 = frames.w * np.where(determinant > 1e-6, exact, (rx**2 + ry**2) / np.maximum(trace, 1e-6))
-    seen = frames.w > 0
-    chi2 = (frames.w * (residual**2).sum(axis=2)).sum(axis=1)
+    d2 = w * np.where(determinant > 1e-6, exact, (rx**2 + ry**2) / np.maximum(trace, 1e-6))
+    chi2 = (w * (residual**2).sum(axis=2)).sum(axis=1)
     count = seen.sum(axis=1)
-    # The upper angle needs an upper marker or two lower ones; the lower angle a lower one and the upper.
-    upper = seen[:, :k1].any(axis=1) | (seen[:, k1:].sum(axis=1) >= 2)
-    known = np.stack([upper, upper & seen[:, k1:].any(axis=1)], axis=1)[:, :links]
-    dof = np.maximum(2 * count - known.sum(axis=1), 0)
-    variance = np.einsum("taa->ta", inverse)
-    sigma = np.where(known, np.sqrt(variance), np.nan)
+    known = known_links(shape, seen)
+    # A closure takes two unknowns from a frame.
+    told = known.sum(axis=1) + 2 * shape.trees_afloat - 2 * len(shape.closures)
+    dof = np.maximum(2 * count - told, 0)
+    covariance = inverse[:, :links, :links]
+    variance = np.einsum("taa->ta", covariance)
     # What a centre's error does to each angle is w (slopes inverse) times it: only that part of a residual counts.
-    share = (frames.w * count[:, None])[..., None] / variance[:, None]
+    share = (w * count[:, None])[..., None] / variance[:, None]
+    spread = spread[..., :links]
     felt = np.einsum("tkda,tkd->tka", spread, residual)
-    scatter = (share * frames.w[..., None] * felt**2).sum(axis=1)
+    scatter = (share * w[..., None] * felt**2).sum(axis=1)
     freedom = (share * np.einsum("tkda,tkde,tkea->tka", spread, left, spread)).sum(axis=1)
-    return _Solved(theta, d2, chi2, dof, sigma, scatter, freedom)
+    return _Solved(state, known, d2, chi2, dof, covariance, scatter, freedom)

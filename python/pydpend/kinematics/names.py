@@ -9,7 +9,9 @@ from dataclasses import dataclass
 NUMBERED = 2
 """Up to so many links their columns are numbered, as the paper's pendulum has them; of more they are named."""
 
-OURS = re.compile(r"frame|(phi|sigma)\d+_(rad|deg)|(sigma_)?phi_.+_(rad|deg)|camera\d_phi(\d+|_.+)_rad")
+OURS = re.compile(
+    r"frame|(phi|sigma)\d+_(rad|deg)|(sigma_)?phi_.+_(rad|deg)|camera\d_phi(\d+|_.+)_rad|covariance_phi.+_rad2"
+)
 """Columns of an angles table that are read; others are the user's, or follow from these."""
 
 
@@ -52,6 +54,10 @@ class ColumnNames:
         if len(self.links) <= NUMBERED:
             return f"sigma_camera{link + 1}_rad"
         return f"sigma_camera_{self.stem(link)}_rad"
+
+    def covariance(self, one: int, other: int) -> str:
+        """The column of the covariance of two links' noise."""
+        return f"covariance_{self.stem(one)}_{self.stem(other)}_rad2"
 
     def camera(self, number: int, link: int) -> str:
         """The column of one of the camera's numbers, from 0."""

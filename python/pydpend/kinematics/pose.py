@@ -62,6 +62,30 @@ class Pose:
     covered_factor: float
     doubtful: NDArray[np.bool_]
 
+    @property
+    def is_alone(self) -> bool:
+        """Whether the body has one marker only, and so no pose of its own."""
+        return len(self.markers.nodes) == 1
+
+
+def alone(markers: BodyMarkers) -> Pose:
+    """What a body of one marker has in place of poses: its marker, and no angle in any frame."""
+    total = markers.weight.shape[0]
+    none = np.full(total, np.nan)
+    return Pose(
+        markers,
+        none,
+        np.full((total, 2), np.nan),
+        none,
+        np.zeros((1, 2)),
+        markers.seen,
+        np.zeros(total),
+        np.zeros(total, dtype=np.int64),
+        1.0,
+        1.0,
+        np.zeros(total, dtype=bool),
+    )
+
 
 @dataclass(frozen=True, eq=False)
 class Fitted:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -16,7 +17,8 @@ class Structure:
     ``joints``: those of the rig that are of links among these only, with one link where it is a fixed pivot; the link
     nearer the ground comes first. ``inner`` (one per link): the joint from which it hangs, ``None`` where that is not
     known. ``on`` (one per link): the link from which it hangs, ``None`` for the ground or where that is not known.
-    ``loops``: joints beside those, where chains close.
+    ``loops``: joints beside those, where chains close. ``outwards``: the links' indices, each after that on which it
+    hangs.
     """
 
     links: tuple[str, ...]
@@ -24,6 +26,7 @@ class Structure:
     inner: tuple[Joint | None, ...]
     on: tuple[str | None, ...]
     loops: tuple[Joint, ...]
+    outwards: tuple[int, ...]
 
     @staticmethod
     def of(rig: Rig, links: Sequence[str]) -> Structure:
@@ -59,7 +62,46 @@ class Structure:
             tuple(inner.get(link) for link in links),
             tuple(on.get(link) for link in links),
             tuple(j for j in joints if j not in used),
+            tuple(links.index(link) for link in reached),
         )
+
+    def as_pendulum(self) -> Structure:
+        """One or two links that may be a pendulum with a pivot and an elbow, of which no place is known.
+
+        Others as they are.
+        """
+        if not self.is_chain or len(self.links) > 2 or all(self.inner):
+            return self
+        unknown = (
+            Joint("pivot", self.links[:1], math.nan, math.nan),
+            Joint("elbow", self.links, math.nan, math.nan),
+        )
+        joints = tuple(known or made for known, made in zip(self.inner, unknown, strict=False))
+        on = (None, *self.links[:-1])
+        return Structure(self.links, joints, joints, on, (), tuple(range(len(self.links))))
+
+    def part(self, links: Sequence[str]) -> Structure:
+        """Some of the links, with the joints between them and the ground."""
+        index = [self.links.index(link) for link in links]
+        joints = tuple(j for j in self.joints if set(j.bodies) <= set(links))
+        return Structure(
+            tuple(links),
+            joints,
+            tuple(self.inner[k] if self.inner[k] in joints else None for k in index),
+            tuple(self.on[k] if self.inner[k] in joints else None for k in index),
+            tuple(j for j in self.loops if j in joints),
+            tuple(index.index(k) for k in self.outwards if k in index),
+        )
+
+    def with_ancestors(self, links: Sequence[str]) -> tuple[str, ...]:
+        """Links and all on which they hang, in the order of `links`."""
+        wanted: set[str] = set()
+        for link in links:
+            now: str | None = link
+            while now is not None and now not in wanted:
+                wanted.add(now)
+                now = self.on[self.links.index(now)]
+        return tuple(link for link in self.links if link in wanted)
 
     @property
     def is_chain(self) -> bool:

@@ -5,6 +5,7 @@ Its file forms are in ``files``; how angles come from nodes is in the other file
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -57,6 +58,9 @@ class LinkAngles(TableResult):
         Names of the L links; ``link1``, ``link2``, ... if not given.
     joints : tuple of pydpend.kinematics.LinkJoint
         The joints between links of these, each with the angle `theta_rad`.
+    covariance_rad2 : ndarray of float, shape (T, L, L), optional
+        Covariance of the links' noise, rad^2, where the angles are of one fit; its diagonal is `sigma_rad` squared.
+        None where each link was seen by itself.
 
     Raises
     ------
@@ -73,6 +77,7 @@ class LinkAngles(TableResult):
     camera_rad: Floats | None = None
     link_names: tuple[str, ...] = ()
     joints: tuple[LinkJoint, ...] = ()
+    covariance_rad2: Floats | None = None
 
     def __post_init__(self) -> None:
         t = times_given(self.t_s, AnglesError)
@@ -103,6 +108,8 @@ class LinkAngles(TableResult):
         self._check_names()
         if self.camera_rad is not None:
             object.__setattr__(self, "camera_rad", self._checked_camera(self.camera_rad))
+        if self.covariance_rad2 is not None:
+            object.__setattr__(self, "covariance_rad2", self._checked_covariance(self.covariance_rad2))
         check_table(
             self.name,
             (t, phi, sigma, self.frame),
@@ -157,6 +164,15 @@ class LinkAngles(TableResult):
             )
         return np.where(self.seen[..., None], camera, np.nan)
 
+    def _checked_covariance(self, given: Floats) -> Floats:
+        """The covariance, NaN where there is no angle."""
+        covariance = np.ascontiguousarray(given, dtype=np.float64)
+        if covariance.shape != (*self.phi_rad.shape, self.links):
+            problem = f"a covariance of shape {covariance.shape} for angles of shape {self.phi_rad.shape}"
+            raise AnglesError(fault(self.name, problem, "It must be (T, L, L)"))
+        both = self.seen[:, :, None] & self.seen[:, None, :]
+        return np.where(both, covariance, np.nan)
+
     @property
     def sigma_camera_rad(self) -> Floats:
         """Standard uncertainty (T, L) of each angle by the camera, rad; NaN where not seen or not stated.
@@ -190,8 +206,11 @@ class LinkAngles(TableResult):
     @property
     def sigma_theta_rad(self) -> Floats:
         """Standard uncertainty (T, J) of `theta_rad` by the links' noise, rad, which differs from frame to frame."""
-        ends = self._ends()
-        return np.asarray(np.hypot(self.sigma_rad[:, ends[1]], self.sigma_rad[:, ends[0]]))
+        first, second = self._ends()
+        variance = self.sigma_rad[:, second] ** 2 + self.sigma_rad[:, first] ** 2
+        if self.covariance_rad2 is not None:
+            variance = variance - 2 * self.covariance_rad2[:, first, second]
+        return np.asarray(np.sqrt(variance))
 
     @property
     def sigma_camera_theta_rad(self) -> Floats:
@@ -267,6 +286,9 @@ class LinkAngles(TableResult):
             sigma_rad=self.sigma_rad[:, index],
             meta=meta,
             camera_rad=None if self.camera_rad is None else self.camera_rad[:, index],
+            covariance_rad2=None
+            if self.covariance_rad2 is None
+            else self.covariance_rad2[:, index][:, :, index],
             link_names=tuple(links),
             joints=tuple(j for j in self.joints if set(j.links) <= set(links)),
         )
@@ -310,6 +332,7 @@ class LinkAngles(TableResult):
             sigma_rad=self.sigma_rad[keep],
             frame=None if self.frame is None else self.frame[keep],
             camera_rad=None if self.camera_rad is None else self.camera_rad[keep],
+            covariance_rad2=None if self.covariance_rad2 is None else self.covariance_rad2[keep],
         )
 
     def to_columns(self) -> dict[str, NDArray[Any]]:
@@ -321,7 +344,8 @@ class LinkAngles(TableResult):
             ``frame`` if there is one, ``time_s``, and of each link ``phi1_rad``, ``sigma1_rad`` (the noise) and, where
             the camera's part is stated, ``sigma_camera1_rad`` and ``camera1_phi1_rad`` to ``camera5_phi1_rad``. Of more
             than two links their names stand in place of the numbers: ``phi_crank_rad``, ``sigma_phi_crank_rad``,
-            ``sigma_camera_phi_crank_rad``, ``camera1_phi_crank_rad``. Last of each joint ``theta_elbow_rad``,
+            ``sigma_camera_phi_crank_rad``, ``camera1_phi_crank_rad``. Where the noise of the links is not independent,
+            ``covariance_phi1_phi2_rad2`` of each two. Last of each joint ``theta_elbow_rad``,
             ``sigma_theta_elbow_rad`` and ``sigma_camera_theta_elbow_rad``.
         """
         names = self.columns
@@ -339,6 +363,9 @@ class LinkAngles(TableResult):
             for k in range(self.links):
                 for number in range(CAMERA_NUMBERS):
                     out[names.camera(number, k)] = self.camera_rad[:, k, number]
+        if self.covariance_rad2 is not None:
+            for a, b in itertools.combinations(range(self.links), 2):
+                out[names.covariance(a, b)] = self.covariance_rad2[:, a, b]
         parts = [("theta", self.theta_rad), ("sigma_theta", self.sigma_theta_rad)]
         if self.camera_rad is not None:
             parts.append(("sigma_camera_theta", self.sigma_camera_theta_rad))

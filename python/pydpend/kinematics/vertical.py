@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pydpend.errors import AnglesError, Setting, fault
-from pydpend.kinematics.linkage import Shape
 from pydpend.kinematics.markers import BodyMarkers, to_world
+from pydpend.kinematics.shape import Shape
 from pydpend.kinematics.structure import Structure
 from pydpend.kinematics.swing import within_half_turn
 from pydpend.kinematics.table import Floats
@@ -88,7 +88,7 @@ def _vectors(
 ) -> list[Floats | None]:
     """For each link the places (K, 2) that say where it points, seen from its upper joint, in the reference picture."""
     if shape is not None:
-        return [shape.upper_px] if shape.links == 1 else [shape.elbow_px[None], shape.lower_px]
+        return [_along(shape, k) for k in range(shape.links)]
     rig = nodes.rig
     structure = Structure.of(rig, [m.name for m in markers])
     at = {j.name: to_world(np.array([j.x_px, j.y_px]), rig, mirrored) for j in structure.joints}
@@ -102,3 +102,11 @@ def _vectors(
         else:
             out.append(body.reference_px - at[inner.name])
     return out
+
+
+def _along(shape: Shape, link: int) -> Floats | None:
+    """The next joint of a link, or its markers, seen from the joint from which it hangs, (K, 2)."""
+    if shape.structure.inner[link] is None:
+        return None
+    outer = [q for _, k, q in shape.ends if k == link and q >= 0]
+    return shape.vectors_px[outer[:1]] if outer else shape.local_markers(link)
