@@ -63,7 +63,7 @@ class Seen:
 
 @dataclass(frozen=True, eq=False)
 class Wishes:
-    """What a caller wants of the estimators.
+    """Wishes of a caller for the estimators.
 
     ``length_m``: distance of pivot and elbow and its standard uncertainty, m. ``given``: joints of the ground that are
     known, by name.
@@ -211,7 +211,7 @@ def _linkage_meta(
         if link == GROUND:
             key = "pivot" if j == 0 else names[j]
             meta[f"{key}_px"] = to_image(shape.vectors_px[q], rig, mirrored).tolist()
-            meta[f"{key}_sigma_px"] = sigma_to_image(linkage.place_sigma_px(q), rig).tolist()
+            meta[f"{key}_sigma_px"] = sigma_to_image(linkage.vector_sigma_px(q), rig).tolist()
     if shape.links == 2 and not shape.trees_afloat and len(names) == 2:
         elbow = shape.joints[1] @ shape.vectors_px
         meta["elbow_in_reference_frame_px"] = to_image(elbow, rig, mirrored).tolist()

@@ -76,15 +76,26 @@ class Linkage:
         slope = np.outer(row, v / length if length > 0 else v).reshape(-1)
         return length, float(np.sqrt(slope @ self.covariance_px2 @ slope))
 
-    def place_sigma_px(self, vector: int) -> Floats:
-        """Standard uncertainties of a vector's x and y, px, (2,)."""
+    def vector_sigma_px(self, vector: int) -> Floats:
+        """Standard uncertainties of one of the shape's vectors.
+
+        Parameters
+        ----------
+        vector : int
+            Its index.
+
+        Returns
+        -------
+        ndarray of float, shape (2,)
+            Of its x and y, px.
+        """
         return np.asarray(np.sqrt(np.diag(self.covariance_px2)[2 * vector : 2 * vector + 2]))
 
     @property
     def pivot_sigma_px(self) -> Floats:
         """Standard uncertainties of the first joint's x and y, px, (2,); NaN where it is not of the ground."""
         q = next((q for j, link, q in self.shape.ends if j == 0 and link == GROUND), None)
-        return np.full(2, np.nan) if q is None else self.place_sigma_px(q)
+        return np.full(2, np.nan) if q is None else self.vector_sigma_px(q)
 
     @property
     def lengths(self) -> dict[tuple[str, str], tuple[float, float]]:
@@ -223,7 +234,7 @@ def inverted(shape: Shape, normal: Floats) -> Floats:
 
 
 def normal_priors(shape: Shape, given: Mapping[str, Given] | None) -> Floats:
-    """What is known of joints beforehand, in the normal equations of the vectors, (2Q, 2Q)."""
+    """Knowledge of joints beforehand, in the normal equations of the vectors, (2Q, 2Q)."""
     return _priors(shape, given or {})[0]
 
 
@@ -248,7 +259,7 @@ def _check_joints(linkage: Linkage) -> None:
     for j, _, q in linkage.shape.ends:
         if q < 0:
             continue
-        worst = float(linkage.place_sigma_px(q).max())
+        worst = float(linkage.vector_sigma_px(q).max())
         if not worst <= LARGEST_JOINT_SIGMA_PX:
             advice = "Use " + Setting("estimator", "rigid")
             if (np.bincount(linkage.shape.of_link) == 1).any():

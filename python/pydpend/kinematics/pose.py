@@ -69,7 +69,7 @@ class Pose:
 
 
 def alone(markers: BodyMarkers) -> Pose:
-    """What a body of one marker has in place of poses: its marker, and no angle in any frame."""
+    """A body of one marker in place of poses: its marker, and no angle in any frame."""
     total = markers.weight.shape[0]
     none = np.full(total, np.nan)
     return Pose(

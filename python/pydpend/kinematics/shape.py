@@ -203,7 +203,7 @@ def across(v: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Frames:
-    """What is measured in some frames: places (T, N + C, 2) of the markers, then of the closures, and their weights."""
+    """Measurements of some frames: places (T, N + C, 2) of the markers, then of the closures, and their weights."""
 
     xy: Floats
     w: Floats
