@@ -360,8 +360,8 @@ def test_what_is_wrong_in_a_file_is_named_with_its_place(name: str, tmp_path: Pa
         ({"min_confidence": 2}, "min_confidence: 2 is no confidence"),
         ({"sigma_px": -1.0}, "sigma_px: -1.0 is no number of pixels"),
         ({"image_px": (0, 3)}, r"image_px: \(0, 3\) is no size"),
-        ({"image_px": "64"}, "image_px: 64 is no size"),
-        ({"fps": "25"}, "fps: 25 is no number of frames per s"),
+        ({"image_px": "64"}, "image_px: .* is needed, and this is '64'"),
+        ({"fps": "25"}, "fps: a number is needed, and this is '25'"),
         ({"bodies": {"a": ["toe"]}}, "the body 'a' has a node 'toe' that is not there"),
     ],
 )

@@ -66,17 +66,11 @@ class Wishes:
                     fault(Setting(name), f"{value} is no number of {what}", "Give one above 0")
                 )
         least = self.min_confidence
-        if least is not None and not (isinstance(least, (int, float, np.number)) and 0 <= least <= 1):
+        if least is not None and not (0 <= least <= 1):
             raise ArgumentError(fault(Setting("min_confidence"), f"{least} is no confidence", "Give 0 to 1"))
         size = self.image_px
-        if size is not None and not (
-            isinstance(size, tuple)
-            and len(size) == 2
-            and all(isinstance(n, (int, np.integer)) and n >= 1 for n in size)
-        ):
-            raise ArgumentError(
-                fault(Setting("image_px"), f"{self.image_px} is no size", "Give width and height, px")
-            )
+        if size is not None and not (len(size) == 2 and min(size) >= 1):
+            raise ArgumentError(fault(Setting("image_px"), f"{size} is no size", "Give width and height, px"))
 
 
 @dataclass

@@ -19,6 +19,7 @@ from pydpend.track_forms import Form, form_of, form_of_columns
 from pydpend.tracks import marked, motion_capture, particles, pose_files, wide_text
 from pydpend.tracks.merging import merged
 from pydpend.tracks.placing import Wishes, placed
+from pydpend.typed import typed
 
 READERS: dict[Form, Callable[[Path, Sequence[str]], RawTracks]] = {
     "nodes": lambda path, names: bare_tracks(path),
@@ -46,6 +47,7 @@ READERS: dict[Form, Callable[[Path, Sequence[str]], RawTracks]] = {
 """The reader of each form: from the file and the points that are wanted."""
 
 
+@typed("source")
 def read_tracks(
     source: Any,
     *,
@@ -102,8 +104,7 @@ def read_tracks(
     WrongTypeError
         For what is neither a file nor a table.
     """
-    chosen = (nodes,) if isinstance(nodes, str) else tuple(nodes)
-    wishes = Wishes(fps, chosen, unit, y_axis, plane, image_px, min_confidence, sigma_px)
+    wishes = Wishes(fps, tuple(nodes), unit, y_axis, plane, image_px, min_confidence, sigma_px)
     several = isinstance(source, (list, tuple))
     parts = [_raw(one, wishes.nodes) for one in (source if several else [source])]
     if not parts:
