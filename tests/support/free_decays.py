@@ -32,6 +32,26 @@ def released(
     return Motion(s.t_s, s.phi_rad, s.w_rad_s, s.a_rad_s2)
 
 
+def with_gaps(angles: LinkAngles, seed: int, missing: float = 0.2) -> LinkAngles:
+    """The angles with gaps common to the links, of 80 ms on average and each twentieth of 0.2 to 0.6 s."""
+    rng = np.random.default_rng([seed, 5])
+    step = float(np.median(np.diff(angles.t_s)))
+    gone = np.zeros(angles.t_s.size, dtype=bool)
+    while gone.mean() < missing:
+        length = rng.exponential(0.08) if rng.random() > 0.05 else rng.uniform(0.2, 0.6)
+        first = rng.integers(0, gone.size)
+        gone[first : first + max(1, round(length / step))] = True
+    return replace(angles, phi_rad=np.where(gone[:, None], np.nan, angles.phi_rad))
+
+
+def with_outliers(angles: LinkAngles, seed: int, share: float = 0.002, most_deg: float = 30.0) -> LinkAngles:
+    """The angles with this share of samples off by up to ``most_deg``."""
+    rng = np.random.default_rng([seed, 13])
+    wild = rng.random(angles.phi_rad.shape) < share
+    off = np.radians(rng.uniform(-most_deg, most_deg, angles.phi_rad.shape))
+    return replace(angles, phi_rad=np.where(wild, angles.phi_rad + off, angles.phi_rad))
+
+
 def measured(motion: Motion, seed: int, noise_deg: float, *, stated: bool = True) -> LinkAngles:
     """The angles with white noise of this size."""
     rng = np.random.default_rng([seed, 11])

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pydpend.damping.outliers import Outlier
 from pydpend.documents import Table
 from pydpend.json_text import plain
 
@@ -70,6 +71,8 @@ class FittedRecording:
     camera_numbers, camera_numbers_sigma : tuple of float or None
         Its camera's five numbers as the trajectory fit found them, and their standard errors, in units of what the
         angles state; None where they state nothing.
+    outliers : tuple of pydpend.damping.outliers.Outlier
+        Samples that were left out (docs/explanation/damping.md has the rule).
     """
 
     name: str
@@ -87,6 +90,7 @@ class FittedRecording:
     e0_j: float | None = None
     camera_numbers: tuple[float, ...] | None = None
     camera_numbers_sigma: tuple[float, ...] | None = None
+    outliers: tuple[Outlier, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """The recording as in ``fit.json``."""
@@ -115,6 +119,10 @@ class FittedRecording:
             table.number("e0_j") if "e0_j" in table else None,
             table.numbers_or_nan("camera_numbers") if "camera_numbers" in table else None,
             table.numbers_or_nan("camera_numbers_sigma") if "camera_numbers_sigma" in table else None,
+            tuple(
+                Outlier(o.number("time_s"), o.whole("link"), o.number("off_rad"))
+                for o in (table.tables("outliers") if "outliers" in table else ())
+            ),
         )
 
 

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pydpend.damping.fitted_recording import FittedRecording
 from pydpend.damping.noise import Noise, noise
+from pydpend.damping.outliers import Outlier, without_outliers, words
 from pydpend.damping.shooting import Track
 from pydpend.decay import Decay, check_pendulum, find_decay
 from pydpend.errors import FitError, fault
@@ -66,10 +67,12 @@ class Recording:
     """A recording made ready for a fit."""
 
     angles: LinkAngles
-    """With `taken_off_rad` taken off."""
+    """With `taken_off_rad` taken off, and outliers not seen."""
     decay: Decay
     noise: Noise
     track: Track
+    outliers: tuple[Outlier, ...]
+    """Samples that are left out."""
     taken_off_rad: Floats
     """(links,): zero of the given angles by their own swing, where theirs is far from that; else 0."""
 
@@ -106,11 +109,13 @@ class Recording:
             zeros_sigma_deg=degrees(zero.sigma_rad),
             zeros_stated_sigma_deg=degrees(zero.stated_rad),
             zeros_off=tuple(zero.off.tolist()),
+            outliers=self.outliers,
         )
 
     def notes(self) -> list[str]:
         """Notes on how the free decay was found, and on links whose stated uncertainty was not believed."""
         out = [f"{self.angles.name}: {self.decay.message}"]
+        out += words(self.angles.name, self.outliers, int(self.angles.t_s.size))
         for j, source in enumerate(self.noise.source[: self.angles.links]):
             if source == "measured":
                 level = np.degrees(self.noise.measured_rad[j])
@@ -143,11 +148,12 @@ def check_distinct(angles: Sequence[LinkAngles]) -> None:
 def prepare(
     angles: LinkAngles, model: Model, start_s: float | None = None, stop_s: float | None = None
 ) -> Recording:
-    """Finds the free decay and the noise, and takes a zero off that is not where the links hang by their swing.
+    """Finds the free decay and the noise, leaves outliers out, and takes a zero off that the swing contradicts.
 
     Raises FitError where there is no decay to fit.
     """
     check_pendulum(angles)
+    angles, outliers = without_outliers(angles)
     scatter = [highpass_noise(c) for c in angles.phi_rad.T]
     known = [v for v in scatter if np.isfinite(v)]
     swing = find_swing(
@@ -168,4 +174,5 @@ def prepare(
                 angles.name, "the angles have no 20 stretches of nine samples", "Give angles with fewer gaps"
             )
         )
-    return Recording(angles, decay, level, (angles.t_s, angles.phi_rad, level.sigma_rad), taken_off)
+    track = (angles.t_s, angles.phi_rad, level.sigma_rad)
+    return Recording(angles, decay, level, track, outliers, taken_off)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pydpend import _native
+from pydpend.damping.pieces import cut_between, ends_of
 from pydpend.damping.result_parts import Residuals
 from pydpend.errors import FitError, fault
 from pydpend.fit_status import FitStatus
@@ -184,9 +185,9 @@ CAMERA = "camera"
 FASTEST_RAD_S = 300.0
 """A first guess that turns faster is one from a handful of samples beside a gap; its segment is left out."""
 
-GAP_S = 0.2
-"""A segment with a longer gap than this in either link is left out: the motion on the other side of the gap is not
-known well enough to start from."""
+GAP_S = 0.6
+"""Longest gap in either link in a segment, s: over a longer one the motion near the upright is not known well enough
+from the other side."""
 
 
 def _longest_gap(t_s: Floats, phi_rad: Floats, edges_s: Floats) -> float:
@@ -207,7 +208,15 @@ def cut(
 
     Also the parameters found on the way: the fit of pieces, loosely tied.
     """
-    rows, times, states = _native.shooting_segments(tracks, spans, length_s, chained)
+    parts = []
+    for r, (track, span) in enumerate(zip(tracks, spans, strict=True)):
+        ends = ends_of(track[0], track[1], span, length_s)
+        if ends is not None:
+            parts.append(cut_between(track[0], track[1], ends, r, chained))
+            continue
+        rows, times, states = _native.shooting_segments([track], [span], length_s, chained)
+        parts.append((np.asarray(rows, dtype=np.int64) + np.array([r, 0, 0, 0]), times, states))
+    rows, times, states = (np.concatenate(each) for each in zip(*parts, strict=True))
     good: NDArray[np.bool_] = np.asarray(np.isfinite(states).all(axis=1))
     good &= np.abs(states[:, 2:]).max(axis=1, initial=0.0) < FASTEST_RAD_S
     for k, (r, first, last, _) in enumerate(rows.tolist()):
