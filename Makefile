@@ -18,7 +18,7 @@ help:
 	@echo "make format    rustfmt and ruff"
 
 .make/system: tools/system-packages.txt tools/system-packages.sh
-	@[ -n "$(SKIP_SYSTEM)" ] || tools/system-packages.sh
+	@[ -n "$(SKIP_SYSTEM)" ] || tools/system-packages.sh tools/system-packages.txt
 	@command -v cargo >/dev/null || { echo "cargo is missing. Install Rust with rustup (https://rustup.rs)." >&2; exit 1; }
 	@mkdir -p .make && touch $@
 
@@ -27,8 +27,19 @@ help:
 	@PYTHON=$(PYTHON) tools/venv.sh
 	@mkdir -p .make && touch $@
 
+# What tests and checks need besides: a browser, and Python's tools.
+.make/test-system: tools/test-packages.txt tools/system-packages.sh
+	@[ -n "$(SKIP_SYSTEM)" ] || tools/system-packages.sh tools/test-packages.txt
+	@mkdir -p .make && touch $@
+
+.make/dev: .make/venv
+	@echo "Adding what tests and checks need to .venv"
+	@.venv/bin/python -m pip install -q --disable-pip-version-check --group dev
+	@touch $@
+
 # Always the whole workspace: one choice of features, so that nothing is built twice.
 build: .make/system .make/venv
+	@[ -e $(EXTENSION) ] || echo "Building, about 5 minutes on two cores the first time"
 	@cargo build $(CARGO_FLAGS)
 	@cmp -s target/release/lib_native.so $(EXTENSION) || \
 	    { cp target/release/lib_native.so $(EXTENSION).new && mv $(EXTENSION).new $(EXTENSION); }
@@ -36,14 +47,14 @@ build: .make/system .make/venv
 demo: build
 	@$(PY) tools/demo.py
 
-screenshot: demo
+screenshot: demo .make/test-system .make/dev
 	@$(PY) tools/screenshot.py
 
-test: build
+test: build .make/test-system .make/dev
 	cargo test $(CARGO_FLAGS)
 	$(PY) -m pytest -n 2 --dist loadgroup
 
-check: build
+check: build .make/dev
 	cargo fmt --all -- --check
 	cargo clippy $(CARGO_FLAGS) --all-targets -- -D warnings
 	.venv/bin/ruff check .
@@ -55,7 +66,7 @@ check: build
 	cargo check --release --locked -p tracker --lib --no-default-features --features opencv
 
 # Long: the eight scenes by twenty seeds, real motion filmed, then the estimators' sweeps.
-validate: build
+validate: build .make/dev
 	cargo build $(CARGO_FLAGS) --example validate
 	target/release/examples/validate --seeds 200..220 --write docs/validation/identity.md
 	$(PY) -m tests.validation.validate_kinematics
@@ -64,17 +75,17 @@ validate: build
 	for sweep in angles default physics mechanisms; do $(PY) -m tests.validation.validate_$$sweep || exit 1; done
 	for part in energy inertias ratios slow all none added; do $(PY) -m tests.validation.validate_damping $$part || exit 1; done
 
-wheel: .make/system .make/venv
+wheel: .make/system .make/dev
 	tools/wheel.sh
 
-bench: build
+bench: build .make/dev
 	cargo bench --workspace --locked
 	$(PY) -m tests.validation.bench_tables
 
 fixtures: build
 	$(PY) fixtures/make.py
 
-format: .make/venv
+format: .make/dev
 	cargo fmt --all
 	.venv/bin/ruff check --fix .
 	.venv/bin/ruff format .

@@ -80,7 +80,9 @@ def main() -> int:
     width = [max(len(r[i]) for r in [*table, ("result", "found", "truth")]) for i in range(3)]
     for r in [("result", "found", "truth"), *table]:
         print(f"{r[0]:<{width[0]}}  {r[1]:>{width[1]}}  {r[2]:>{width[2]}}")
-    print(f"\nLook at {outcome.folder / 'report.html'}")
+    print(
+        f"\nLook at {outcome.folder / 'report.html'}, or for a picture at {outcome.folder / 'fit' / 'energy.png'}"
+    )
     return 0 if outcome.status == "done" else 1
 
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Installs the Debian packages of tools/system-packages.txt that are missing, or says which to install.
+# Installs the Debian packages of a list that are missing, or says which to install.
 set -euo pipefail
-list=$(dirname "$0")/system-packages.txt
+list=$1
 wanted=$(grep -vE '^\s*(#|$)' "$list")
 
 if ! command -v dpkg-query >/dev/null; then

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Makes .venv with what pyproject.toml lists, the package itself from the source tree, and the program pydpend.
+# Makes .venv with what the package needs, the package itself from the source tree, and the program pydpend.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 python=${PYTHON:-python3}
@@ -15,7 +15,7 @@ import tomllib
 with open("pyproject.toml", "rb") as f:
     print("\n".join(tomllib.load(f)["project"]["dependencies"]))
 P
-.venv/bin/python -m pip install -q --disable-pip-version-check -r .venv/requirements.txt --group dev
+.venv/bin/python -m pip install -q --disable-pip-version-check -r .venv/requirements.txt
 # From the source tree: the compiled half is copied beside it by `make build`.
 site=$(.venv/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')
 echo "$PWD/python" >"$site/pydpend-tree.pth"

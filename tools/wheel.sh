@@ -28,6 +28,8 @@ assert len(film.frame) == 40
 print(nodes, dp.read_nodes("t.parquet"), sep="\n")
 P
 venv/bin/pydpend --version
+venv/bin/pydpend track "$tree/fixtures/demo/hanging.mp4" -o h.parquet
+venv/bin/pydpend check h.parquet
 venv/bin/pydpend export t.parquet -o t.trc
 [ -s t.trc ]
 echo "$(basename "$wheel"): built, installed and used in a new environment"

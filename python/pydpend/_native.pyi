@@ -43,6 +43,8 @@ __all__ = [
     "arrow_reader",
     "check_outputs",
     "check_table",
+    "command",
+    "commands",
     "damage_words",
     "detect",
     "fingerprint",
@@ -82,6 +84,12 @@ __all__ = [
 
 VERSION: str
 CAMERA_BY_EYE: list[float]
+
+def command(arguments: list[str]) -> int:
+    """Runs a command of the tracker as ``pydpend`` does, and gives the exit status. Signals are its own then."""
+
+def commands() -> str:
+    """The commands of the tracker and their arguments, as JSON."""
 
 def setting_words() -> dict[str, list[str]]:
     """The words of each setting that has words, the default first."""

@@ -89,9 +89,9 @@ Text: TypeAlias = "str | Message | Setting | Step"
 """Parts of a message."""
 
 
-CHECK = Step("tracker check", "nodes.status")
+CHECK = Step("pydpend check", "nodes.status")
 """Sums up what became of each node."""
-SETUP = Step("tracker setup", "dp.setup")
+SETUP = Step("pydpend setup", "dp.setup")
 """Finds markers, bodies, joints and camera."""
 SELECT = Step("pydpend angles --bodies A,B", "dp.LinkAngles.select")
 """Takes some links of many."""
@@ -107,7 +107,7 @@ PREDICT = Step("pydpend predict", "pydpend.damping.predict")
 """Predicts a recording from a fit of others."""
 COMPARE = Step("pydpend compare", "dp.compare")
 """Compares a film's angles with an encoder's."""
-FILM_TRUTH = Step("tracker film --truth", "dp.film(truth=...)")
+FILM_TRUTH = Step("pydpend film --truth", "dp.film(truth=...)")
 """Writes the truth of a film that is made."""
 
 

@@ -1,6 +1,6 @@
 """The film maker: films of markers on links with known truth, to try a layout, a light and a frame rate.
 
-A scene is a TOML file or the same as a dictionary; ``tracker film --preset clean --print-scene`` prints one with every
+A scene is a TOML file or the same as a dictionary; ``pydpend film --preset clean --print-scene`` prints one with every
 part. The tracker knows no physics: a pendulum's motion comes as times and angles, for example from
 :func:`pydpend.simulate`.
 
@@ -209,7 +209,7 @@ class Film:
 
     @typed()
     def rig_toml(self, frame: int = 0) -> str:
-        """The rig file as a perfect ``tracker setup`` would write it.
+        """The rig file as a perfect ``pydpend setup`` would write it.
 
         Parameters
         ----------

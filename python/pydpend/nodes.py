@@ -347,7 +347,7 @@ def read_nodes(path: AnyPath) -> Nodes:
     Parameters
     ----------
     path : path-like
-        A table written by `tracker track`, `Nodes.write` or anyone.
+        A table written by `pydpend track`, `Nodes.write` or anyone.
 
     Returns
     -------

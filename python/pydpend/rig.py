@@ -100,7 +100,7 @@ class Rig:
     @staticmethod
     @typed()
     def read(path: AnyPath) -> Rig:
-        """A rig from its file (TOML), as `tracker setup` writes it.
+        """A rig from its file (TOML), as `pydpend setup` writes it.
 
         Parameters
         ----------

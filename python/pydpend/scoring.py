@@ -43,7 +43,7 @@ class Score(JsonResult):
     matches : dict of str to str or None
         Which marker each node stands for; None for none.
     details : dict
-        Everything, as ``tracker score --json`` prints it.
+        Everything, as ``pydpend score --json`` prints it.
     """
 
     _error: ClassVar = TableError
@@ -73,7 +73,7 @@ class Score(JsonResult):
 
     @classmethod
     def of_table(cls, table: Table) -> Score:
-        """The score from what ``tracker score --json`` printed, read already.
+        """The score from what ``pydpend score --json`` printed, read already.
 
         Parameters
         ----------

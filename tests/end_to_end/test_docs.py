@@ -132,7 +132,7 @@ OWN_FILES = """
 cp fixtures/demo/drop.mp4 fixtures/demo/hanging.mp4 .
 cp fixtures/demo/encoder.csv drop.csv
 cp -r fixtures/demo/calibration holds
-target/release/tracker setup drop.mp4 -o rig.toml
+.venv/bin/pydpend setup drop.mp4 -o rig.toml
 .venv/bin/python - <<'END'
 import numpy as np, pyarrow.parquet as pq, pydpend as dp
 t_s = np.arange(1500) / 250
@@ -149,7 +149,7 @@ END
 
 
 def test_the_readme(tmp_path: Path) -> None:
-    (use,) = indented("README.md", "target/release/tracker track")
+    (use,) = indented("README.md", ".venv/bin/pydpend track")
     (python,) = indented("README.md", "import pydpend as dp\n\n    nodes")
     tried = re.sub(r"^(.*pydpend analyse .*)$", r"\1 --dry-run", use, flags=re.M)
     done = shell(f"{OWN_FILES}\n{tried}\n.venv/bin/python - <<'END'\n{python}\nprint(fit)\nEND", tmp_path)
@@ -165,11 +165,11 @@ def test_what_is_said_of_files_of_ones_own(tmp_path: Path) -> None:
     (pendulum,) = re.findall(r"^(cat > out/own/pendulum.toml .*?^END\n)", commands(how_to), re.M | re.S)
     lines = [f"{line.strip()} --dry-run" for line in indented(how_to, "pydpend analyse")]
     linking = (ROOT / "docs/explanation/linking.md").read_text("utf-8")
-    (film,) = re.findall(r"`(tracker film --preset clean --tilt [^`]*)`", linking)
+    (film,) = re.findall(r"`(pydpend film --preset clean --tilt [^`]*)`", linking)
     done = shell(
         "\n".join(
             [
-                'export PATH="$PWD/target/release:$PWD/.venv/bin:$PATH"',
+                'export PATH="$PWD/.venv/bin:$PATH"',
                 OWN_FILES,
                 "mkdir -p out/own",
                 pendulum,

@@ -8,6 +8,7 @@ import importlib
 import inspect
 import re
 import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from dataclasses import fields
 from pathlib import Path
@@ -19,6 +20,7 @@ import pydpend as dp
 import pydpend.analyse
 import pytest
 from pydpend.cli import COMMANDS, _parsers, main
+from pydpend.cli.tracker import COMMANDS as TRACKER_COMMANDS
 from pydpend.cli.words import RENAMED, flags_of, options_of
 from pydpend.errors import FitOptionError, Message, PydpendError, Setting, Step, fault, speaking
 from pydpend.kinematics import LinkAngles
@@ -30,6 +32,7 @@ from tests.support.drawn_nodes import some_nodes
 
 ROOT = Path(__file__).parent.parent.parent
 TRACKER = ROOT / "target" / "release" / "tracker"
+PYDPEND = Path(sys.executable).with_name("pydpend")
 PACKAGE = ROOT / "python" / "pydpend"
 DEMO = ROOT / "fixtures" / "demo"
 TRACKER_SOURCE = ROOT / "crates" / "tracker" / "src"
@@ -76,18 +79,9 @@ def keywords() -> set[str]:
     return found
 
 
-def tracker_help() -> dict[str, str]:
-    commands = ("info", "setup", "track", "overlay", "check", "film", "score")
-    return {
-        c: subprocess.run([TRACKER, c, "--help"], capture_output=True, text=True, check=True).stdout
-        for c in commands
-    }
-
-
 def flags() -> dict[str, set[str]]:
-    """The flags of every command of both programs."""
-    found = {f"pydpend {name}": set(options_of(p)) for name, p in _parsers()[1].items()}
-    return found | {f"tracker {name}": set(FLAG.findall(text)) for name, text in tracker_help().items()}
+    """The flags of every command."""
+    return {f"pydpend {name}": set(options_of(p)) for name, p in _parsers()[1].items()}
 
 
 PYTHON_ONLY = {"link_length_sigma_m"}
@@ -113,14 +107,14 @@ def test_every_step_that_a_message_names_can_be_typed_and_called() -> None:
     steps += [
         list(pair)
         for pair in re.findall(
-            r'format!\("((?:tracker|pydpend) [^"]*)"[^;]*?\),\s*format!\("((?:dp|pydpend)[^"]*)"', source
+            r'format!\("(pydpend [^"]*)"[^;]*?\),\s*format!\("((?:dp|pydpend)[^"]*)"', source
         )
     ]
     assert len(steps) > 10
     known = flags()
     for command, call in steps:
         words = command.replace("{file}", "x").split()
-        if words[0] in ("tracker", "pydpend"):
+        if words[0] == "pydpend":
             assert set(FLAG.findall(command)) - {"--help"} <= known[" ".join(words[:2])], command
         else:
             assert any(set(FLAG.findall(command)) <= f for f in known.values()), command
@@ -151,7 +145,7 @@ def test_no_text_of_the_library_writes_flags_or_keywords_itself() -> None:
                 ) or KEYWORD.search(said):
                     wrong.append(f"{path.name}: {said!r}")
     for file in sorted(TRACKER_SOURCE.rglob("*.rs")):
-        if "bin" in file.parts or file.name in ("message.rs", "next_step.rs"):
+        if "cli" in file.parts or file.name in ("message.rs", "next_step.rs"):
             continue
         code = re.sub(r"//.*", "", file.read_text("utf-8").split("#[cfg(test)]")[0])
         wrong += [f"{file.name}: {s}" for s in re.findall(r'"(?:[^"\\]|\\.)*"', code) if FLAG.search(s)]
@@ -224,12 +218,12 @@ SAID: dict[str, tuple[Callable[[Path], object], Callable[[Path], list[str]], lis
         lambda d: dp.read_angles(DEMO / "drop.mp4"),
         lambda d: ["fit", str(DEMO / "drop.mp4"), "-o", str(d / "out")],
         ["it is a film, not an angles table. Next: dp.track("],
-        ["it is a film, not an angles table. Next: `tracker track ", "drop.parquet`"],
+        ["it is a film, not an angles table. Next: `pydpend track ", "drop.parquet`"],
     ),
     "a film in place of nodes": (
         lambda d: dp.read_nodes(DEMO / "drop.mp4"),
         lambda d: ["angles", str(DEMO / "drop.mp4"), "-o", str(d / "a.parquet")],
-        ["it is a film, not a node table. Next: dp.track("], ["it is a film, not a node table. Next: `tracker track "],
+        ["it is a film, not a node table. Next: dp.track("], ["it is a film, not a node table. Next: `pydpend track "],
     ),
 }  # fmt: skip
 
@@ -269,15 +263,14 @@ def test_a_setting_that_a_command_has_not_is_named_with_one_that_has(
 ) -> None:
     from pydpend.cli.words import CommandLine
 
-    commands = _parsers()[1]
-    with speaking(CommandLine(commands, "plot")):
+    with speaking(CommandLine(lambda: _parsers()[1], "plot")):
         assert str(Message.of(Setting("unwrap", True))).startswith("--unwrap (of `pydpend ")
         assert str(Message.of(Setting("threshold"))) == "--threshold (of `pydpend analyse`)"
         assert (
             str("Leave " + Setting("prediction", False) + ".")
             == "Leave --no-prediction (of `pydpend analyse`)."
         )
-        assert str(Message.of(Step("tracker setup", "dp.setup"))) == "`tracker setup`"
+        assert str(Message.of(Step("pydpend setup", "dp.setup"))) == "`pydpend setup`"
     assert str(Message.of(Setting("prediction", False))) == "prediction=False"
     assert (
         str(fault(Setting("fps"), "is wrong", "Leave " + Setting("fps") + " out"))
@@ -321,7 +314,9 @@ def test_options_of_the_other_method_are_refused_by_all(
     ("words", "said"),
     [
         ("analyze x", "Did you mean analyse?"),
-        ("track x", "'track' is a command of the program tracker. Type `tracker track`"),
+        ("tarck x", "'tarck' is not a command. Did you mean track?"),
+        ("--markr track x", "--markr: is not an option of `pydpend track`. Did you mean --marker"),
+        ("fit x -o y --marker 1,2", "but of `pydpend analyse`, `pydpend setup` or `pydpend track`"),
         ("fitt x", "Did you mean fit?"),
         ("fit x -o y --hanging-rad 3.14", "--hanging-rad: the option is called --hanging now, in degrees"),
         ("fit x -o y --angle-map", "Did you mean --angle-maps?"),
@@ -403,24 +398,26 @@ def test_a_length_that_nothing_is_made_of_is_refused() -> None:
             dp.angles(nodes, zero="reference_frame", **given)
 
 
-def test_the_program_tracker_says_the_same(tmp_path: Path) -> None:
+@pytest.mark.parametrize("program", [TRACKER, PYDPEND], ids=["tracker", "pydpend"])
+def test_the_trackers_commands_say_the_same(program: Path, tmp_path: Path) -> None:
     def said(*words: str | Path) -> str:
-        done = subprocess.run([TRACKER, *map(str, words)], capture_output=True, text=True, check=False)
+        done = subprocess.run([program, *map(str, words)], capture_output=True, text=True, check=False)
         assert done.returncode == 2, done
         assert done.stderr.count("\n") == 1, done.stderr
         return done.stderr
 
     out = tmp_path / "out.parquet"
-    assert "it is a scene to film, not a film. Next: `tracker film " in said(
+    assert f"it is a scene to film, not a film. Next: `{program.name} film " in said(
         "track", DEMO / "scene.toml", "-o", out
     )
     assert "it is an angles table, not a film. Next: `pydpend fit " in said("info", DEMO / "motion.parquet")
-    assert "it is a film, not a node table. Next: `tracker track " in said("check", DEMO / "drop.mp4")
+    assert f"it is a film, not a node table. Next: `{program.name} track " in said("check", DEMO / "drop.mp4")
     assert "it is a film, not a rig file" in said(
         "track", DEMO / "drop.mp4", "--rig", DEMO / "drop.mp4", "-o", out
     )
     assert "--force" in said("track", DEMO / "drop.mp4", "-o", there(tmp_path))
-    assert "Type `pydpend analyse`" in said("analyze", "x")
+    analyse = "Type `pydpend analyse`" if program == TRACKER else "Did you mean analyse?"
+    assert analyse in said("analyze", "x")
     assert "Did you mean track?" in said("trakc", "x")
     assert '--polarity <POLARITY>: "up" is not known. Give auto, bright or dark' in said(
         "track", "x", "-o", out, "--polarity", "up"
@@ -445,5 +442,5 @@ def test_a_warning_of_the_tracker_speaks_as_its_caller(tmp_path: Path) -> None:
 
 
 def test_every_command_has_its_place() -> None:
-    assert set(_parsers()[1]) == set(COMMANDS)
+    assert list(_parsers()[1]) == [*COMMANDS, *TRACKER_COMMANDS]
     assert all(isinstance(p, argparse.ArgumentParser) for p in _parsers()[1].values())

@@ -87,7 +87,7 @@ def test_a_film_in_place_of_angles_is_told_the_whole_way(
     assert main([str(words.get(word, word)) for word in line.split()]) == 2
     stem = film.with_suffix("")
     assert (
-        f"it is a film, not an angles table. Next: `tracker track {film} -o {stem}.parquet`, then `pydpend angles "
+        f"it is a film, not an angles table. Next: `pydpend track {film} -o {stem}.parquet`, then `pydpend angles "
         f"{stem}.parquet -o {stem}-angles.parquet`, and give what that makes"
     ) in capsys.readouterr().err
 

@@ -14,7 +14,6 @@ ROOT = Path(__file__).parent.parent.parent
 PACKAGE = ROOT / "python" / "pydpend"
 CRATES = {
     "tracker": ROOT / "crates" / "tracker" / "src",
-    "tracker's program": ROOT / "crates" / "tracker" / "src" / "bin" / "tracker",
     "dynamics": ROOT / "crates" / "dynamics" / "src",
     "threads": ROOT / "crates" / "threads" / "src",
     "pydpend": ROOT / "crates" / "pydpend" / "src",

@@ -101,6 +101,7 @@ RUST_GROUPS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("pipeline",),
         ("overlay",),
         ("setup",),
+        ("cli",),
     ),
     "dynamics": (
         ("scalar", "state"),
@@ -129,9 +130,9 @@ def assert_right(graph: Graph, groups: tuple[tuple[str, ...], ...]) -> None:
 
 def test_python_arrows_go_right() -> None:
     graph = python_graph()
-    assert {n for n in top_modules() if n not in ("_native", "py")} == {m[0] for m in graph if m} - {
-        "__main__"
-    }
+    assert {n for n in top_modules() if n not in ("_native", "py", "__main__")} == {
+        m[0] for m in graph if m
+    } - {"__main__"}
     graph.pop(("__main__",), None)
     assert_right(graph, GROUPS)
 

@@ -3,6 +3,7 @@
 //! Each area has its file and is registered by one line in the module below; `python/pydpend` wraps it all.
 
 mod arrays;
+mod command;
 mod dynamics;
 mod errors;
 mod film;
@@ -23,6 +24,8 @@ use pyo3::prelude::*;
 /// The compiled half of pydpend; private.
 #[pymodule]
 mod _native {
+    #[pymodule_export]
+    use super::command::{command, commands};
     #[pymodule_export]
     use super::film::{EncodeSettings, PyFilm, score_places};
     #[pymodule_export]

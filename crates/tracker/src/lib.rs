@@ -30,7 +30,7 @@
 //! ```
 //!
 //! Features: `ffmpeg` reads and writes compressed film, `opencv` decodes pictures, corrects lenses and draws, `cli` is the
-//! program; all are on by default. Without the first two, cameras' own files (Photron, NorPix) and TIFF stacks are read.
+//! command line; all are on by default. Without the first two, cameras' own files (Photron, NorPix) and TIFF stacks are read.
 
 #![cfg_attr(
     not(all(feature = "ffmpeg", feature = "opencv")),
@@ -39,6 +39,8 @@
 
 pub(crate) mod calibrate;
 pub mod camera;
+#[cfg(feature = "cli")]
+pub mod cli;
 pub mod csv_text;
 pub mod detect;
 pub mod discover;

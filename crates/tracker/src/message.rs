@@ -186,7 +186,7 @@ pub enum Piece {
         /// Its value.
         value: Option<String>,
     },
-    /// Something to do with another part of the program: what to type, for example `tracker setup`, and the
+    /// Something to do with another part of the program: what to type, for example `pydpend setup`, and the
     /// function of the Python package, for example `dp.setup`.
     Step(Step),
 }
@@ -235,16 +235,16 @@ impl Step {
 }
 
 /// Looks at a recording.
-pub const INFO: Step = Step::known("tracker info", "dp.info");
+pub const INFO: Step = Step::known("pydpend info", "dp.info");
 /// Finds the rig of a recording.
-pub const SETUP: Step = Step::known("tracker setup", "dp.setup");
+pub const SETUP: Step = Step::known("pydpend setup", "dp.setup");
 /// Makes a node table.
-pub const TRACK: Step = Step::known("tracker track", "dp.track");
+pub const TRACK: Step = Step::known("pydpend track", "dp.track");
 /// Shows a scene with all it may hold.
 pub const PRINT_SCENE: Step =
-    Step::known("tracker film --preset clean --print-scene", "dp.Film('clean').scene");
+    Step::known("pydpend film --preset clean --print-scene", "dp.Film('clean').scene");
 /// Writes the truth of a film that is made.
-pub const FILM_TRUTH: Step = Step::known("tracker film --truth", "dp.film(truth=...)");
+pub const FILM_TRUTH: Step = Step::known("pydpend film --truth", "dp.film(truth=...)");
 
 impl Message {
     /// The message's parts in order.
@@ -369,7 +369,7 @@ mod tests {
             + Setting::Decoder.set_to("ffmpeg")
             + ". See "
             + INFO;
-        assert_eq!(message.to_string(), "Go on with resume, or use decoder ffmpeg. See `tracker info`");
+        assert_eq!(message.to_string(), "Go on with resume, or use decoder ffmpeg. See `pydpend info`");
         assert!(!message.is_empty() && Message::default().is_empty() && Message::from("").is_empty());
     }
 

@@ -38,7 +38,7 @@ class Options(FitOptions, ReadingOptions):
     markers : int, optional
         How many markers a film shows.
     also : str, optional
-        Numbers of the picture of ``tracker setup`` that are to be followed too, with commas.
+        Numbers of the picture of ``pydpend setup`` that are to be followed too, with commas.
     same : tuple of str
         Two nodes of a film that are one marker, ``n1=n2``; once for each pair.
     encoder : str, optional

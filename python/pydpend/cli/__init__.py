@@ -1,6 +1,7 @@
 """The command line ``pydpend``: one module per command, this dispatcher, and nothing else.
 
-A command's module has ``HELP`` (one line), ``add_arguments(parser)`` and ``run(args) -> int``.
+A command's module has ``HELP`` (one line), ``add_arguments(parser)`` and ``run(args) -> int``; those of the tracker are
+run by the compiled half (`tracker`).
 Exit status: 0 done; 1 done, but something was left out and said; 2 an error, in one line on stderr;
 130 interrupted.
 """
@@ -16,6 +17,7 @@ from collections.abc import Iterable
 from contextlib import redirect_stderr, redirect_stdout
 from typing import Any
 
+from pydpend.cli import tracker
 from pydpend.cli.reads import read_by
 from pydpend.cli.words import RENAMED, CommandLine, unknown_command, unknown_option
 from pydpend.errors import PydpendError, listed, speaking
@@ -36,6 +38,10 @@ COMMANDS: tuple[str, ...] = (
     "export",
     "completions",
 )
+"""Those that Python runs."""
+
+ALL = (*COMMANDS, *tracker.COMMANDS)
+"""Every command; where several have an option, an earlier one is named."""
 
 MODULES = {"import": "import_tracks"}
 """Modules of commands whose names are words of Python."""
@@ -81,18 +87,28 @@ class Parser(argparse.ArgumentParser):
 
 
 def parser() -> Parser:
-    """The whole command line. Imports each command's module, which imports nothing heavy at its top."""
+    """The whole command line."""
     return _parsers()[0]
 
 
-def _parsers() -> tuple[Parser, dict[str, argparse.ArgumentParser]]:
-    """The whole command line, and each command's part of it."""
+def _parsers(wanted: Iterable[str] = ALL) -> tuple[Parser, dict[str, argparse.ArgumentParser]]:
+    """The whole command line, and each command's part of it, with the arguments of the commands that are wanted.
+
+    A command's module imports nothing heavy at its top; to know its arguments may take NumPy and more.
+    """
+    wanted = set(wanted)
     top = Parser(
         prog="pydpend",
-        description="From node tables and angles to encoder comparison, damping and a report.",
+        description="From film to node tables, angles, encoder comparison, damping and a report.",
     )
     top.add_argument("--version", action="version", version=f"pydpend {_version()}")
     commands = top.add_subparsers(dest="command", metavar="COMMAND", required=True, parser_class=Parser)
+    films = tracker.described()
+    for name in tracker.COMMANDS:
+        about = films[name]["about"]
+        sub = commands.add_parser(name, help=about, description=about)
+        if name in wanted:
+            tracker.add_arguments(sub, films[name])
     for name in COMMANDS:
         module = importlib.import_module(f"pydpend.cli.{MODULES.get(name, name)}")
         sub = commands.add_parser(
@@ -101,9 +117,15 @@ def _parsers() -> tuple[Parser, dict[str, argparse.ArgumentParser]]:
             description=module.__doc__,
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )
-        module.add_arguments(sub)
+        if name in wanted:
+            module.add_arguments(sub)
         sub.set_defaults(run=module.run)
-    return top, dict(commands.choices)
+    return top, {name: commands.choices[name] for name in ALL}
+
+
+def _commands() -> dict[str, argparse.ArgumentParser]:
+    """Every command with its arguments."""
+    return _parsers()[1]
 
 
 class _Refused(Exception):
@@ -112,21 +134,22 @@ class _Refused(Exception):
 
 def _parse(argv: list[str]) -> tuple[argparse.Namespace, CommandLine]:
     """The arguments, and the front end of their command. Raises _Refused with one line."""
-    top, commands = _parsers()
     word = next((w for w in argv if not w.startswith("-")), None)
-    if word is not None and word not in commands:
-        with speaking(CommandLine(commands, COMMANDS[0])):
-            raise _Refused(unknown_command(word, COMMANDS))
+    if word is not None and word not in ALL:
+        with speaking(CommandLine(_commands, COMMANDS[0])):
+            raise _Refused(unknown_command(word, ALL))
+    if word in tracker.COMMANDS and not {"-h", "--help", "--version"} & set(argv[: argv.index(word)]):
+        raise _Refused(unknown_option(argv[0], word, _commands()))
     try:
-        with speaking(CommandLine(commands, word or COMMANDS[0])):
-            args, rest = top.parse_known_args(_renamed(argv, word))
+        with speaking(CommandLine(_commands, word or COMMANDS[0])):
+            args, rest = _parsers(() if word is None else (word,))[0].parse_known_args(_renamed(argv, word))
     except argparse.ArgumentError as problem:
         raise _Refused(f"{problem.argument_name}: {problem.message}") from None
     if rest:
         if not rest[0].startswith("-"):
             raise _Refused(f"{rest[0]!r} is one argument too many. See `pydpend {args.command} --help`")
-        raise _Refused(unknown_option(rest[0], args.command, commands))
-    return args, CommandLine(commands, args.command)
+        raise _Refused(unknown_option(rest[0], args.command, _commands()))
+    return args, CommandLine(_commands, args.command)
 
 
 def _renamed(argv: list[str], command: str | None) -> list[str]:
@@ -163,9 +186,14 @@ def _look_up_numpy() -> None:
 
 def main(argv: list[str] | None = None) -> int:
     """Runs one command and returns its exit status."""
+    words = sys.argv[1:] if argv is None else argv
+    if words[:1] == ["help"]:
+        words = [*words[1:2], "--help"]
+    if words and words[0] in tracker.COMMANDS:
+        return tracker.run(words)
     with redirect_stdout(Shown(sys.stdout)), redirect_stderr(Shown(sys.stderr)):
         try:
-            args, front = _parse(sys.argv[1:] if argv is None else argv)
+            args, front = _parse(words)
         except _Refused as problem:
             print(f"pydpend: {problem}", file=sys.stderr)
             return 2
@@ -195,7 +223,3 @@ def _run(args: argparse.Namespace) -> int:
         named = "" if error.filename is None else f"{os.fsdecode(error.filename)}: "
         print(f"pydpend: {named}{error.strerror or error}", file=sys.stderr)
         return 2
-
-
-if __name__ == "__main__":
-    sys.exit(main())

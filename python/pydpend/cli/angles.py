@@ -22,7 +22,7 @@ HELP = "node table in, link angles with uncertainties out"
 
 def add_arguments(p: argparse.ArgumentParser) -> None:
     """The options of ``pydpend angles``."""
-    p.add_argument("nodes", metavar="NODES", help="node table of `tracker track` (.parquet or .csv)")
+    p.add_argument("nodes", metavar="NODES", help="node table of `pydpend track` (.parquet or .csv)")
     p.add_argument("-o", "--output", required=True, metavar="OUT", help="angles table (.parquet or .csv)")
     p.add_argument(
         "--estimator",

@@ -21,8 +21,6 @@ from typing import TYPE_CHECKING
 
 from pydpend.cli.flags import add_fields, given
 from pydpend.cli.writes import add_force, check_files
-from pydpend.fit_options import FitOptions
-from pydpend.fit_status import FitStatus
 from pydpend.terminal import below
 
 if TYPE_CHECKING:
@@ -34,6 +32,8 @@ HELP = "damping of each joint from angles of free decays"
 
 def add_arguments(p: argparse.ArgumentParser) -> None:
     """The command's arguments."""
+    from pydpend.fit_options import FitOptions
+
     add_angles_arguments(p, many=True)
     p.add_argument(
         "--model",
@@ -128,6 +128,8 @@ def run(args: argparse.Namespace) -> int:
     """Fits and writes. 1 when the fit did not converge."""
     from pydpend.damping import fit_damping
     from pydpend.fit_folder import FitFolder
+    from pydpend.fit_options import FitOptions
+    from pydpend.fit_status import FitStatus
     from pydpend.model import model_called
     from pydpend.output import check_folder, results_folder
     from pydpend.trials import fit_trials

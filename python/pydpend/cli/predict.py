@@ -15,15 +15,14 @@ from pathlib import Path
 from pydpend.cli.fit import add_angles_arguments, add_output_arguments, read
 from pydpend.cli.flags import add_fields
 from pydpend.cli.writes import check_files
-from pydpend.fit_options import FitOptions
-from pydpend.output import check_folder, results_folder, write_text
-from pydpend.tabular import write_csv
 
 HELP = "predict a recording from a fit to others"
 
 
 def add_arguments(p: argparse.ArgumentParser) -> None:
     """The command's arguments."""
+    from pydpend.fit_options import FitOptions
+
     add_angles_arguments(p, many=False)
     add_fields(p, FitOptions, [f for f in fields(FitOptions) if f.name in ("start_s", "stop_s")])
     p.add_argument(
@@ -39,6 +38,8 @@ def run(args: argparse.Namespace) -> int:
     from pydpend.errors import OptionError, Setting, fault
     from pydpend.fit_folder import load_fit
     from pydpend.number_words import numbers
+    from pydpend.output import check_folder, results_folder, write_text
+    from pydpend.tabular import write_csv
 
     check_folder(args.output)
     check_files(args, *(args.output / name for name in ("predict.json", "windows.csv", "windows.png")))

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import argparse
 import difflib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 from pydpend.errors import Setting, Step, listed
 from pydpend.kinds import misplaced
@@ -29,9 +30,15 @@ def flags_of(keyword: str) -> tuple[str, ...]:
 class CommandLine:
     """The program ``pydpend`` at a command. A setting that the command has not is named with one that has it."""
 
-    def __init__(self, commands: Mapping[str, argparse.ArgumentParser], command: str) -> None:
-        self._commands = {command: commands[command], **commands}
+    def __init__(self, commands: Callable[[], Mapping[str, argparse.ArgumentParser]], command: str) -> None:
+        self._all = commands
         self._command = command
+
+    @cached_property
+    def _commands(self) -> Mapping[str, argparse.ArgumentParser]:
+        """Every command's arguments, this one's first; made when a message names a setting."""
+        commands = self._all()
+        return {self._command: commands[self._command], **commands}
 
     def setting(self, setting: Setting) -> str:
         """``--method energy``."""
@@ -61,7 +68,7 @@ class CommandLine:
             for flag in (*named, *flags_of(keyword)):
                 if flag in options_of(parser):
                     return f"pydpend {command}", flag
-        return "tracker track", flags_of(keyword)[0]
+        return "pydpend track", flags_of(keyword)[0]
 
 
 def options_of(parser: argparse.ArgumentParser) -> list[str]:
@@ -86,16 +93,9 @@ RENAMED: Mapping[str, Mapping[str, Renamed]] = {
 }
 """Old names of options, by command."""
 
-ELSEWHERE = {
-    name: f"tracker {name}" for name in ("info", "setup", "track", "overlay", "check", "film", "score")
-}
-"""Commands of the other program."""
-
 
 def unknown_command(word: str, known: Iterable[str]) -> str:
     """The message for a command that is none."""
-    if word in ELSEWHERE:
-        return f"{word!r} is a command of the program tracker. Type `{ELSEWHERE[word]}`"
     said = misplaced(word, ())
     if said is not None:
         return str(said)

@@ -66,7 +66,7 @@ impl Kind {
         };
         match self {
             Self::Film | Self::Pictures => type_this(
-                format!("tracker track {file} -o {}", joined(&stem, ".parquet")),
+                format!("pydpend track {file} -o {}", joined(&stem, ".parquet")),
                 format!("dp.track({name:?})"),
             ),
             Self::NodeTable => type_this(
@@ -74,7 +74,7 @@ impl Kind {
                 format!("dp.angles(dp.read_nodes({name:?}))"),
             ),
             Self::Truth => {
-                type_this(format!("tracker score NODES {file}"), format!("dp.score(nodes, {name:?})"))
+                type_this(format!("pydpend score NODES {file}"), format!("dp.score(nodes, {name:?})"))
             }
             Self::Angles => type_this(
                 format!("pydpend fit {file} -o {}", joined(&stem, "-damping/")),
@@ -93,11 +93,11 @@ impl Kind {
                 format!("dp.read_calibration({name:?})"),
             ),
             Self::Rig => type_this(
-                format!("tracker track FILM --rig {file} -o nodes.parquet"),
+                format!("pydpend track FILM --rig {file} -o nodes.parquet"),
                 format!("dp.track(film, {name:?})"),
             ),
             Self::Scene => type_this(
-                format!("tracker film {file} -o film.mp4"),
+                format!("pydpend film {file} -o film.mp4"),
                 format!("dp.film({name:?}, 'film.mp4')"),
             ),
             Self::Model => type_this(

@@ -46,7 +46,7 @@ fn what_is_misplaced_is_named_with_the_next_command() {
     let film = folder.path().join("my drop.mp4");
     std::fs::write(&film, b"\0\0\0\x18ftypisom").unwrap();
     let said = misplaced(&film, &[Kind::Angles]).unwrap().to_string();
-    assert!(said.contains("it is a film, not an angles table. Next: `tracker track '"), "{said}");
+    assert!(said.contains("it is a film, not an angles table. Next: `pydpend track '"), "{said}");
     assert!(said.contains("my drop.mp4' -o '") && said.contains("my drop.parquet'`"), "{said}");
     assert!(misplaced(&film, &[Kind::Film]).is_none());
     let archive = folder.path().join("run.npz");

@@ -109,7 +109,7 @@ impl Film {
         if self.scene.camera.depth_bits > 8 { PixelFormat::Gray16 } else { PixelFormat::Gray8 }
     }
 
-    /// The rig of the scene as it stands in frame `index`, with its joints: what a perfect `tracker setup` finds.
+    /// The rig of the scene as it stands in frame `index`, with its joints: what a perfect `pydpend setup` finds.
     pub fn rig(&self, index: u64) -> Rig {
         let scene = &self.scene;
         let mut poses = Vec::new();

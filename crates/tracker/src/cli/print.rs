@@ -4,7 +4,7 @@
 
 use std::io::{self, Write};
 
-use tracker::name::{shown, shown_json, shown_lines};
+use crate::name::{shown, shown_json, shown_lines};
 
 /// Results on standard output, some lines. Whoever reads them may stop reading.
 pub fn lines(text: &str) -> anyhow::Result<()> {
@@ -17,9 +17,9 @@ pub fn json(value: &serde_json::Value) -> anyhow::Result<()> {
     ignore_closed(writeln!(io::stdout(), "{text}"))
 }
 
-/// A message on standard error.
-pub fn say(message: impl std::fmt::Display) {
-    eprintln!("tracker: {}", shown(&message.to_string()));
+/// A program's message on standard error.
+pub fn say(program: &str, message: impl std::fmt::Display) {
+    eprintln!("{program}: {}", shown(&message.to_string()));
 }
 
 fn ignore_closed(written: io::Result<()>) -> anyhow::Result<()> {

@@ -8,10 +8,13 @@ use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-use anyhow::Context;
+use super::print;
+use crate::pipeline::{Candidates, Observer, Stage};
+use anyhow::anyhow;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use tracker::pipeline::{Candidates, Observer, Stage};
 
+/// Whether signals are listened to, or what kept them from being.
+static LISTENS: OnceLock<Result<(), String>> = OnceLock::new();
 /// Number of times that the user asked to stop.
 static ASKED: AtomicUsize = AtomicUsize::new(0);
 /// Time at which the user first asked to stop.
@@ -25,17 +28,20 @@ const PATIENCE: Duration = Duration::from_millis(800);
 /// Exit status of what the user stopped.
 pub const INTERRUPTED: u8 = 130;
 
-/// Begins to listen for ctrl-c and termination signals.
-pub fn listen() -> anyhow::Result<()> {
-    ctrlc::set_handler(|| {
-        FIRST.get_or_init(Instant::now);
-        ASKED.fetch_add(1, Ordering::Relaxed);
-        if !WATCHED.load(Ordering::Relaxed) {
-            eprintln!("tracker: interrupted");
-            std::process::exit(INTERRUPTED.into());
-        }
-    })
-    .context("ctrl-c cannot be listened to")
+/// Begins to listen for ctrl-c and termination signals, once in a process.
+pub fn listen(program: &'static str) -> anyhow::Result<()> {
+    let listens = LISTENS.get_or_init(|| {
+        ctrlc::set_handler(move || {
+            FIRST.get_or_init(Instant::now);
+            ASKED.fetch_add(1, Ordering::Relaxed);
+            if !WATCHED.load(Ordering::Relaxed) {
+                print::say(program, "interrupted");
+                std::process::exit(INTERRUPTED.into());
+            }
+        })
+        .map_err(|error| error.to_string())
+    });
+    listens.clone().map_err(|error| anyhow!("ctrl-c cannot be listened to: {error}"))
 }
 
 /// Shows progress on a terminal's standard error and hears ctrl-c.

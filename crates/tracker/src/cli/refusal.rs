@@ -1,16 +1,17 @@
 //! Explains in one line a command line that cannot be understood: what is wrong, and the choices or the nearest word.
 
 use std::error::Error;
+use std::ffi::OsString;
 use std::num::{IntErrorKind, ParseFloatError, ParseIntError};
 use std::path::Path;
 
-use clap::CommandFactory;
+use clap::Command;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 
-use tracker::kind::misplaced;
+use crate::kind::misplaced;
 
-use crate::args::Cli;
-use crate::words::CommandLine;
+use super::args::command;
+use super::words::CommandLine;
 
 /// Commands of the other program, and American spellings of them.
 const PYDPEND: [(&str, &str); 11] = [
@@ -27,8 +28,13 @@ const PYDPEND: [(&str, &str); 11] = [
     ("report", "analyse"),
 ];
 
-/// The line; `None` for help, versions and what clap says better itself.
-pub fn line(error: &clap::Error) -> Option<String> {
+/// The line; `None` for help, versions and what clap says better itself. `first` is the first word behind the program's name.
+pub fn line(error: &clap::Error, program: &'static str, first: Option<&OsString>) -> Option<String> {
+    let whole = command(program);
+    let help = match first.and_then(|word| whole.find_subcommand(word)) {
+        Some(subcommand) => format!("See `{program} {} --help`", subcommand.get_name()),
+        None => format!("See `{program} --help`"),
+    };
     let arguments = words(error, ContextKind::InvalidArg);
     let argument = arguments.join(", ");
     let value = words(error, ContextKind::InvalidValue).concat();
@@ -43,13 +49,15 @@ pub fn line(error: &clap::Error) -> Option<String> {
             Some(format!("{argument}: {value:?} cannot be ({why})"))
         }
         ErrorKind::UnknownArgument => {
-            Some(unknown_option(&argument, &words(error, ContextKind::SuggestedArg)))
+            let owners = owners(&whole, &argument).map(|name| format!("`{program} {name}`"));
+            let owners: Vec<String> = owners.collect();
+            Some(unknown_option(&argument, &words(error, ContextKind::SuggestedArg), &owners, &help))
         }
         ErrorKind::InvalidSubcommand => {
             let word = words(error, ContextKind::InvalidSubcommand).concat();
-            Some(unknown_command(&word, &words(error, ContextKind::SuggestedSubcommand)))
+            Some(unknown_command(&word, &words(error, ContextKind::SuggestedSubcommand), program))
         }
-        ErrorKind::MissingRequiredArgument => Some(format!("{argument} is missing. See `tracker help`")),
+        ErrorKind::MissingRequiredArgument => Some(format!("{argument} is missing. {help}")),
         ErrorKind::ArgumentConflict => {
             let others = words(error, ContextKind::PriorArg).join(", ");
             Some(format!("{argument} and {others} cannot be given together. Leave one out"))
@@ -69,30 +77,30 @@ fn why(source: &(dyn Error + 'static)) -> String {
     whole.or_else(number).unwrap_or_else(|| source.to_string())
 }
 
-fn unknown_option(option: &str, near: &[String]) -> String {
+/// Subcommands that have an option.
+fn owners<'a>(whole: &'a Command, option: &'a str) -> impl Iterator<Item = &'a str> {
     let name = option.trim_start_matches('-').split('=').next().unwrap_or_default();
-    let whole = Cli::command();
-    let owners: Vec<String> = whole
-        .get_subcommands()
-        .filter(|c| c.get_arguments().any(|a| a.get_long() == Some(name)))
-        .map(|c| format!("`tracker {}`", c.get_name()))
-        .collect();
+    let has = move |c: &&Command| c.get_arguments().any(|a| a.get_long() == Some(name));
+    whole.get_subcommands().filter(has).map(Command::get_name)
+}
+
+fn unknown_option(option: &str, near: &[String], owners: &[String], help: &str) -> String {
     let advice = match near.first() {
-        _ if !owners.is_empty() => format!("{} has it", listed(&owners)),
+        _ if !owners.is_empty() => format!("{} has it", listed(owners)),
         Some(near) => format!("Did you mean {near}?"),
-        None => "See `tracker help`".into(),
+        None => help.to_owned(),
     };
     format!("{option}: it is not an option of this command. {advice}")
 }
 
-fn unknown_command(word: &str, near: &[String]) -> String {
+fn unknown_command(word: &str, near: &[String], program: &'static str) -> String {
     if let Some(fault) = misplaced(Path::new(word), &[]) {
-        return CommandLine::new(Cli::command(), "track").say(&fault.message());
+        return CommandLine::new(program, command(program), "track").say(&fault.message());
     }
-    if let Some((_, command)) = PYDPEND.iter().find(|(known, _)| *known == word.to_lowercase()) {
-        return format!("{word:?} is not a command of tracker but of pydpend. Type `pydpend {command}`");
+    if let Some((_, known)) = PYDPEND.iter().find(|(w, _)| *w == word.to_lowercase()) {
+        return format!("{word:?} is not a command of tracker but of pydpend. Type `pydpend {known}`");
     }
-    let whole = Cli::command();
+    let whole = command(program);
     let known: Vec<String> = whole.get_subcommands().map(|c| c.get_name().to_owned()).collect();
     let advice =
         near.first().map_or_else(|| format!("Give {}", listed(&known)), |n| format!("Did you mean {n}?"));

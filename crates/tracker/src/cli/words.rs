@@ -1,16 +1,23 @@
 //! Writes the library's messages in the words of the command line: settings are flags, steps are commands to type.
 
-use tracker::message::{FrontEnd, Message, Setting};
+use super::print;
+use crate::message::{FrontEnd, Message, Setting};
 
 /// The command line at the subcommand that runs. A setting that it has not is named with a subcommand that has it.
 pub struct CommandLine {
+    program: &'static str,
     whole: clap::Command,
     subcommand: &'static str,
 }
 
 impl CommandLine {
-    pub fn new(whole: clap::Command, subcommand: &'static str) -> Self {
-        Self { whole, subcommand }
+    pub fn new(program: &'static str, whole: clap::Command, subcommand: &'static str) -> Self {
+        Self { program, whole, subcommand }
+    }
+
+    /// Prints a message on standard error, in the program's name.
+    pub fn tell(&self, message: impl std::fmt::Display) {
+        print::say(self.program, message);
     }
 
     /// A message as this subcommand's user types it.
@@ -31,12 +38,18 @@ impl FrontEnd for CommandLine {
         let name = setting.name().replace('_', "-");
         let flag = value.map_or_else(|| format!("--{name}"), |v| format!("--{name} {v}"));
         match self.owner(&name) {
-            Some(owner) if owner != self.subcommand => format!("{flag} (of `tracker {owner}`)"),
+            Some(owner) if owner != self.subcommand => format!("{flag} (of `{} {owner}`)", self.program),
             _ => flag,
         }
     }
 
     fn step(&self, command: &str, _call: &str) -> String {
-        format!("`{command}`")
+        // Steps are those of the whole program. What this one can do too is done with this one.
+        let own =
+            |words: &&str| self.whole.find_subcommand(words.split(' ').next().unwrap_or(words)).is_some();
+        match command.strip_prefix("pydpend ").filter(own) {
+            Some(words) => format!("`{} {words}`", self.program),
+            None => format!("`{command}`"),
+        }
     }
 }

@@ -1,16 +1,15 @@
-//! `tracker check`: whether a node table is valid, and what became of each node.
+//! The subcommand `check`: whether a node table is valid, and what became of each node.
 //!
 //! Owns: its arguments, the summary as text. Must not: decide what is valid.
 
 use std::fmt::Write;
 use std::path::PathBuf;
-use std::process::ExitCode;
 
-use tracker::name::{shown, text};
-use tracker::residual::residuals;
-use tracker::table::read_table;
+use crate::name::{shown, text};
+use crate::residual::residuals;
+use crate::table::read_table;
 
-use crate::print;
+use super::print;
 
 /// Check a node table and sum it up
 #[derive(Debug, clap::Args)]
@@ -23,7 +22,7 @@ pub struct Args {
 }
 
 /// Runs it.
-pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+pub fn run(args: Args) -> anyhow::Result<u8> {
     // Reading checks.
     let table = read_table(&args.nodes)?;
     let summary = table.summary();
@@ -39,7 +38,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             "damage": table.meta.damage,
         });
         print::json(&value)?;
-        return Ok(ExitCode::SUCCESS);
+        return Ok(0);
     }
     let mut out = String::new();
     writeln!(out, "{}: valid, {} frames, {} nodes", text(&args.nodes), table.frames(), summary.len())?;
@@ -67,5 +66,5 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         )?;
     }
     print::lines(&out)?;
-    Ok(ExitCode::SUCCESS)
+    Ok(0)
 }

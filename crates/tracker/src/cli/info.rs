@@ -1,23 +1,22 @@
-//! `tracker info`: what a recording is, without tracking it.
+//! The subcommand `info`: what a recording is, without tracking it.
 
 use std::ffi::OsString;
-use std::process::ExitCode;
 
+use crate::error::Error;
+use crate::frame::{Ending, Frame, FrameSource, PixelFormat, SourceInfo};
+use crate::gaps::Damage;
+use crate::name::{shown, text};
+use crate::peak_level::peak_level;
+use crate::pipeline;
+use crate::pixel_aspect::AspectOrigin;
+use crate::source::{Interlaced, open};
+use crate::timing::{Steps, Timing, notes, rate_words, times_words};
 use rayon::prelude::*;
 use serde_json::{Value, json};
-use tracker::error::Error;
-use tracker::frame::{Ending, Frame, FrameSource, PixelFormat, SourceInfo};
-use tracker::gaps::Damage;
-use tracker::name::{shown, text};
-use tracker::peak_level::peak_level;
-use tracker::pipeline;
-use tracker::pixel_aspect::AspectOrigin;
-use tracker::source::{Interlaced, open};
-use tracker::timing::{Steps, Timing, notes, rate_words, times_words};
 
-use crate::print;
-use crate::reading::OpenArgs;
-use crate::words::CommandLine;
+use super::print;
+use super::reading::OpenArgs;
+use super::words::CommandLine;
 
 /// Number of frames whose time stamps are shown.
 const FIRST: usize = 5;
@@ -62,7 +61,7 @@ struct Times {
 }
 
 /// Runs the subcommand.
-pub fn run(args: Args, front: &CommandLine) -> anyhow::Result<ExitCode> {
+pub fn run(args: Args, front: &CommandLine) -> anyhow::Result<u8> {
     // What film is can be told of interlaced film too.
     let options = args.open.options(Interlaced::AsFrames);
     let mut source = open(&text(&args.input), &options)?;
@@ -74,7 +73,7 @@ pub fn run(args: Args, front: &CommandLine) -> anyhow::Result<ExitCode> {
         print::lines(&as_text(&*source, &seen, &times, front))?;
     }
     let early = matches!(seen.ending, Some(Ending::Early { .. }));
-    Ok(ExitCode::from(u8::from(early || seen.damage.is_damaged())))
+    Ok(u8::from(early || seen.damage.is_damaged()))
 }
 
 /// Decides what the times are by all stamps that were seen.

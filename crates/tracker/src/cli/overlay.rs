@@ -1,20 +1,19 @@
-//! `tracker overlay`: a recording and its node table in, the film with nodes drawn out.
+//! The subcommand `overlay`: a recording and its node table in, the film with nodes drawn out.
 //!
 //! Owns: its arguments. Must not: draw.
 
 use std::ffi::OsString;
 use std::path::PathBuf;
-use std::process::ExitCode;
 
-use tracker::error::Error;
-use tracker::name::text;
-use tracker::output;
-use tracker::overlay::{self, FilmSettings};
-use tracker::source::Interlaced;
-use tracker::table::{read_table, table_files};
+use crate::error::Error;
+use crate::name::text;
+use crate::output;
+use crate::overlay::{self, FilmSettings};
+use crate::source::Interlaced;
+use crate::table::{read_table, table_files};
 
-use crate::reading::OpenArgs;
-use crate::watch::Watch;
+use super::reading::OpenArgs;
+use super::watch::Watch;
 
 /// Draw nodes, names, bodies, trails and gaps into the recording
 #[derive(Debug, clap::Args)]
@@ -49,7 +48,7 @@ pub struct Args {
 }
 
 /// Runs it.
-pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+pub fn run(args: Args) -> anyhow::Result<u8> {
     let nodes = table_files(&args.nodes)?;
     output::check(std::slice::from_ref(&args.output), &nodes, args.force).map_err(Error::Film)?;
     let table = read_table(&args.nodes)?;
@@ -70,5 +69,5 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         &mut watch,
     )?;
     watch.finish();
-    Ok(ExitCode::SUCCESS)
+    Ok(0)
 }

@@ -1,7 +1,6 @@
-//! `tracker completions`: what a shell needs to complete the command line.
+//! The subcommand `completions`: what a shell needs to complete the command line.
 
 use std::io::Write;
-use std::process::ExitCode;
 
 /// Print completions for a shell on standard output
 #[derive(Debug, clap::Args)]
@@ -11,10 +10,10 @@ pub struct Args {
 }
 
 /// Prints the completions of `command`.
-pub fn run(args: Args, mut command: clap::Command) -> anyhow::Result<ExitCode> {
+pub fn run(args: Args, mut command: clap::Command) -> anyhow::Result<u8> {
     // Into memory first: written straight to a pipe whose reader has gone, clap_complete would panic.
     let mut text = Vec::new();
     clap_complete::generate(args.shell, &mut command, "tracker", &mut text);
     std::io::stdout().write_all(&text)?;
-    Ok(ExitCode::SUCCESS)
+    Ok(0)
 }

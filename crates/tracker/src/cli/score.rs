@@ -1,16 +1,15 @@
-//! `tracker score`: a node table against the truth of a film.
+//! The subcommand `score`: a node table against the truth of a film.
 
 use std::fmt::Write;
 use std::path::PathBuf;
-use std::process::ExitCode;
 
-use tracker::score::{LIMIT_PX, Score, Tracked, score};
-use tracker::synth::Truth;
-use tracker::table::read_table;
+use crate::score::{LIMIT_PX, Score, Tracked, score};
+use crate::synth::Truth;
+use crate::table::read_table;
 
-use crate::print;
+use super::print;
 
-/// Compare a node table with the truth that `tracker film` wrote
+/// Compare a node table with the truth that `pydpend film` wrote
 ///
 /// Names need not agree: each tracked node stands for the marker at whose place it is most often.
 #[derive(Debug, clap::Args)]
@@ -28,7 +27,7 @@ pub struct Args {
 }
 
 /// Prints the score. Exit status 1 if an identity was wrong.
-pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+pub fn run(args: Args) -> anyhow::Result<u8> {
     let table = read_table(&args.nodes)?;
     let truth = Truth::read(&args.truth)?;
     let s = score(&Tracked::from(&table), &truth, args.limit)?;
@@ -39,7 +38,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         text(&mut out, &s)?;
         print::lines(&out)?;
     }
-    Ok(ExitCode::from(u8::from(s.wrong > 0 || s.switches > 0)))
+    Ok(u8::from(s.wrong > 0 || s.switches > 0))
 }
 
 fn text(out: &mut String, s: &Score) -> std::fmt::Result {

@@ -1,23 +1,22 @@
-//! `tracker track`: a recording in, a node table out.
+//! The subcommand `track`: a recording in, a node table out.
 //!
 //! Owns: its arguments, what is said of the result. Must not: do any of the work; `pipeline::run` does.
 
 use std::ffi::OsString;
 use std::path::PathBuf;
-use std::process::ExitCode;
 
-use tracker::csv_text::Cells;
-use tracker::error::Error;
-use tracker::name::{shown, text};
-use tracker::pipeline::{Existing, RunSettings, RunSummary, partial_path, run as run_pipeline};
-use tracker::rig::Rig;
-use tracker::table::RunEnding;
+use crate::csv_text::Cells;
+use crate::error::Error;
+use crate::name::{shown, text};
+use crate::pipeline::{Existing, RunSettings, RunSummary, partial_path, run as run_pipeline};
+use crate::rig::Rig;
+use crate::table::RunEnding;
 
-use crate::print;
-use crate::reading::ReadArgs;
-use crate::unclear;
-use crate::watch::{INTERRUPTED, Watch};
-use crate::words::CommandLine;
+use super::print;
+use super::reading::ReadArgs;
+use super::unclear;
+use super::watch::{INTERRUPTED, Watch};
+use super::words::CommandLine;
 
 /// Follow the markers of a recording and write a node table
 #[derive(Debug, clap::Args)]
@@ -27,7 +26,7 @@ pub struct Args {
     /// The table, Parquet or CSV by the ending
     #[arg(short, long, value_name = "OUT.{parquet,csv}")]
     output: PathBuf,
-    /// Nodes, bodies and joints, as `tracker setup` writes them; found in the recording if not given
+    /// Nodes, bodies and joints, as `pydpend setup` writes them; found in the recording if not given
     #[arg(long, value_name = "RIG.toml")]
     rig: Option<PathBuf>,
     #[command(flatten)]
@@ -50,7 +49,7 @@ pub struct Args {
 }
 
 impl Args {
-    fn settings(&self) -> tracker::error::Result<RunSettings> {
+    fn settings(&self) -> crate::error::Result<RunSettings> {
         Ok(RunSettings {
             output: Some(self.output.clone()),
             existing: match (self.resume, self.force) {
@@ -67,41 +66,41 @@ impl Args {
 }
 
 /// Runs it.
-pub fn run(args: Args, front: &CommandLine) -> anyhow::Result<ExitCode> {
+pub fn run(args: Args, front: &CommandLine) -> anyhow::Result<u8> {
     let mut watch = Watch::new(args.quiet);
     let settings = args.settings()?;
     let outcome = run_pipeline(&settings, &mut watch);
     if let Err(Error::Detect(_) | Error::Rig(_)) = &outcome {
         let picture = unclear::picture_beside(&args.output);
-        unclear::tell(&settings, &picture, args.force, &mut watch);
+        unclear::tell(&settings, &picture, args.force, &mut watch, front);
     }
     watch.finish();
     let state = partial_path(&args.output);
     if matches!(outcome, Err(Error::Interrupted)) && state.exists() {
         let state = text(&state);
-        print::say(format!("interrupted; {state} holds what was detected. Go on with --resume"));
-        return Ok(ExitCode::from(INTERRUPTED));
+        front.tell(format!("interrupted; {state} holds what was detected. Go on with --resume"));
+        return Ok(INTERRUPTED);
     }
     let summary = outcome?;
     if !args.quiet {
         for warning in &summary.warnings {
-            print::say(format!("note: {}", front.say(warning)));
+            front.tell(format!("note: {}", front.say(warning)));
         }
     }
     let lost = summary.lost();
     if let Some(words) = summary.meta.damage.words() {
-        print::say(format!("{}: {words}. All other frames are in {}", text(&args.input), text(&args.output)));
+        front.tell(format!("{}: {words}. All other frames are in {}", text(&args.input), text(&args.output)));
     }
     let status = match &summary.meta.ending {
         RunEnding::Interrupted => {
             let go_on = if summary.resumable { ". Go on with --resume" } else { "" };
             let output = text(&args.output);
-            print::say(format!("interrupted after {} frames; {output} holds them{go_on}", summary.frames));
+            front.tell(format!("interrupted after {} frames; {output} holds them{go_on}", summary.frames));
             INTERRUPTED
         }
         RunEnding::Early { frames, byte, reason } => {
             let at = byte.map(|b| format!(", byte {b}")).unwrap_or_default();
-            print::say(format!(
+            front.tell(format!(
                 "{}{at}: the recording ended early, after {frames} frames ({reason}). They are all in {}",
                 text(&args.input),
                 text(&args.output)
@@ -109,11 +108,11 @@ pub fn run(args: Args, front: &CommandLine) -> anyhow::Result<ExitCode> {
             1
         }
         RunEnding::Complete | RunEnding::Damaged if !lost.is_empty() => {
-            print::say(format!("not seen again up to the end: {}", lost.join(", ")));
+            front.tell(format!("not seen again up to the end: {}", lost.join(", ")));
             1
         }
         RunEnding::Complete if !summary.doubtful.is_empty() => {
-            print::say(format!("doubtful, as the notes say: {}", summary.doubtful.join(", ")));
+            front.tell(format!("doubtful, as the notes say: {}", summary.doubtful.join(", ")));
             1
         }
         RunEnding::Damaged => 1,
@@ -124,7 +123,7 @@ pub fn run(args: Args, front: &CommandLine) -> anyhow::Result<ExitCode> {
     } else if !args.quiet {
         print_text(&args, &summary)?;
     }
-    Ok(ExitCode::from(status))
+    Ok(status)
 }
 
 fn print_json(args: &Args, summary: &RunSummary, status: u8, front: &CommandLine) -> anyhow::Result<()> {

@@ -2,14 +2,14 @@
 
 use std::ops::Range;
 
+use crate::detect::{Centroid, DetectSettings, PolaritySetting, Threshold};
+use crate::pipeline::{RunSettings, frame_range};
+use crate::pixel_aspect::PixelAspect;
+use crate::rig::Region;
+use crate::setting_words::Worded;
+use crate::source::{Decoder, Interlaced, OpenOptions};
+use crate::wanted::{Pointed, Wanted};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use tracker::detect::{Centroid, DetectSettings, PolaritySetting, Threshold};
-use tracker::pipeline::{RunSettings, frame_range};
-use tracker::pixel_aspect::PixelAspect;
-use tracker::rig::Region;
-use tracker::setting_words::Worded;
-use tracker::source::{Decoder, Interlaced, OpenOptions};
-use tracker::wanted::{Pointed, Wanted};
 
 /// Arguments of opening a recording: of every subcommand that reads one.
 #[derive(Debug, Clone, clap::Args)]
@@ -84,7 +84,7 @@ struct WantedArgs {
     /// How many markers there are
     #[arg(long, value_name = "N")]
     markers: Option<usize>,
-    /// Follow these numbers of the picture of `tracker setup` too
+    /// Follow these numbers of the picture of `pydpend setup` too
     #[arg(long, value_name = "N,...", value_delimiter = ',')]
     also: Vec<usize>,
     /// Two nodes are one marker, whose name is the first; once for each pair
@@ -151,10 +151,10 @@ fn pair(text: &str) -> Result<Pair, String> {
 
 #[cfg(test)]
 mod tests {
-    use clap::{Args, Command, CommandFactory};
+    use clap::{Args, Command};
 
+    use super::super::args::command;
     use super::*;
-    use crate::args::Cli;
 
     /// The flags of some arguments.
     fn flags<A: Args>() -> Vec<String> {
@@ -167,7 +167,7 @@ mod tests {
 
     #[test]
     fn every_command_takes_every_option_of_what_it_reads() {
-        let whole = Cli::command();
+        let whole = command("tracker");
         let (mut opens, mut detects) = (Vec::new(), Vec::new());
         for command in whole.get_subcommands() {
             let has = flags_of(command);

@@ -1,21 +1,20 @@
-//! `tracker film`: a scene in, a film and its truth out.
+//! The subcommand `film`: a scene in, a film and its truth out.
 
 use std::path::PathBuf;
-use std::process::ExitCode;
 
-use clap::builder::PossibleValuesParser;
-use tracker::csv_text::Cells;
-use tracker::error::Error;
-use tracker::output;
-use tracker::pipeline::{Observer, Stage};
-use tracker::synth::encode::Codec;
-use tracker::synth::{
+use crate::csv_text::Cells;
+use crate::error::Error;
+use crate::output;
+use crate::pipeline::{Observer, Stage};
+use crate::synth::encode::Codec;
+use crate::synth::{
     Film, MECHANISMS, MotionTable, PRESETS, Scene, View, WriteOptions, film_files, preset, write,
 };
+use clap::builder::PossibleValuesParser;
 
-use crate::print;
-use crate::reading::word;
-use crate::watch::Watch;
+use super::print;
+use super::reading::word;
+use super::watch::Watch;
 
 /// Make a film of markers on links, with its truth: to try a marker layout, a light and a frame rate before the rig
 /// is built, or to test a tracker.
@@ -37,7 +36,7 @@ pub struct Args {
     /// Where the truth goes: .parquet or .csv, a row per frame and marker.
     #[arg(long, value_name = "TABLE", requires = "output")]
     truth: Option<PathBuf>,
-    /// Where the rig goes, as a perfect `tracker setup` would find it in frame 0.
+    /// Where the rig goes, as a perfect `pydpend setup` would find it in frame 0.
     #[arg(long, value_name = "RIG.toml")]
     rig: Option<PathBuf>,
     /// Print the scene as TOML, with all that was left out filled in; edit it and film it.
@@ -119,7 +118,7 @@ impl Args {
 }
 
 /// Makes the film.
-pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+pub fn run(args: Args) -> anyhow::Result<u8> {
     let scene = args.scene()?;
     if args.print_scene {
         print::lines(&scene.to_toml()?)?;
@@ -136,7 +135,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         output::check(&outputs, &reads, args.force).map_err(Error::Film)?;
         film.rig(0).write(path)?;
     }
-    let Some(output) = &args.output else { return Ok(ExitCode::SUCCESS) };
+    let Some(output) = &args.output else { return Ok(0) };
     let options = WriteOptions {
         codec: args.codec,
         quality: args.quality,
@@ -155,5 +154,5 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         if watch.interrupted() { Err(Error::Interrupted) } else { Ok(()) }
     })?;
     watch.finish();
-    Ok(ExitCode::SUCCESS)
+    Ok(0)
 }

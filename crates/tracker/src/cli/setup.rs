@@ -1,23 +1,22 @@
-//! `tracker setup`: a recording in, its rig out, with an annotated picture and advice.
+//! The subcommand `setup`: a recording in, its rig out, with an annotated picture and advice.
 //!
 //! Owns: its arguments, what is said of the result. Must not: find anything itself.
 
 use std::ffi::OsString;
 use std::fmt::Write;
 use std::path::PathBuf;
-use std::process::ExitCode;
 
-use tracker::error::Error;
-use tracker::name::text;
-use tracker::source;
-use tracker::table::RunEnding;
-use tracker::{output, setup};
+use crate::error::Error;
+use crate::name::text;
+use crate::source;
+use crate::table::RunEnding;
+use crate::{output, setup};
 
-use crate::print;
-use crate::reading::ReadArgs;
-use crate::unclear;
-use crate::watch::Watch;
-use crate::words::CommandLine;
+use super::print;
+use super::reading::ReadArgs;
+use super::unclear;
+use super::watch::Watch;
+use super::words::CommandLine;
 
 /// Find markers, bodies and joints of a recording and write them as a rig file to be edited
 #[derive(Debug, clap::Args)]
@@ -41,7 +40,7 @@ pub struct Args {
 }
 
 /// Runs it.
-pub fn run(args: Args, front: &CommandLine) -> anyhow::Result<ExitCode> {
+pub fn run(args: Args, front: &CommandLine) -> anyhow::Result<u8> {
     let picture = args.picture.clone().unwrap_or_else(|| args.output.with_extension("png"));
     let input = text(&args.input);
     let outputs = [args.output.clone(), picture.clone()];
@@ -50,7 +49,7 @@ pub fn run(args: Args, front: &CommandLine) -> anyhow::Result<ExitCode> {
     let mut watch = Watch::new(args.quiet);
     let found = setup::find(&settings, &mut watch);
     if let Err(Error::Detect(_) | Error::Rig(_)) = &found {
-        unclear::tell(&settings, &picture, args.force, &mut watch);
+        unclear::tell(&settings, &picture, args.force, &mut watch, front);
     }
     let found = found?;
     watch.finish();
@@ -58,7 +57,7 @@ pub fn run(args: Args, front: &CommandLine) -> anyhow::Result<ExitCode> {
     found.picture.save(&picture)?;
     rig.write(&args.output)?;
     for warning in &found.warnings {
-        print::say(format!("note: {}", front.say(warning)));
+        front.tell(format!("note: {}", front.say(warning)));
     }
     if !args.quiet {
         let mut out = String::new();
@@ -77,5 +76,5 @@ pub fn run(args: Args, front: &CommandLine) -> anyhow::Result<ExitCode> {
         print::lines(&out)?;
     }
     // The rig is of what could be read.
-    Ok(ExitCode::from(u8::from(found.ending != RunEnding::Complete)))
+    Ok(u8::from(found.ending != RunEnding::Complete))
 }
