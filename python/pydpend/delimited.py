@@ -11,13 +11,14 @@ import io
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NoReturn
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING, NoReturn
 
 from pydpend.errors import Message, PydpendError, Setting, fault
 from pydpend.units import unit_at_end
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 EMPTY = frozenset({"", "nan", "na", "n/a", "null", "none"})
 """Fields (lower case, stripped) that mean "no value"."""
@@ -421,6 +422,8 @@ class Numbers:
 
     def column(self, column: str) -> NDArray[np.float64]:
         """The numbers of a column (R,), NaN where there is none."""
+        import numpy as np
+
         fields = [f or "nan" for f in self._fields[column]]
         if self._comma:
             fields = [f.replace(",", ".") for f in fields]

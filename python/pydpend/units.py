@@ -8,10 +8,11 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
-import numpy as np
-from numpy.typing import NDArray
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 Quantity = Literal["time", "voltage", "angle"]
 
@@ -26,6 +27,8 @@ class UnitOf:
 
     def to_base(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values of this unit in s, V or rad."""
+        import numpy as np
+
         if self.name == "deg":
             return np.asarray(np.radians(values), dtype=np.float64)
         return values if self.per_base == 1.0 else values / self.per_base
