@@ -38,7 +38,7 @@ COMMANDS: tuple[str, ...] = (
     "export",
     "completions",
 )
-"""Those that Python runs."""
+"""Commands that Python runs."""
 
 ALL = (*COMMANDS, *tracker.COMMANDS)
 """Every command; where several have an option, an earlier one is named."""
