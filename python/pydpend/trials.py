@@ -231,7 +231,10 @@ def summary(each: Sequence[DampingFit], joint: DampingFit) -> Trials:
                 of_parts = np.array(
                     [0.0 if f.consistency is None else f.consistency.sigma.get(name, 0.0) for f in each]
                 )
-                shared = np.hypot(of_camera, of_parts) if group == "coefficients" else None
+                of_laws = np.array(
+                    [0.0 if f.omitted is None else f.omitted.sigma.get(name, 0.0) for f in each]
+                )
+                shared = np.sqrt(of_camera**2 + of_parts**2 + of_laws**2) if group == "coefficients" else None
                 spreads[name] = combine(pairs[:, 0], pairs[:, 1], estimate.unit, shared)
     differing = [name for name, s in spreads.items() if s.p_value < 0.01]
     message = (

@@ -1,6 +1,9 @@
 """The issue's table of accuracies over seeds held back (0-19):
 ``python -m tests.validation.validate_damping CASE [SEEDS [FIRST]]``.
 
+``python -m tests.validation.validate_damping wrong [SEEDS [FIRST [KIND]]]``: inputs of which something is wrong
+(`tests.support.wrong_inputs`), the paper's laws and free ratios: how many intervals hold, and if the cause is named.
+
 Cases: exact, energy, inertias (true inertias), ratios (inertias up to 2 % off), slow (500 fps, 0.1 deg), all (every
 law), added (the paper's laws alone, fitted with every law), none (mu_q2 is zero); speed (wall and processor time,
 memory; no seeds). Prints each seed's errors, and over all the worst and how often 95 % intervals hold the truth. Not
@@ -21,6 +24,7 @@ from pydpend.damping.shares import shares
 from pydpend.model import Damping, derived
 
 from tests.support.free_decays import ALL_TERMS, TRUTH, measured, released
+from tests.support.wrong_inputs import kinds
 
 RATIOS = {"lambda": "lambda_kg_m2", "sigma": "sigma_j", "kappa": "kappa_j", "a3": "a3_kg_m2"}
 
@@ -54,6 +58,26 @@ def shares_off(result: DampingFit, motion: energy.Motion, truth: Damping) -> flo
         e.value - true[group][k].value for group in ("law", "joint") for k, e in result.shares[group].items()
     ]
     return 100 * float(np.abs(off).max())
+
+
+def wrong(seeds: int, first: int, only: str = "") -> None:
+    """Prints a row for each kind of wrong input."""
+    for name, kind in kinds().items():
+        if only and name != only:
+            continue
+        inside, z, named, done = [], [], 0, 0
+        for seed in range(first, first + seeds):
+            fit = fit_damping(kind.angles(seed), kind.given, laws="paper")
+            score = [(e.value - getattr(kind.truth, n)) / e.sigma for n, e in fit.coefficients.items()]
+            inside += [abs(s) < 1.96 for s in score]
+            z.append(max(map(abs, score)))
+            named += kind.named(fit)
+            done += fit.status == "converged"
+        print(
+            f"{name} ({kind.about}): {done} of {seeds} converged, 95 % intervals hold {100 * np.mean(inside):.1f} % of "
+            f"{len(inside)}, largest |z| {max(z):.2f}, cause named in {named} of {seeds}",
+            flush=True,
+        )
 
 
 def main(case: str, seeds: int, first: int) -> None:
@@ -128,5 +152,9 @@ def main(case: str, seeds: int, first: int) -> None:
 
 
 if __name__ == "__main__":
+    if sys.argv[1] == "wrong":
+        given = [*sys.argv[2:], *("20", "200", "")[len(sys.argv[2:]) :]]
+        wrong(int(given[0]), int(given[1]), given[2])
+        sys.exit()
     counts = [int(a) for a in sys.argv[2:]]
     main(sys.argv[1], *counts, *(20, 0)[len(counts) :])

@@ -7,6 +7,7 @@ from pydpend.damping.consistency import Consistency, Explanation, LengthCheck, R
 from pydpend.damping.fit import fit_damping
 from pydpend.damping.fitted_recording import AngleMaps, FittedRecording, Window
 from pydpend.damping.maps import Maps
+from pydpend.damping.omitted import Omitted
 from pydpend.damping.prediction import Prediction, predict
 from pydpend.damping.result import DampingFit
 from pydpend.damping.result_parts import (
@@ -30,6 +31,7 @@ __all__ = [
     "Interval",
     "LengthCheck",
     "Maps",
+    "Omitted",
     "Prediction",
     "RatioCheck",
     "Residuals",

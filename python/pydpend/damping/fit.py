@@ -9,10 +9,11 @@ from typing import Unpack
 import numpy as np
 from numpy.typing import NDArray
 
-from pydpend.coefficients import RATIOS, parameters, ratios_of
+from pydpend.coefficients import FREE, FULL, RATIOS, parameters, ratios_of
 from pydpend.damping import camera, shooting
 from pydpend.damping.compare import compare_terms
 from pydpend.damping.of_motion import pendulum_of_decay, without_load
+from pydpend.damping.omitted import Wider, explained, left_out
 from pydpend.damping.plausible import check_followed, modes_hz
 from pydpend.damping.prediction import held_out
 from pydpend.damping.profile import fit_energy
@@ -124,6 +125,8 @@ def _trajectory(
 ) -> DampingFit:
     """The trajectory fit, with the prediction and the comparison that are asked for."""
     fit = fit_trajectory(recordings, model, names, options, progress=progress)
+    if fit.within_noise is False and options.frees_ratios:
+        fit = _with_omitted(fit, recordings, model, names, options)
     if options.prediction:
         bare = options.bare()
         prediction, note = held_out(
@@ -137,6 +140,41 @@ def _trajectory(
             return replace(fit, notes=(*fit.notes, f"the terms were not compared: {problem}"))
         fit = replace(fit, terms=terms)
     return fit
+
+
+def _with_omitted(
+    fit: DampingFit, recordings: Sequence[Recording], model: Model, names: Sequence[str], options: FitOptions
+) -> DampingFit:
+    """The fit with what laws that were left out would make of it, in its errors and in words."""
+    bare = options.bare()
+
+    def wider(more: tuple[str, ...]) -> Wider | None:
+        laws = [n for n in FULL if n in names or n in more]
+        freed = [n for n in FREE if n in options.freed or n in more]
+        try:
+            found = fit_trajectory(recordings, model, laws, replace(bare, free=freed), checked=False)
+        except FitError:
+            return None
+        further = {n: found.freed[n] for n in freed if n in found.freed}
+        return Wider(found.chi2, bool(found.within_noise), found.coefficients, further)
+
+    groups = left_out(names, options.freed, links=recordings[0].angles.links, scale_known=model.scale_known)
+    omitted = explained(names, fit.coefficients, fit.chi2, groups, wider)
+    if omitted is None:
+        return fit
+    added = np.array([omitted.sigma.get(n, 0.0) for n in fit.names])
+    cov = fit.covariance + np.diag(added**2)
+    coefficients = {
+        n: replace(e, sigma=float(np.hypot(e.sigma, omitted.sigma.get(n, 0.0))))
+        for n, e in fit.coefficients.items()
+    }
+    return replace(
+        fit,
+        coefficients=coefficients,
+        covariance=cov,
+        omitted=omitted,
+        notes=(*fit.notes, omitted.sentence),
+    )
 
 
 def _energy(

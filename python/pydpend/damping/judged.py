@@ -8,18 +8,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pydpend.coefficients import FULL, RATIOS, ratios_of
+from pydpend.coefficients import FREE, FULL, RATIOS, ratios_of
 from pydpend.damping import camera, maps, plausible, shooting
 from pydpend.damping.contradiction import carried
 from pydpend.damping.parts import length_check
 from pydpend.damping.recording import FittedZero, Recording
 from pydpend.damping.result import DampingFit
-from pydpend.damping.result_parts import estimates
+from pydpend.damping.result_parts import Estimate, estimates
 from pydpend.damping.shares import energy_curve, shares, unit_works
 from pydpend.damping.shooting import Progress, Solution, Track
 from pydpend.damping.uncertainty import covariance, identifiability
 from pydpend.information import check_errors
-from pydpend.model import Model
+from pydpend.model import UNITS, Model
 
 Floats = NDArray[np.float64]
 
@@ -131,6 +131,7 @@ def judge(found: Found, progress: Progress | None = None, *, checked: bool = Tru
         modes_hz=plausible.modes_hz(fitted)[:links],
         maps=None if found.bias is None else found.bias.result(),
         scale_known=known,
+        freed=_freed(solution, whole),
         camera_sigma={n: of_camera[n] for n in names if n in of_camera},
         consistency=held_against.consistency,
         notes=(
@@ -164,6 +165,16 @@ def _scaled(solution: Solution, whole: Floats, names: Sequence[str]) -> tuple[tu
     check_errors(list(kept), cov)
     scale = np.array([1 / solution.parameters["psi"] if n in RATIOS else 1.0 for n in kept])
     return kept, cov * np.outer(scale, scale)
+
+
+def _freed(solution: Solution, whole: Floats) -> dict[str, Estimate]:
+    """Further parameters that were free, with their standard errors."""
+    sigma = np.sqrt(np.maximum(np.diag(whole), 0.0))
+    return {
+        n: Estimate(float(solution.parameters.get(n, 0.0)), float(sigma[i]), UNITS[n])
+        for i, n in enumerate(solution.names)
+        if n in FREE
+    }
 
 
 def _slack_told(solution: Solution, relative: Floats) -> dict[str, float]:

@@ -13,6 +13,7 @@ from pydpend import _native
 from pydpend.coefficients import FULL, RATIOS, unit
 from pydpend.damping.consistency import Consistency
 from pydpend.damping.fitted_recording import AngleMaps, FittedRecording, Window
+from pydpend.damping.omitted import Omitted
 from pydpend.damping.result_parts import (
     SHORT_S,
     EnergyCurve,
@@ -102,6 +103,10 @@ class DampingFit(JsonResult, TableResult):
     consistency : pydpend.damping.Consistency or None
         The ratios against the model's parts: g, clock and length, contradictions and what explains them (trajectory fit
         of two links with free ratios).
+    omitted : pydpend.damping.Omitted or None
+        Laws that were left out and would explain a misfit beyond the noise (trajectory fit).
+    freed : dict of str to pydpend.damping.Estimate
+        Further parameters that were fitted too (``free``).
     notes : tuple of str
         What was left out or should be known.
     """
@@ -138,6 +143,8 @@ class DampingFit(JsonResult, TableResult):
     scale_known: bool = True
     camera_sigma: dict[str, float] = field(default_factory=dict)
     consistency: Consistency | None = None
+    omitted: Omitted | None = None
+    freed: dict[str, Estimate] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
@@ -259,6 +266,8 @@ class DampingFit(JsonResult, TableResult):
             "scale_known": self.scale_known,
             "camera_sigmas": self.camera_sigma,
             "consistency": None if self.consistency is None else self.consistency.to_dict(),
+            "omitted": None if self.omitted is None else self.omitted.to_dict(),
+            "freed": {k: v.to_dict() for k, v in self.freed.items()},
             "notes": list(self.notes),
         }
         values: dict[str, Any] = plain(out)
@@ -340,8 +349,18 @@ class DampingFit(JsonResult, TableResult):
             scale_known=table.flag("scale_known") if "scale_known" in table else True,
             camera_sigma=_numbers_of(table, "camera_sigmas"),
             consistency=Consistency.of_table(table.table("consistency")) if "consistency" in table else None,
+            omitted=Omitted.of_table(table.table("omitted")) if "omitted" in table else None,
+            freed={n: Estimate.of_table(t) for n, t in _tables_of(table, "freed").items()},
             notes=table.texts("notes"),
         )
+
+
+def _tables_of(table: Table, key: str) -> dict[str, Table]:
+    """Tables by their names; empty in a file written before there were any."""
+    if key not in table:
+        return {}
+    found = table.table(key)
+    return {name: found.table(name) for name in found}
 
 
 def _numbers_of(table: Table, key: str) -> dict[str, float]:

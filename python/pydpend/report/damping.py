@@ -90,6 +90,8 @@ def warnings(fit: DampingFit) -> list[str]:
     if fit.consistency is not None:
         told = fit.consistency.sentences
         out += [sentence(s.removeprefix("warning: ")) for s in told if s.startswith("warning: ")]
+    if fit.omitted is not None and fit.omitted.explains:
+        out.append(sentence(fit.omitted.sentence.removeprefix("warning: ")))
     # The sentence on the whole recording; those on single coefficients stand with them.
     if fit.identifiability.too_short:
         out.append(fit.identifiability.warning)
