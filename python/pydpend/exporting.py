@@ -1,4 +1,6 @@
-"""Node tables in the forms that other people's programs ask for: C3D, TRC, DLTdv's xypts CSV, MAT.
+"""Results in the forms that other people's programs ask for: nodes as C3D, TRC, DLTdv's xypts CSV, MAT, NetCDF, Excel.
+
+Angles, states and other tables are `pydpend.table_exports`' part.
 
 C3D and TRC are three-dimensional and in a length: x right, y up from the lowest row of pixels, z zero, in mm if a
 scale is given and else in px, which the file then says. What is not seen is what each form has for it.
@@ -7,7 +9,7 @@ scale is given and else in px, which the file then says. What is not seen is wha
 from __future__ import annotations
 
 import os
-import shutil
+import struct
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -18,6 +20,8 @@ from numpy.typing import NDArray
 from pydpend.errors import ArgumentError, Setting, TableError, fault
 from pydpend.nodes import STATUS_WORDS, Nodes
 from pydpend.output import whole
+from pydpend.table_exports import TABLE_WRITERS, write_excel, write_netcdf
+from pydpend.tabular import TableResult
 from pydpend.typed import typed
 
 LEAST_EVEN = 1e-6
@@ -32,43 +36,57 @@ LAST_C3D_FRAME = 65534
 gives the first 65535 frames, c3d 0.6 fails)."""
 
 
+RESIDUAL_STEPS = 127
+"""C3D's residuals have seven bits."""
+
+
 @typed()
-def export(nodes: Nodes, path: str | os.PathLike[str], *, px_per_m: float | None = None) -> None:
-    """Writes nodes for another program, by the ending: `.c3d`, `.trc`, `.csv` (DLTdv xypts) or `.mat`.
+def export(
+    result: Nodes | TableResult, path: str | os.PathLike[str], *, px_per_m: float | None = None
+) -> None:
+    """Writes nodes, angles, states or another table for another program, by the ending of the file.
+
+    Nodes: `.c3d`, `.trc`, `.csv` (DLTdv's xypts), `.mat`, `.nc` (NetCDF as movement has poses) and `.xlsx`. Angles,
+    states and other tables: `.csv`, `.mat`, `.nc`, `.xlsx`, `.parquet`, and `.mot` or `.sto` (OpenSim's, in rad).
 
     Parameters
     ----------
-    nodes : Nodes
-        The nodes.
+    result : Nodes, LinkAngles, LinkStates or another result that is a table
+        The result.
     path : path-like
         The file; one that is there is replaced when the new one is whole.
     px_per_m : float, optional
-        Scale of the image, px per m; C3D and TRC are then in mm. Not used for the others, which are in px.
+        Scale of the image, px per m; C3D and TRC are then in mm. The others are in px.
 
     Raises
     ------
     ArgumentError
         If the ending is not known or the scale makes no sense.
     TableError
-        If the form cannot hold the table (C3D and TRC need one rate, and C3D ends at frame 65534 counted from 1), or
-        the file cannot be written.
+        If the form cannot hold the table (C3D and TRC need one rate, C3D ends at frame 65534 counted from 1, a sheet of
+        Excel at row 1048576), a library for it is not installed, or the file cannot be written.
     """
     target = Path(os.fsdecode(path))
-    writer = WRITERS.get(target.suffix.lower())
-    if writer is None:
+    known: tuple[str, ...] = tuple(WRITERS if isinstance(result, Nodes) else TABLE_WRITERS)
+    ending = target.suffix.lower()
+    if ending not in known:
         raise ArgumentError(
-            fault(str(target), f"the ending is none of {', '.join(WRITERS)}", "Choose one of them")
+            fault(str(target), f"the ending is none of {', '.join(known)}", "Choose one of them")
         )
     if px_per_m is not None and not (np.isfinite(px_per_m) and px_per_m > 0):
         raise ArgumentError(
             fault(Setting("px_per_m"), f"{px_per_m} is no scale", "Give pixels per metre, above 0")
         )
-    nodes.check()
-    if writer is _c3d:
-        _numbered(nodes, str(target))
+    if isinstance(result, Nodes):
+        result.check()
+        if ending == ".c3d":
+            _numbered(result, str(target))
     try:
         with whole(target) as new:
-            writer(nodes, new, px_per_m, target.name)
+            if isinstance(result, Nodes):
+                WRITERS[ending](result, new, px_per_m, target.name)
+            else:
+                TABLE_WRITERS[ending](result, new, target.name)
     except OSError as error:
         raise TableError(
             fault(str(target), f"it cannot be written ({error})", "Choose another folder")
@@ -132,15 +150,22 @@ def _c3d(nodes: Nodes, path: Path, px_per_m: float | None, name: str) -> None:
     parameters["LABELS"]["value"] = list(nodes.rig.names)
     parameters["UNITS"]["value"] = [unit]
     file["data"]["points"] = points
-    # The residual is the length of the uncertainty; -1 is C3D's word for a point that is not there.
-    residuals = np.where(nodes.seen, nodes.sigma_px * scale, -1.0)
+    # The residual is the length of the uncertainty in whole steps, of which ezc3d cuts the decimals off; 0 is C3D's
+    # word for a point that was filled in, -1 for one that is not there.
+    step = float(np.max(nodes.sigma_px, where=nodes.seen, initial=0.0)) * scale / RESIDUAL_STEPS or 1.0
+    steps = np.maximum(np.rint(nodes.sigma_px * (scale / step)), 1)
+    residuals = np.where(nodes.seen, (steps + 0.25) * step, -1.0)
+    parameters["SCALE"]["value"] = [-step]
     file["data"]["meta_points"]["residuals"] = residuals.T[None]
     file["header"]["points"]["first_frame"] = int(nodes.frame[0])
     # ezc3d takes names in UTF-8 only, and the folder's may be none.
     with tempfile.TemporaryDirectory() as folder:
         plain = Path(folder) / "nodes.c3d"
         file.write(str(plain))
-        shutil.copyfile(plain, path)
+        data = bytearray(plain.read_bytes())
+    # ezc3d has the step in POINT:SCALE alone, and the header has it too.
+    data[12:16] = struct.pack("<f", -step)
+    path.write_bytes(data)
 
 
 def _trc(nodes: Nodes, path: Path, px_per_m: float | None, name: str) -> None:
@@ -160,7 +185,7 @@ def _trc(nodes: Nodes, path: Path, px_per_m: float | None, name: str) -> None:
         file.write("\n".join(head) + "\n")
         for t in range(count):
             # Frames count from 1 here; what is not seen is left empty.
-            cells = ("" if np.isnan(v) else f"{v:.6f}" for v in places[t].ravel())
+            cells = ("" if np.isnan(v) else repr(v) for v in places[t].ravel().tolist())
             file.write(f"{nodes.frame[t] + 1}\t{float(nodes.t_s[t])!r}\t" + "\t".join(cells) + "\n")
 
 
@@ -170,7 +195,9 @@ def _dltdv(nodes: Nodes, path: Path, px_per_m: float | None, name: str) -> None:
     rows = np.full((int(nodes.frame[-1]) + 1 if len(nodes) else 0, len(names)), np.nan)
     rows[nodes.frame, 0::2] = nodes.xy_px[..., 0] + 1
     rows[nodes.frame, 1::2] = nodes.rig.image_px[1] - nodes.xy_px[..., 1]
-    np.savetxt(path, rows, fmt="%.6f", delimiter=",", header=",".join(names), comments="")
+    # Digits that give each number back.
+    lines = (",".join("nan" if v != v else repr(v) for v in row) for row in rows.tolist())
+    path.write_text("\n".join([",".join(names), *lines]) + "\n", "utf-8")
 
 
 def _mat(nodes: Nodes, path: Path, px_per_m: float | None, name: str) -> None:
@@ -196,9 +223,19 @@ def _mat(nodes: Nodes, path: Path, px_per_m: float | None, name: str) -> None:
     savemat(path, content, do_compression=True)
 
 
+def _netcdf(nodes: Nodes, path: Path, px_per_m: float | None, name: str) -> None:
+    write_netcdf(nodes.to_xarray(), path, name)
+
+
+def _excel(nodes: Nodes, path: Path, px_per_m: float | None, name: str) -> None:
+    write_excel(nodes.to_dataframe, nodes.status.size, path, name)
+
+
 WRITERS: dict[str, Callable[[Nodes, Path, float | None, str], None]] = {
     ".c3d": _c3d,
     ".trc": _trc,
     ".csv": _dltdv,
     ".mat": _mat,
+    ".nc": _netcdf,
+    ".xlsx": _excel,
 }

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydpend import _native
 from pydpend.bare_nodes import bare_tracks, is_bare
 from pydpend.crossing import Columns, HeldColumns
+from pydpend.datasets import poses_dataset
 from pydpend.errors import ArgumentError, Step, TableError, fault
 from pydpend.kinds import kind_of, misplaced
 from pydpend.marker_status import AMBIGUOUS, MISSING, REACQUIRED, SEEN, STATUS_WORDS, UNDECODED
@@ -30,6 +31,7 @@ from pydpend.typed import typed, typed_class
 if TYPE_CHECKING:
     import pandas as pd
     import pyarrow as pa
+    import xarray as xr
 
 __all__ = [
     "AMBIGUOUS",
@@ -44,6 +46,7 @@ __all__ = [
     "Nodes",
     "Rig",
     "nodes_of",
+    "nodes_of_dataset",
     "nodes_of_tracks",
     "read_nodes",
 ]
@@ -271,6 +274,32 @@ class Nodes:
 
         return pa.table(self)
 
+    def to_xarray(self) -> xr.Dataset:
+        """The nodes as movement has poses; xarray must be installed.
+
+        Returns
+        -------
+        xarray.Dataset
+            ``position`` (px, y down) with the dimensions time (s), space (x, y), keypoints (the nodes) and individuals
+            (one), NaN where not seen; ``confidence`` NaN, as it is not known; ``sigma_px``, ``area_px`` and ``status``;
+            the coordinates ``frame`` and ``body``; ``rig`` and ``meta`` as JSON in the attributes. `dp.read_tracks`
+            reads it, with all that is in it.
+
+        Raises
+        ------
+        TableError
+            If xarray is not installed.
+        ArgumentError
+            If an array has the wrong type or shape.
+        """
+        width, height = self.rig.image_px
+        about = {
+            "image_px": [width, height],
+            "rig": self.rig.to_json(),
+            "meta": json.dumps(self.meta),
+        }
+        return poses_dataset(self._columns(), self.rig.names, [n.body for n in self.rig.nodes], about)
+
     def __arrow_c_stream__(self, requested_schema: object | None = None) -> object:
         """The table as an Arrow stream: `pyarrow.table(nodes)`, `polars.DataFrame(nodes)`.
 
@@ -315,6 +344,29 @@ class Nodes:
                 )
             )
         return json.dumps({**meta, "rig": json.loads(self.rig.to_json())})
+
+
+def nodes_of_dataset(dataset: Any, source: str) -> Nodes:
+    """Nodes of what `Nodes.to_xarray` gave. Raises TableError or RigError if it is not that."""
+    try:
+        arrays = [dataset[name].values[..., 0] for name in ("sigma_px", "area_px", "status")]
+        sigma_px, area_px, status = arrays
+        nodes = Nodes(
+            dataset["frame"].values.astype(np.int64),
+            dataset["time"].values.astype(np.float64),
+            np.ascontiguousarray(dataset["position"].values[..., 0].transpose(0, 2, 1), dtype=np.float64),
+            sigma_px.astype(np.float32),
+            area_px.astype(np.float32),
+            status.astype(np.uint8),
+            Rig.from_json(dataset.attrs["rig"]),
+            json.loads(dataset.attrs["meta"]),
+        )
+        nodes.check()
+    except (KeyError, ValueError, TypeError, AttributeError, IndexError) as problem:
+        raise TableError(
+            fault(source, f"it is no dataset of nodes ({problem})", "Write it again")
+        ) from problem
+    return nodes
 
 
 def _array(name: str, value: ArrayLike, dimensions: int) -> NDArray[np.float64]:

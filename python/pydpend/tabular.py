@@ -11,11 +11,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pydpend.datasets import table_dataset
 from pydpend.output import whole
 
 if TYPE_CHECKING:
     import pandas as pd
     import pyarrow as pa
+    import xarray as xr
 
 
 class TableResult(ABC):
@@ -54,6 +56,22 @@ class TableResult(ABC):
         import pyarrow as pa
 
         return pa.table({name: pa.array(v, from_pandas=True) for name, v in self.to_columns().items()})
+
+    def to_xarray(self) -> xr.Dataset:
+        """The table as xarray has it; xarray must be installed.
+
+        Returns
+        -------
+        xarray.Dataset
+            A variable for each of `to_columns` with its unit, along ``time`` (s) where there is one, else along
+            ``row``; NaN where there is no number.
+
+        Raises
+        ------
+        TableError
+            If xarray is not installed.
+        """
+        return table_dataset(self.to_columns())
 
     def __arrow_c_stream__(self, requested_schema: object | None = None) -> object:
         """The table as an Arrow stream: ``pyarrow.table(result)``, ``polars.DataFrame(result)``."""

@@ -1,9 +1,11 @@
-"""Write a node table in the form of another program.
+"""Write a node table or an angles table in the form of another program.
 
-By the ending of the output: .c3d and .trc (biomechanics), .csv (DLTdv's xypts), .mat (MATLAB).
+By the ending of the output. Nodes: .c3d and .trc (biomechanics), .csv (DLTdv's xypts), .mat (MATLAB), .nc (NetCDF, as
+movement has poses), .xlsx. Angles, or with --states their rates and accelerations: .csv, .mat, .nc, .xlsx, .parquet,
+and .mot or .sto (OpenSim).
 
   pydpend export drop.parquet -o drop.c3d --px-per-m 930
-  pydpend export drop.parquet -o drop.mat
+  pydpend export angles.parquet --states -o states.mot
 """
 
 from __future__ import annotations
@@ -13,15 +15,18 @@ import json
 from pathlib import Path
 
 from pydpend.cli.writes import add_force, check_files
-from pydpend.errors import ArgumentError, Setting, fault
+from pydpend.errors import ArgumentError, OptionError, Setting, fault
 
-HELP = "write a node table as C3D, TRC, DLTdv CSV or MAT"
+HELP = "write nodes, angles or states for another program: C3D, TRC, MAT, NetCDF, Excel, OpenSim"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the arguments."""
-    parser.add_argument("nodes", help="a node table, Parquet or CSV")
-    parser.add_argument("-o", "--output", required=True, help="the file: .c3d, .trc, .csv or .mat")
+    parser.add_argument("table", help="a node table or an angles table, Parquet or CSV")
+    parser.add_argument("-o", "--output", required=True, help="the file; its ending says the form")
+    parser.add_argument(
+        "--states", action="store_true", help="of angles: with rates and accelerations, smoothed"
+    )
     parser.add_argument("--px-per-m", type=float, help="scale of the image; C3D and TRC are then in mm")
     add_force(parser)
     parser.add_argument("--json", action="store_true", help="print what was written as JSON")
@@ -30,7 +35,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Writes it."""
     from pydpend.exporting import SCALED, WRITERS, export
-    from pydpend.nodes import read_nodes
+    from pydpend.kinds import kind_of
+    from pydpend.kinematics import LinkAngles, read_angles
+    from pydpend.link_states import LinkStates, states
+    from pydpend.nodes import Nodes, read_nodes
 
     check_files(args, args.output)
     ending = Path(args.output).suffix.lower()
@@ -38,8 +46,21 @@ def run(args: argparse.Namespace) -> int:
         raise ArgumentError(
             fault(Setting("px_per_m"), f"{ending} files are in px", "Leave it out, or write .c3d or .trc")
         )
-    nodes = read_nodes(args.nodes)
-    export(nodes, args.output, px_per_m=args.px_per_m)
+    is_angles = kind_of(args.table) == "angles"
+    if args.states and not is_angles:
+        raise OptionError(
+            fault(Setting("states"), f"{args.table} is no angles table", "Leave it out, or give angles")
+        )
+    result: Nodes | LinkAngles | LinkStates
+    if is_angles:
+        if args.px_per_m is not None:
+            raise OptionError(fault(Setting("px_per_m"), "angles have no scale", "Leave it out"))
+        angles = read_angles(args.table)
+        result = states(angles) if args.states else angles
+    else:
+        result = read_nodes(args.table)
+    export(result, args.output, px_per_m=args.px_per_m)
     if args.json:
-        print(json.dumps({"output": args.output, "frames": len(nodes), "nodes": list(nodes.rig.names)}))
+        about = {"output": args.output, "frames": len(result.t_s)}
+        print(json.dumps(about | ({"nodes": list(result.rig.names)} if isinstance(result, Nodes) else {})))
     return 0

@@ -128,6 +128,11 @@ def sleap_slp(path: Path, names: Sequence[str] = ()) -> RawTracks:
 
 def movement(path: Path, names: Sequence[str] = ()) -> RawTracks:
     """A dataset of movement's poses in NetCDF, which xarray reads."""
+    return of_dataset(opened(path), str(path))
+
+
+def opened(path: Path) -> Any:
+    """The dataset in a NetCDF file. Raises TableError if it is damaged or a library is not installed."""
     xarray = library("xarray", str(path), "NetCDF", EXTRA)
     with path.open("rb") as file:
         engine = "scipy" if file.read(3) == b"CDF" else "h5netcdf"
@@ -135,7 +140,7 @@ def movement(path: Path, names: Sequence[str] = ()) -> RawTracks:
         library(engine, str(path), "NetCDF", EXTRA)
     try:
         with xarray.open_dataset(path, engine=engine) as dataset:
-            return of_dataset(dataset.load(), str(path))
+            return dataset.load()
     except DAMAGE as problem:
         raise _damaged(path, problem) from problem
 

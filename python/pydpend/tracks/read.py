@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from pydpend.bare_nodes import bare_tracks, tracks_of
-from pydpend.errors import ArgumentError, TableError, fault
+from pydpend.errors import ArgumentError, OptionError, TableError, fault
 from pydpend.kinds import expect, kind_of, tracks_form
 from pydpend.long_table import of_frame
 from pydpend.node_arrays import Who, assembled
-from pydpend.nodes import Nodes
+from pydpend.nodes import Nodes, nodes_of_dataset
 from pydpend.output import AnyPath, path_of
 from pydpend.raw_tracks import RawTracks
 from pydpend.track_forms import Form, form_of, form_of_columns
@@ -106,11 +106,28 @@ def read_tracks(
     """
     wishes = Wishes(fps, tuple(nodes), unit, y_axis, plane, image_px, min_confidence, sigma_px)
     several = isinstance(source, (list, tuple))
+    own = None if several else _own(source)
+    if own is not None:
+        if wishes != Wishes() or bodies is not None:
+            raise OptionError(
+                fault("source", "it is nodes with all that is known of them", "Leave out the settings")
+            )
+        return own
     parts = [_raw(one, wishes.nodes) for one in (source if several else [source])]
     if not parts:
         raise ArgumentError(fault("source", "there is no file", "Give at least one"))
     raw = placed(merged(parts), wishes)
     return Nodes(*assembled(raw, bodies, Who(raw.source)))
+
+
+def _own(source: Any) -> Nodes | None:
+    """The nodes of a dataset that `Nodes.to_xarray` gave, or of its file; None for anything else."""
+    if hasattr(source, "data_vars"):
+        return nodes_of_dataset(source, "the dataset") if "rig" in source.attrs else None
+    if not isinstance(source, (str, bytes, os.PathLike)) or tracks_form(path_of(source)) != "movement":
+        return None
+    dataset = pose_files.opened(path_of(source))
+    return nodes_of_dataset(dataset, os.fsdecode(source)) if "rig" in dataset.attrs else None
 
 
 def _raw(source: Any, names: Sequence[str]) -> RawTracks:
