@@ -51,7 +51,8 @@ READERS = {
     "predict": ("predict MOTION --fit {} -o OUT", {"motion.parquet": "an angles table"}),
     "plot": ("plot energy {} -o OUT.pdf", {"motion.parquet": "an angles table", "drop.mp4": "a film"}),
     "animate": ("animate {} -o OUT.mp4", {"drop.mp4": "a film"}),
-    "export": ("export {} -o OUT.mat", {"drop.mp4": "a film", "motion.parquet": "an angles table"}),
+    "export": ("export {} -o OUT.mat", {"drop.mp4": "a film", "encoder.csv": "an encoder recording"}),
+    "import": ("import {} -o OUT.csv", {"drop.mp4": "a film", "motion.parquet": "an angles table"}),
     "analyse": ("analyse {} -o OUT", {"scene.toml": "a scene", "encoder.csv": "an encoder recording"}),
 }
 
@@ -145,7 +146,8 @@ PLACES: dict[str, tuple[str, ...]] = {
     "plot energy {} -o OUT.pdf": ("run",),
     "plot {} -o OUT.pdf": (),
     "animate {} -o OUT.mp4": ("run",),
-    "export {} -o OUT.mat": ("nodes.csv",),
+    "export {} -o OUT.mat": ("nodes.csv", "angles.csv"),
+    "import {} -o OUT.csv": ("nodes.csv",),
     "analyse {} -o OUT": ("film", "pictures", "nodes.csv", "angles.csv"),
     "analyse FILM --rig {} -o OUT": ("rig.toml",),
     "analyse FILM --encoder {} -o OUT": ("encoder.csv", "angles.csv"),

@@ -15,7 +15,7 @@ import json
 from pathlib import Path
 
 from pydpend.cli.writes import add_force, check_files
-from pydpend.errors import ArgumentError, OptionError, Setting, fault
+from pydpend.errors import ArgumentError, OptionError, Setting, TableError, fault
 
 HELP = "write nodes, angles or states for another program: C3D, TRC, MAT, NetCDF, Excel, OpenSim"
 
@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Writes it."""
     from pydpend.exporting import SCALED, WRITERS, export
-    from pydpend.kinds import kind_of
+    from pydpend.kinds import expect, kind_of
     from pydpend.kinematics import LinkAngles, read_angles
     from pydpend.link_states import LinkStates, states
     from pydpend.nodes import Nodes, read_nodes
@@ -46,6 +46,7 @@ def run(args: argparse.Namespace) -> int:
         raise ArgumentError(
             fault(Setting("px_per_m"), f"{ending} files are in px", "Leave it out, or write .c3d or .trc")
         )
+    expect(args.table, ("nodes", "angles"), TableError)
     is_angles = kind_of(args.table) == "angles"
     if args.states and not is_angles:
         raise OptionError(
