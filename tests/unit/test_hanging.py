@@ -298,7 +298,9 @@ def test_a_lone_rest_is_doubted_link_by_link_and_a_rest_at_the_end_is_not() -> N
 
     def stated(kept: list[Rest], sigma_deg: tuple[float, float], off_deg: float, tilt_deg: float) -> Floats:
         swing = Swing(np.radians([-off_deg] * 2), np.radians(sigma_deg), np.ones(2), 0.9, False, 2.0)
-        down = Down(np.radians([-tilt_deg] * 2), np.radians([0.0, np.sqrt(3.0)]), ("upper", "lower"))
+        down = Down(
+            np.radians([-tilt_deg] * 2), np.radians([0.0, np.sqrt(3.0)]), ("upper", "lower"), ("", "")
+        )
         return np.degrees(lone_sigma(kept, np.zeros(2), np.full(2, 1e-4), swing, down))
 
     # Swing and picture are of 2 deg each, and their mean of 2 / sqrt(2) deg.

@@ -194,10 +194,10 @@ def check_files(options: Options) -> None:
             fault(
                 Setting("zero"),
                 f"{zero} is no file and no degrees",
-                "Give rest, vertical, reference_frame, 180,180, or a film or node table",
+                "Give rest, vertical, horizontal, reference_frame, 180,180, or a film or node table",
             )
         )
-    if isinstance(said, str) and said.startswith("vertical"):
+    if isinstance(said, str) and said.startswith(("vertical", "horizontal")):
         roll_sigma(said)
 
 

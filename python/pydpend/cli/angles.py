@@ -35,13 +35,20 @@ def add_arguments(p: argparse.ArgumentParser) -> None:
         default="rest",
         metavar="WHERE",
         help="rest (found in the recording, default), vertical (the picture's, uncertain by the camera's roll: 1 deg, "
-        "or vertical=0.5), reference_frame, the links' angles in the rig's reference picture in degrees (12.5,-3), or "
-        "the node table of a recording at rest",
+        "or vertical=0.5), horizontal (to the right), reference_frame, the links' angles in the rig's reference "
+        "picture in degrees (12.5,-3), or the node table of a recording at rest",
     )
     p.add_argument(
         "--bodies",
         metavar="A,B",
         help="names of the links from the pivot outwards (default: all bodies of the rig)",
+    )
+    p.add_argument(
+        "--axis",
+        action="append",
+        metavar="LINK=A-B",
+        help="the line of a link that is vertical or horizontal at 0, from marker or joint A to B (upper=pivot-elbow); "
+        "again for others",
     )
     p.add_argument(
         "--pivot",
@@ -84,6 +91,7 @@ def run(args: argparse.Namespace) -> int:
         bodies=args.bodies.split(",") if args.bodies else None,
         mirrored=args.mirrored,
         link_length_m=args.link_length_m,
+        axis=_axes(args.axis),
         pivot=_pivots(args.pivot),
         gaps=args.gaps,
     )
@@ -128,6 +136,19 @@ def run(args: argparse.Namespace) -> int:
     for note in (*nodes.notes, *found.meta["notes"]):
         print(f"note: {note}", file=sys.stderr)
     return 1 if found.left_out else 0
+
+
+def _axes(words: list[str] | None) -> dict[str, str]:
+    from pydpend.errors import OptionError, Setting, fault
+
+    out = {}
+    for word in words or ():
+        link, equals, points = word.rpartition("=")
+        if not (link and equals and points):
+            problem = f"{word!r} names no link and two points"
+            raise OptionError(fault(Setting("axis"), problem, "Write upper=pivot-elbow"))
+        out[link] = points
+    return out
 
 
 def _pivots(words: list[str] | None) -> Any:

@@ -3,26 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 
 from pydpend.errors import CHECK, AnglesError, Setting, fault
+from pydpend.kinematics.axes import Axes, directions
 from pydpend.kinematics.camera_slopes import zero_slopes
-from pydpend.kinematics.estimators import Method, Wishes, estimate, poses_of
-from pydpend.kinematics.hanging import VERTICAL, Raw, zero_for
+from pydpend.kinematics.estimators import Method, Seen, Wishes, estimate, poses_of
+from pydpend.kinematics.hanging import HORIZONTAL, VERTICAL, Raw, is_direction, zero_for
 from pydpend.kinematics.linkage import Linkage
-from pydpend.kinematics.linkage_frames import fit_linkage
-from pydpend.kinematics.markers import BodyMarkers, body_markers
+from pydpend.kinematics.linkage_frames import LinkageAngles, fit_joints
+from pydpend.kinematics.markers import BodyMarkers, body_markers, to_world
 from pydpend.kinematics.pivots import with_pivots
 from pydpend.kinematics.structure import Structure
 from pydpend.kinematics.table import Floats, LinkAngles
 from pydpend.kinematics.unwrap import unwrap
+from pydpend.kinematics.vertical import picture_down
 from pydpend.nodes import Nodes
 from pydpend.typed import typed
 
 
-@typed("zero", "method", "pivot")
+@typed("zero", "method", "pivot", "axis")
 def angles(
     nodes: Nodes,
     estimator: Method = "rigid",
@@ -32,6 +35,7 @@ def angles(
     mirrored: bool = False,
     link_length_m: float | None = None,
     link_length_sigma_m: float = 0.0,
+    axis: Mapping[str, str | Sequence[str]] | None = None,
     pivot: Sequence[float] | Mapping[str, Sequence[float]] | None = None,
     gaps: Literal["error", "stop"] = "error",
     name: str | None = None,
@@ -50,7 +54,8 @@ def angles(
     zero : str, float, sequence of float or Nodes
         ``"rest"`` finds the stretches in which all links hang still, and believes them if nothing in the recording
         contradicts that (docs/explanation/angles.md); ``"vertical"`` is the picture's vertical, with the camera's roll
-        as standard uncertainty, 1 deg or as in ``"vertical=0.5"``; the nodes of another recording with the same rig and
+        as standard uncertainty, 1 deg or as in ``"vertical=0.5"``, and ``"horizontal"`` its direction to the right:
+        angles are 0 where a link's line (`axis`) points there; the nodes of another recording with the same rig and
         camera take the rest from there; one number per link says at what angles, in rad, the links stand in the rig's
         reference picture; ``"reference_frame"`` says 0 for all.
     bodies : sequence of str, optional
@@ -61,6 +66,10 @@ def angles(
         Distance of pivot and elbow, m; it puts the scale into ``meta["linkage"]``.
     link_length_sigma_m : float
         Standard uncertainty of that distance, m.
+    axis : dict of str to str or sequence of str, optional
+        For links by name the line that is vertical or horizontal at 0, from one of their markers or joints to another:
+        ``{"upper": "pivot-elbow"}``. If not given it is from the joint from which a link hangs to its next one, or to
+        the mean of its markers.
     pivot : sequence of float or dict of str to sequence of float, optional
         Where a link of one marker hangs, if that was not found: place (x, y) in the picture, px (x right, y down), and
         as a third number its standard uncertainty, 1 px if not given (a place pointed at); of several links by their
@@ -106,6 +115,7 @@ def angles(
         notes.append(f"the node table is not of the whole recording ({why})")
     phi, left_out = _unwrapped(nodes, raw.theta, markers, label, gaps, notes)
     _check_hanging(raw.structure, zero, label)
+    raw = _with_directions(raw, seen, nodes, zero, axis or {}, wishes)
     offset, zero_meta, doubts = zero_for(nodes, phi, raw, markers, zero, bodies, mirrored, label)
     notes += doubts
     at_zero = zero_slopes(zero, zero_meta, offset, nodes.t_s, seen.slopes, seen.views, mirrored)
@@ -125,6 +135,31 @@ def angles(
     return LinkAngles(
         nodes.t_s, phi, sigma, nodes.frame, meta, label, camera.columns_rad, links, joints, covariance
     )
+
+
+def _with_directions(raw: Raw, seen: Seen, nodes: Nodes, zero: object, axis: Axes, wishes: Wishes) -> Raw:
+    """The turns with the directions of the links, where a direction of the picture is the zero.
+
+    Raises AnglesError for lines that no zero asks for.
+    """
+    if not (isinstance(zero, str) and is_direction(zero)):
+        if axis:
+            problem = "a line of a link counts only where a direction of the picture is the zero"
+            advice = "Give " + Setting("zero", VERTICAL) + " or " + Setting("zero", HORIZONTAL)
+            raise AnglesError(fault(Setting("axis"), problem, advice))
+        return raw
+    known: LinkageAngles | Linkage | None = raw.linked
+    shape = raw.shape
+    by_linkage = wishes.estimator == "linkage" or all(p.is_alone for p in seen.poses)
+    if not by_linkage or raw.linked is None:
+        try:
+            known = fit_joints(seen.poses, raw.structure, wishes.given)
+            shape = known.shape
+        except AnglesError:
+            known = None
+    down = picture_down(shape, nodes, [p.markers for p in seen.poses], wishes.mirrored)
+    at = {j: to_world(np.array([j.x_px, j.y_px]), nodes.rig, wishes.mirrored) for j in raw.structure.joints}
+    return replace(raw, down=directions(down, axis, seen.poses, known, at))
 
 
 def _check_hanging(structure: Structure, zero: object, label: str) -> None:
@@ -195,7 +230,7 @@ def find_linkage(nodes: Nodes, *, bodies: Sequence[str] | None = None, mirrored:
         If the links turn too little to find the joints.
     """
     poses = poses_of(body_markers(nodes, bodies, mirrored))
-    return fit_linkage(poses, Structure.of(nodes.rig, [p.markers.name for p in poses])).linkage
+    return fit_joints(poses, Structure.of(nodes.rig, [p.markers.name for p in poses]))
 
 
 def _check_length(estimator: Method, links: int, length_m: float | None, length_sigma_m: float) -> None:

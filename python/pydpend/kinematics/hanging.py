@@ -29,7 +29,7 @@ from pydpend.kinematics.structure import Structure
 from pydpend.kinematics.swing import Swing, find_swing
 from pydpend.kinematics.table import Floats, LinkAngles
 from pydpend.kinematics.unwrap import unwrap
-from pydpend.kinematics.vertical import ROLL_SIGMA_DEG, picture_down, vertical_zero
+from pydpend.kinematics.vertical import ROLL_SIGMA_DEG, Down, picture_down, vertical_zero
 from pydpend.kinematics.zero import find_rest, zero_of
 from pydpend.nodes import Nodes
 from pydpend.number_words import numbers
@@ -38,13 +38,22 @@ from pydpend.series import highpass_noise
 VERTICAL = "vertical"
 """The word for the picture's vertical, alone or with the roll's standard uncertainty in degrees: ``vertical=0.5``."""
 
+HORIZONTAL = "horizontal"
+"""The word for the picture's direction to the right, which is written alike."""
+
+
+def is_direction(zero: str) -> bool:
+    """Whether a word for the zero is a direction of the picture."""
+    return zero.partition("=")[0] in (VERTICAL, HORIZONTAL)
+
 
 @dataclass(frozen=True, eq=False)
 class Raw:
     """Turns from the rig's reference picture before unwrapping, (T, L), and what they came from.
 
     ``structure``: what hangs on what. ``linked``: the linkage, where angles of some links are by it;
-    ``covariance_rad2`` (T, L, L): of all angles' noise, where it is.
+    ``covariance_rad2`` (T, L, L): of all angles' noise, where it is. ``down``: directions of the links, where those of
+    the picture are the zero.
     """
 
     theta: Floats
@@ -55,6 +64,7 @@ class Raw:
     structure: Structure
     linked: LinkageAngles | None = None
     covariance_rad2: Floats | None = None
+    down: Down | None = None
 
 
 def parse_zero(text: str) -> str | list[float] | None:
@@ -66,7 +76,7 @@ def parse_zero(text: str) -> str | list[float] | None:
 
     Raises OptionError for degrees that may be read in two ways.
     """
-    if text in ("rest", "reference_frame") or text.partition("=")[0] == VERTICAL:
+    if text in ("rest", "reference_frame") or is_direction(text):
         return text
     if not re.fullmatch(r"[-+.,\deE]*\d[-+.,\deE]*", text):
         return None
@@ -107,19 +117,15 @@ def zero_for(
     """The zero to take off the turns ``phi`` (T, L) to have angles, (L,), its origin, and what is doubtful."""
     links = phi.shape[1]
     given = _given(zero, links)
-    if (
-        isinstance(zero, str)
-        and zero not in ("rest", "reference_frame")
-        and zero.partition("=")[0] != VERTICAL
-    ):
+    if isinstance(zero, str) and zero not in ("rest", "reference_frame") and not is_direction(zero):
         raise AnglesError(
             fault(
                 Setting("zero"),
                 f"{zero!r} is not known",
-                f"Give rest, {VERTICAL}, reference_frame or the links' angles",
+                f"Give rest, {VERTICAL}, {HORIZONTAL}, reference_frame or the links' angles",
             )
         )
-    down = picture_down(raw.shape, nodes, markers, mirrored)
+    down = raw.down or picture_down(raw.shape, nodes, markers, mirrored)
     swing = None
     if raw.structure.is_chain:
         swing = find_swing(nodes.t_s, phi, _noise(phi, raw.sigma), down.turn_rad)
@@ -145,7 +151,11 @@ def zero_for(
             "from": "the picture's vertical",
             "sigma_rad": sigma.tolist(),
             "roll_sigma_rad": roll_sigma(zero),
+            "lines": list(down.lines),
         }
+        if zero.startswith(HORIZONTAL):
+            # A quarter turn on from pointing down; links that swing do so about the vertical.
+            value, swing, meta["from"] = value + np.pi / 2, None, "the picture's horizontal"
     elif given is not None:
         value, meta = -given, {"from": "given", "reference_frame_rad": given.tolist()}
     else:

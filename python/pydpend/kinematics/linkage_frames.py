@@ -76,6 +76,13 @@ def fit_linkage(
 
     Raises :class:`~pydpend.errors.AnglesError` if the links turn too little to find the joints.
     """
+    linkage = fit_joints(poses, structure, given)
+    frames = Frames.of([p.markers for p in poses], linkage.shape)
+    return _all_frames(linkage, frames, first_state(linkage.shape, frames, *posed(linkage.shape, poses)))
+
+
+def fit_joints(poses: list[Pose], structure: Structure, given: Mapping[str, Given] | None = None) -> Linkage:
+    """Joints and shape from the whole recording. Raises as `fit_linkage` does."""
     structure = structure.as_pendulum()
     shape = first_shape(poses, structure, {name: g.place_px for name, g in (given or {}).items()})
     clean = Frames.of([p.markers.without(~p.used) for p in poses], shape)
@@ -86,9 +93,7 @@ def fit_linkage(
         problem = "there is no frame in which all of " + ", ".join(structure.links) + " can be told"
         raise AnglesError(fault("nodes", problem, "Name fewer links with " + Setting("bodies")))
     rows = rows[evenly(rows.size, FIT_FRAMES)]
-    linkage, _ = fit_shape(clean.at(rows), shape, state.at(rows), given)
-    frames = Frames.of([p.markers for p in poses], linkage.shape)
-    return _all_frames(linkage, frames, first_state(linkage.shape, frames, *posed(linkage.shape, poses)))
+    return fit_shape(clean.at(rows), shape, state.at(rows), given)[0]
 
 
 def turns_by(linkage: Linkage, markers: list[BodyMarkers], link: str) -> tuple[Floats, Floats]:
@@ -100,6 +105,19 @@ def turns_by(linkage: Linkage, markers: list[BodyMarkers], link: str) -> tuple[F
     start = first_state(linkage.shape, frames, nothing, np.full((total, len(links), 2), np.nan))
     found, k = _all_frames(linkage, frames, start), links.index(link)
     return found.theta_rad[:, k], found.sigma_rad[:, k]
+
+
+def mean_response(linked: LinkageAngles, markers: list[BodyMarkers]) -> Floats:
+    """How the angles follow the vectors of the shape on the mean over the frames, (L, 2Q)."""
+    shape = linked.linkage.shape
+    rows = np.flatnonzero(np.isfinite(linked.theta_rad).all(axis=1))
+    rows = rows[evenly(rows.size, FIT_FRAMES)] if rows.size else rows
+    frames, state = Frames.of(markers, shape).at(rows), linked.state.at(rows)
+    w = frames.w.copy()
+    w[:, : len(shape.of_link)] = np.where(linked.used[rows], w[:, : len(shape.of_link)], 0.0)
+    _, slopes = predicted(shape, state)
+    inverse = np.asarray(np.linalg.inv(regular(information(w, slopes))))
+    return np.asarray(shape_response(shape, state.theta, w, slopes, inverse)[:, : shape.links].mean(axis=0))
 
 
 def checked_sigma(linked: LinkageAngles, poses: list[Pose]) -> tuple[Floats, list[str]]:

@@ -25,7 +25,7 @@ Floats = NDArray[np.float64]
 CAMERA_NUMBERS = 5
 """Numbers of a camera that angles depend on."""
 
-PER_LINK = ("sigma_rad", "reference_frame_rad")
+PER_LINK = ("sigma_rad", "reference_frame_rad", "lines")
 """Entries of ``meta["zero"]`` that have a value for each link."""
 
 
