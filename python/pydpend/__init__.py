@@ -48,17 +48,20 @@ if TYPE_CHECKING:
     from pydpend.kinematics import (
         Linkage,
         LinkAngles,
+        Places,
         angles,
         find_linkage,
         find_rest,
+        places,
         read_angles,
         write_angles,
     )
     from pydpend.linear import lyapunov, modes, poincare
-    from pydpend.link_states import LinkStates, savitzky_golay, states
+    from pydpend.link_states import LinkStates, PointStates, point_states, savitzky_golay, states
     from pydpend.live import NodeRow, Tracker, detect
     from pydpend.model import Damping, Model, derived, published, read_model
     from pydpend.nodes import Nodes, Rig, read_nodes
+    from pydpend.ring_down import RingDown, ring_down
     from pydpend.scoring import Score, score
     from pydpend.simulation import Simulation, simulate, simulate_many
     from pydpend.tracking import OverlayFilm, Setup, info, overlay, setup, track
@@ -88,11 +91,14 @@ __all__ = [
     "NodeRow",
     "Nodes",
     "OverlayFilm",
+    "Places",
+    "PointStates",
     "Prediction",
     "PydpendError",
     "RecordingWarning",
     "Rig",
     "RigError",
+    "RingDown",
     "Score",
     "Setup",
     "Simulation",
@@ -119,7 +125,9 @@ __all__ = [
     "lyapunov",
     "modes",
     "overlay",
+    "places",
     "poincare",
+    "point_states",
     "published",
     "read_angles",
     "read_calibration",
@@ -128,6 +136,7 @@ __all__ = [
     "read_model",
     "read_nodes",
     "read_tracks",
+    "ring_down",
     "savitzky_golay",
     "score",
     "setup",
@@ -177,17 +186,20 @@ _HOMES = {
     "kinematics": (
         "LinkAngles",
         "Linkage",
+        "Places",
         "angles",
         "find_linkage",
         "find_rest",
+        "places",
         "read_angles",
         "write_angles",
     ),
     "linear": ("lyapunov", "modes", "poincare"),
-    "link_states": ("LinkStates", "savitzky_golay", "states"),
+    "link_states": ("LinkStates", "PointStates", "point_states", "savitzky_golay", "states"),
     "live": ("NodeRow", "Tracker", "detect"),
     "model": ("Damping", "Model", "derived", "published", "read_model"),
     "nodes": ("Nodes", "Rig", "read_nodes"),
+    "ring_down": ("RingDown", "ring_down"),
     "scoring": ("Score", "score"),
     "simulation": ("Simulation", "simulate", "simulate_many"),
     "tracking": ("OverlayFilm", "Setup", "info", "overlay", "setup", "track"),

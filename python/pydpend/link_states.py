@@ -17,6 +17,7 @@ from pydpend import _native
 from pydpend.argument_types import of_type
 from pydpend.errors import AnglesError, fault
 from pydpend.kinematics import LinkAngles
+from pydpend.kinematics.names import NUMBERED
 from pydpend.tabular import TableResult, by_link, html_rows
 from pydpend.typed import typed, typed_class
 
@@ -79,6 +80,8 @@ class LinkStates(TableResult):
         ``done`` or ``failed``.
     message : str
         Why it failed, in words.
+    link_names : tuple of str
+        Names of the links, where the angles have them.
     """
 
     t_s: Array
@@ -90,6 +93,7 @@ class LinkStates(TableResult):
     method: str
     status: str = "done"
     message: str = ""
+    link_names: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         """A line for people."""
@@ -107,13 +111,14 @@ class LinkStates(TableResult):
         -------
         dict of str to ndarray, each of shape (T,)
             ``time_s``, and of each link angle, rate and acceleration with their standard errors (``phi1_rad``,
-            ``sigma_phi1_rad``, ...), SI.
+            ``sigma_phi1_rad``, ...), SI; of more than two links by their names (``phi_crank_rad``, ``w_crank_rad_s``).
         """
         names = ("phi#_rad", "w#_rad_s", "a#_rad_s2")
         values = (self.phi_rad, self.w_rad_s, self.a_rad_s2)
         sigmas = np.sqrt(np.diagonal(self.covariance, axis1=2, axis2=3))
         columns = {"time_s": self.t_s} | dict(zip(names, values, strict=True))
-        return by_link(columns | {f"sigma_{name}": sigmas[:, :, k] for k, name in enumerate(names)})
+        columns |= {f"sigma_{name}": sigmas[:, :, k] for k, name in enumerate(names)}
+        return by_link(columns, self.link_names if len(self.link_names) > NUMBERED else ())
 
 
 @typed()
@@ -182,6 +187,7 @@ def states(
         "smoother",
         "done" if found else "failed",
         "" if found else "the smoother gave numbers that are not finite: check times and sigmas",
+        _names(angles),
     )
 
 
@@ -239,8 +245,20 @@ def savitzky_golay(angles: Angles, *, window: int = 31, degree: int = 4) -> Link
         v = np.lib.stride_tricks.sliding_window_view(s**2, window)
         cov[half : len(t) - half, k] = np.einsum("iw,tw,jw->tij", rows, v, rows, optimize=True)
     return LinkStates(
-        t, out[:, :, 0], out[:, :, 1], out[:, :, 2], cov, np.ones(links), f"savitzky-golay {window}/{degree}"
+        t,
+        out[:, :, 0],
+        out[:, :, 1],
+        out[:, :, 2],
+        cov,
+        np.ones(links),
+        f"savitzky-golay {window}/{degree}",
+        link_names=_names(angles),
     )
+
+
+def _names(angles: Angles) -> tuple[str, ...]:
+    """The links' names, where what holds the angles has them."""
+    return angles.link_names if isinstance(angles, LinkAngles) else ()
 
 
 def _checked(angles: Angles) -> tuple[Array, Array, Array]:

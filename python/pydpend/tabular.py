@@ -78,14 +78,18 @@ class TableResult(ABC):
         return self.to_arrow().__arrow_c_stream__(requested_schema)
 
 
-def by_link(columns: Mapping[str, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
-    """Columns of arrays (T,) and (T, L): ``"phi#_rad"`` becomes ``phi1_rad``, ``phi2_rad``."""
+def by_link(
+    columns: Mapping[str, NDArray[np.float64]], names: Sequence[str] = ()
+) -> dict[str, NDArray[np.float64]]:
+    """Columns of arrays (T,) and (T, L): ``"phi#_rad"`` becomes ``phi1_rad``, ``phi2_rad``, or ``phi_crank_rad``."""
+    ends = [f"_{name}" for name in names]
     out = {}
     for name, values in columns.items():
         if values.ndim == 1:
             out[name] = values
         else:
-            out |= {name.replace("#", str(k + 1)): values[:, k] for k in range(values.shape[1])}
+            own = ends or [str(k + 1) for k in range(values.shape[1])]
+            out |= {name.replace("#", end): values[:, k] for k, end in enumerate(own)}
     return out
 
 

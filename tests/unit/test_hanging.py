@@ -334,7 +334,8 @@ def test_the_pictures_vertical_with_the_cameras_roll() -> None:
         sigma = np.degrees(found.meta["zero"]["sigma_rad"])
         off = np.degrees(np.median(found.phi_rad - phi, axis=0))
         # The upper link's line of joints is 0.9 deg off where it hangs; the lower one's markers scatter about its line.
-        assert sigma[0] == pytest.approx(stated)
+        # The line through the joints is known to a thousandth of a degree.
+        assert sigma[0] == pytest.approx(stated, abs=1e-4)
         assert sigma[1] == pytest.approx(np.hypot(stated, 1.72), abs=0.1)
         np.testing.assert_array_less(np.abs(off - [roll_deg + 0.9, roll_deg]), [0.1, 2 * 1.72])
         assert found.meta["zero"]["from"] == "the picture's vertical"
