@@ -15,8 +15,8 @@ import numpy.typing as npt
 
 from pydpend import _native
 from pydpend.argument_types import of_type
-from pydpend.errors import AnglesError, fault
-from pydpend.kinematics import LinkAngles
+from pydpend.errors import AnglesError, Setting, fault
+from pydpend.kinematics import LinkAngles, Places
 from pydpend.kinematics.names import NUMBERED
 from pydpend.tabular import TableResult, by_link, html_rows
 from pydpend.typed import typed, typed_class
@@ -26,6 +26,9 @@ Array = npt.NDArray[np.float64]
 STRETCH_S = 0.25
 """Length of the stretches of a recording that have a process noise of their own, s: short against the
 change from tumbling to swinging, long against the 30 or so samples that the smoother looks at."""
+
+LEAST_SAMPLES = 50
+"""Samples that the smoother takes, at least."""
 
 _LEAST_SHARE = 0.2
 """A sigma below this share of the median is raised to it: a scatter of marker pairs is near zero by
@@ -191,6 +194,132 @@ def states(
     )
 
 
+@dataclass(frozen=True, eq=False, repr=False)
+class PointStates(TableResult):
+    """Places, velocities and accelerations of P points at T times, x right and y up.
+
+    Attributes
+    ----------
+    t_s : ndarray of float, shape (T,)
+        Time, s.
+    names : tuple of str
+        Names of the points.
+    unit : {"m", "px"}
+        Unit of length.
+    xy, v, a : ndarray of float, shape (T, P, 2)
+        Places in `unit`, velocities in `unit`/s, accelerations in `unit`/s2.
+    covariance : ndarray of float, shape (T, P, 2, 3, 3)
+        Of place, velocity and acceleration along each axis, by the noise; that of a scale is not in it.
+    sigma_factor : ndarray of float, shape (P, 2)
+        By what the places' sigmas were multiplied to agree with their own scatter.
+    """
+
+    t_s: Array
+    names: tuple[str, ...]
+    unit: str
+    xy: Array
+    v: Array
+    a: Array
+    covariance: Array
+    sigma_factor: Array
+
+    @property
+    def speed(self) -> Array:
+        """Speed of each point, (T, P), `unit`/s."""
+        return np.asarray(np.hypot(self.v[..., 0], self.v[..., 1]))
+
+    def __repr__(self) -> str:
+        """A line for people."""
+        return f"<PointStates: {self.t_s.size} times x {len(self.names)} points, {self.unit}>"
+
+    def _repr_html_(self) -> str:
+        """The first rows, for a notebook."""
+        return html_rows(repr(self)[1:-1], dict(list(self.to_columns().items())[:8]))
+
+    def to_columns(self) -> dict[str, Array]:
+        """The states as columns of a table.
+
+        Returns
+        -------
+        dict of str to ndarray, each of shape (T,)
+            ``time_s``, and of each point ``x_n0_m``, ``vx_n0_m_s``, ``ax_n0_m_s2``, the same of y, their standard
+            uncertainties ``sigma_x_n0_m``, ..., and ``speed_n0_m_s``; ``px`` in place of ``m`` without a scale.
+        """
+        out = {"time_s": self.t_s}
+        ends = (self.unit, f"{self.unit}_s", f"{self.unit}_s2")
+        sigma = np.sqrt(np.maximum(np.diagonal(self.covariance, axis1=3, axis2=4), 0.0))
+        for p, name in enumerate(self.names):
+            for k, axis in enumerate("xy"):
+                stems = (axis, f"v{axis}", f"a{axis}")
+                for i, (stem, end, part) in enumerate(
+                    zip(stems, ends, (self.xy, self.v, self.a), strict=True)
+                ):
+                    out[f"{stem}_{name}_{end}"] = part[:, p, k]
+                    out[f"sigma_{stem}_{name}_{end}"] = sigma[:, p, k, i]
+            out[f"speed_{name}_{self.unit}_s"] = self.speed[:, p]
+        return out
+
+
+@dataclass(frozen=True, eq=False)
+class _Coordinates:
+    """Coordinates of points in the place of angles."""
+
+    t_s: Array
+    phi_rad: Array
+    sigma_rad: Array
+
+
+@typed()
+def point_states(places: Places, *, stretch_s: float = STRETCH_S, seed: int = 0) -> PointStates:
+    """Velocity and acceleration of each point by the smoother of `states`, with standard uncertainties.
+
+    Parameters
+    ----------
+    places : Places
+        Places of P points at T times.
+    stretch_s : float
+        Length of the stretches in each of which the process's intensity is the most likely one, s; inf is one for all.
+    seed : int
+        Of the noise that calibrates the covariances.
+
+    Returns
+    -------
+    PointStates
+        Places, velocities and accelerations in the places' unit.
+
+    Raises
+    ------
+    AnglesError
+        For times that do not increase, or a point with fewer than 50 places.
+    """
+    total, count = places.xy.shape[:2]
+    flat = places.xy.reshape(total, 2 * count)
+    sigma = np.repeat(places.sigma, 2, axis=1)
+    for k, name in enumerate(places.names):
+        seen = int(np.isfinite(places.xy[:, k, 0]).sum())
+        if seen < LEAST_SAMPLES:
+            advice = (
+                f"At least {LEAST_SAMPLES} are needed to smooth them; leave the point out with "
+                + Setting("points")
+            )
+            raise AnglesError(fault(f"point {name}", f"{seen} places", advice))
+    found = states(_Coordinates(places.t_s, flat, sigma), stretch_s=stretch_s, seed=seed)
+
+    def of_points(values: Array) -> Array:
+        return np.asarray(values.reshape(total, count, 2))
+
+    return PointStates(
+        places.t_s,
+        places.names,
+        places.unit,
+        of_points(found.phi_rad),
+        of_points(found.w_rad_s),
+        of_points(found.a_rad_s2),
+        found.covariance.reshape(total, count, 2, 3, 3),
+        found.sigma_factor.reshape(count, 2),
+    )
+
+
 @typed()
 def savitzky_golay(angles: Angles, *, window: int = 31, degree: int = 4) -> LinkStates:
     """States by a polynomial through the samples around each: the simple alternative to `states`.
@@ -286,9 +415,13 @@ def _checked(angles: Angles) -> tuple[Array, Array, Array]:
 def _sigmas(phi: Array, sigma: Array, link: int) -> tuple[Array, bool]:
     """Positive sigmas for every time, and whether any were given."""
     seen = np.isfinite(phi)
-    if seen.sum() < 50:
+    if seen.sum() < LEAST_SAMPLES:
         raise AnglesError(
-            fault(f"phi{link + 1}", f"{int(seen.sum())} angles", "At least 50 are needed to smooth them")
+            fault(
+                f"phi{link + 1}",
+                f"{int(seen.sum())} angles",
+                f"At least {LEAST_SAMPLES} are needed to smooth them",
+            )
         )
     bad = seen & np.isfinite(sigma) & (sigma < 0)
     if np.any(bad):

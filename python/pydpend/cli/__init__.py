@@ -28,6 +28,7 @@ from pydpend.terminal import Shown
 COMMANDS: tuple[str, ...] = (
     "analyse",
     "angles",
+    "states",
     "calibrate",
     "compare",
     "fit",

@@ -16,6 +16,7 @@ from pydpend.kinematics.linkage import Linkage
 from pydpend.kinematics.misfit import misfits
 from pydpend.kinematics.names import LinkJoint
 from pydpend.kinematics.pairwise import PairAngles, pair_angles
+from pydpend.kinematics.point_places import Places, places
 from pydpend.kinematics.pose import Pose, fit_pose
 from pydpend.kinematics.shape import Shape
 from pydpend.kinematics.structure import Structure
@@ -28,6 +29,7 @@ __all__ = [
     "LinkJoint",
     "Linkage",
     "PairAngles",
+    "Places",
     "Pose",
     "Rest",
     "Shape",
@@ -41,6 +43,7 @@ __all__ = [
     "misfits",
     "pair_angles",
     "parse_zero",
+    "places",
     "read_angles",
     "roll_sigma",
     "write_angles",

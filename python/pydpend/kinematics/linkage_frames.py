@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from pydpend.kinematics.names import ColumnNames
 from pydpend.kinematics.pose import Pose, evenly
 from pydpend.kinematics.scale import hidden_factor, inflation, partly_hidden, pooled_scale2, reject_limit
 from pydpend.kinematics.shape import (
+    GROUND,
     Frames,
     Shape,
     State,
@@ -105,6 +106,44 @@ def turns_by(linkage: Linkage, markers: list[BodyMarkers], link: str) -> tuple[F
     start = first_state(linkage.shape, frames, nothing, np.full((total, len(links), 2), np.nan))
     found, k = _all_frames(linkage, frames, start), links.index(link)
     return found.theta_rad[:, k], found.sigma_rad[:, k]
+
+
+def joint_places(linked: LinkageAngles, markers: list[BodyMarkers]) -> tuple[Floats, Floats]:
+    """Places (T, J, 2) of the joints in the world, px, and the greater of their coordinates' uncertainties (T, J)."""
+    shape = linked.linkage.shape
+    frames, total = Frames.of(markers, shape), len(linked.theta_rad)
+    first = {j: link for j, link, _ in reversed(shape.ends) if link != GROUND}
+    on = np.array([first[j] for j in range(len(shape.joints))], dtype=np.int64)
+    joints = replace(shape, markers=shape.joints, closures=shape.closures[:0], of_link=on)
+    places, sigma = np.full((total, len(on), 2), np.nan), np.full((total, len(on)), np.nan)
+    known = np.isfinite(linked.theta_rad)
+    needed = np.stack([((shape.joints[j] != 0) @ _turning(shape)) > 0 for j in range(len(on))])
+    for start in range(0, total, _CHUNK):
+        rows = slice(start, min(start + _CHUNK, total))
+        state = State(np.nan_to_num(linked.theta_rad[rows]), np.nan_to_num(linked.state.place[rows]))
+        w = frames.w[rows].copy()
+        w[:, : len(shape.of_link)] = np.where(linked.used[rows], w[:, : len(shape.of_link)], 0.0)
+        inverse = np.asarray(np.linalg.inv(regular(information(w, predicted(shape, state)[1]))))
+        at, slopes = predicted(joints, state)
+        variance = np.einsum("tjdu,tuv,tjdv->tjd", slopes, inverse, slopes, optimize=True).max(axis=2)
+        told = np.stack([known[rows][:, need].all(axis=1) for need in needed], axis=1)
+        scale = linked.linkage.sigma_scale
+        places[rows] = np.where(told[..., None], at, np.nan)
+        sigma[rows] = np.where(told, scale * np.sqrt(variance + _fixed(linked.linkage) ** 2), np.nan)
+    return places, sigma
+
+
+def _turning(shape: Shape) -> Floats:
+    """Which vectors turn with which links, (Q, L)."""
+    return np.asarray(shape.turns_with[:, None] == np.arange(shape.links), dtype=np.float64)
+
+
+def _fixed(linkage: Linkage) -> Floats:
+    """The part (J,) of the joints' uncertainties by the vectors that lead there, px: one error of all frames."""
+    shape = linkage.shape
+    rows = np.stack([np.kron(shape.joints, axis) for axis in np.eye(2)], axis=1)
+    variance = np.einsum("jdq,qr,jdr->jd", rows, linkage.covariance_px2, rows)
+    return np.asarray(np.sqrt(np.maximum(variance.max(axis=1), 0.0)) / linkage.sigma_scale)
 
 
 def mean_response(linked: LinkageAngles, markers: list[BodyMarkers]) -> Floats:
