@@ -100,7 +100,8 @@ def _of_angles(args: argparse.Namespace) -> tuple[Any, dict[str, Any], list[str]
         for unit in [{"viscous": "1/s", "quadratic": "1/(rad s)", "dry": "rad/s"}[law]]
     ]
     about["said"] = [
-        f"{swing.link}: {swing.swings} swings, small ones of {swing.period_s:.6g} +- {swing.period_sigma_s:.2g} s period",
+        f"{swing.link}: {swing.swings} swings; period of small ones {swing.period_s:.6g} +- "
+        f"{swing.period_sigma_s:.2g} s",
         f"damping of the amplitude: {' and '.join(rates)}",
         f"at {swing.at_amplitude_rad:.3g} rad: Q {swing.q:.4g}, logarithmic decrement {swing.decrement:.4g} +- "
         f"{swing.decrement_sigma:.2g}",
