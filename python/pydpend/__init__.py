@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from pydpend.exporting import export
     from pydpend.filming import Film, Truth, film
     from pydpend.fit_options import FitOptions
+    from pydpend.free_swing import RingDown, ring_down
     from pydpend.kinematics import (
         Linkage,
         LinkAngles,
@@ -61,7 +62,6 @@ if TYPE_CHECKING:
     from pydpend.live import NodeRow, Tracker, detect
     from pydpend.model import Damping, Model, derived, published, read_model
     from pydpend.nodes import Nodes, Rig, read_nodes
-    from pydpend.ring_down import RingDown, ring_down
     from pydpend.scoring import Score, score
     from pydpend.simulation import Simulation, simulate, simulate_many
     from pydpend.tracking import OverlayFilm, Setup, info, overlay, setup, track
@@ -199,7 +199,7 @@ _HOMES = {
     "live": ("NodeRow", "Tracker", "detect"),
     "model": ("Damping", "Model", "derived", "published", "read_model"),
     "nodes": ("Nodes", "Rig", "read_nodes"),
-    "ring_down": ("RingDown", "ring_down"),
+    "free_swing": ("RingDown", "ring_down"),
     "scoring": ("Score", "score"),
     "simulation": ("Simulation", "simulate", "simulate_many"),
     "tracking": ("OverlayFilm", "Setup", "info", "overlay", "setup", "track"),

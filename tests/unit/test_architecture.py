@@ -71,7 +71,7 @@ GROUPS: tuple[tuple[str, ...], ...] = (
     ("kinematics",),
     ("encoder",),
     ("simulation", "linear", "link_states"),
-    ("ring_down", "decay", "energy", "damping", "trials"),
+    ("free_swing", "decay", "energy", "damping", "trials"),
     ("fit_folder", "recording_folder", "run_folder"),
     ("plots",),
     ("report",),

@@ -71,10 +71,10 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _of_angles(args: argparse.Namespace) -> tuple[Any, dict[str, Any], list[str]]:
+    from pydpend.free_swing import ring_down
     from pydpend.json_text import plain
     from pydpend.kinematics import read_angles
     from pydpend.link_states import states
-    from pydpend.ring_down import ring_down
 
     for flag in ("points", "scale", "origin"):
         if getattr(args, flag) is not None:

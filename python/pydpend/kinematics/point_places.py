@@ -226,7 +226,7 @@ def _origin(
 
 
 def _camera(nodes: Nodes, markers: list[BodyMarkers], mirrored: bool) -> dict[str, Any]:
-    """What the camera may do to the markers' places: RMS of each, but for a common shift, px."""
+    """The camera's part in the markers' places: RMS of each, but for a common shift, px."""
     poses = poses_of(markers)
     views = [BodyView.of(nodes, pose, mirrored) for pose in poses]
     camera = known(nodes.rig, [v.evidence(p.centre_px) for v, p in zip(views, poses, strict=True)])
