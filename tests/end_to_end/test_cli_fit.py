@@ -133,7 +133,7 @@ def test_bad_input_is_refused_in_words(folder: Path, tmp_path: Path) -> None:
     still = LinkAngles(np.arange(2000) / 500, np.zeros((2000, 2)), np.full((2000, 2), 1e-3))
     good = measured(released(21, 6.0, 500.0), 21, 0.05, stated=False)
     gaps = good.phi_rad.copy()
-    gaps[(np.arange(len(gaps)) % 150) > 20] = np.nan  # 0.26 s of 0.3 s not seen
+    gaps[(np.arange(len(gaps)) % 400) > 20] = np.nan  # 0.76 s of 0.8 s not seen
     holed = LinkAngles(good.t_s, gaps, np.full_like(gaps, np.nan))
     cases = {
         "no free decay": (written(still, tmp_path / "still.csv"), []),

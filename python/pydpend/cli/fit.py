@@ -24,7 +24,7 @@ from pydpend.cli.writes import add_force, check_files
 from pydpend.terminal import below
 
 if TYPE_CHECKING:
-    from pydpend.damping import DampingFit, RatioCheck
+    from pydpend.damping import DampingFit, Estimate, RatioCheck
     from pydpend.kinematics import LinkAngles
 
 HELP = "damping of each joint from angles of free decays"
@@ -184,16 +184,26 @@ def describe(fit: DampingFit) -> list[str]:
     for recording in fit.inputs:
         if recording.tail_modes_hz:
             seen = ", ".join(f"{f:.4f}" for f in recording.tail_modes_hz)
-            lines.append(f"measured in the last seconds of {recording.name}: {seen} Hz")
+            swing = " and ".join(f"{d:.2g}" for d in recording.tail_swing_deg)
+            lines.append(
+                f"measured in the last seconds of {recording.name}, swinging by up to {swing} deg: {seen} Hz"
+            )
     for group in ("law", "joint"):
-        parts = ", ".join(
-            f"{k} {100 * e.value:.1f} +- {100 * e.sigma:.1f} %" for k, e in fit.shares[group].items()
-        )
+        parts = ", ".join(_share(k, e) for k, e in fit.shares[group].items())
         lines.append(f"energy by {group}: {parts}")
     for window, p in fit.prediction.items():
         lines.append(f"prediction, {window} s windows: {slashed(p.rms_deg)} deg RMS")
     rest = [note for note in fit.notes if note not in warned]
     return [*lines, *(t.sentence for t in fit.terms), *fit.identifiability.sentences, *rest]
+
+
+def _share(name: str, share: Estimate) -> str:
+    """A share of the energy lost, in words where it is not determined."""
+    if not math.isfinite(share.value):
+        return f"{name} none (no energy was lost to these laws)"
+    if not share.sigma < 1.0:
+        return f"{name} not determined"
+    return f"{name} {100 * share.value:.1f} +- {100 * share.sigma:.1f} %"
 
 
 def _beside(ratio: RatioCheck) -> str:

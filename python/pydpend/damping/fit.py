@@ -20,7 +20,7 @@ from pydpend.damping.profile import fit_energy
 from pydpend.damping.recording import Recording, check_distinct, prepare
 from pydpend.damping.result import DampingFit
 from pydpend.damping.result_parts import EnergyCurve, estimates
-from pydpend.damping.shares import shares
+from pydpend.damping.shares import shares, with_measured
 from pydpend.damping.shooting import Progress
 from pydpend.damping.single import reduced
 from pydpend.damping.ten import fit_ten
@@ -230,7 +230,10 @@ def _energy(
             replace(r.described(zero), e0_j=float(e0))
             for r, e0, zero in zip(recordings, fit.e0_j, found, strict=True)
         ),
-        energy=curves,
+        energy=tuple(
+            with_measured(curve, r, zeros, model)
+            for curve, r, zeros in zip(curves, recordings, smoothed.zeros_rad, strict=True)
+        ),
         residuals=shooting.residuals_of(tracks, path, smoothed.zeros_rad),
         ten=freed,
         camera_sigma=of_camera,

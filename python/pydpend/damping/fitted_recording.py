@@ -65,12 +65,14 @@ class FittedRecording:
     zeros_off : tuple of bool
         Whether each given zero is wrong beyond these.
     tail_modes_hz : tuple of float or None
-        Small oscillations in the last seconds, Hz (trajectory fit).
+        Small oscillations in the last seconds, Hz (trajectory fit); empty where the links swing by more than 20 deg.
     e0_j : float or None
         Energy at the start, J (energy fit).
     camera_numbers, camera_numbers_sigma : tuple of float or None
         Its camera's five numbers as the trajectory fit found them, and their standard errors, in units of what the
         angles state; None where they state nothing.
+    tail_swing_deg : tuple of float
+        Half of each link's swing in these seconds, deg.
     outliers : tuple of pydpend.damping.outliers.Outlier
         Samples that were left out (docs/explanation/damping.md has the rule).
     """
@@ -91,6 +93,7 @@ class FittedRecording:
     camera_numbers: tuple[float, ...] | None = None
     camera_numbers_sigma: tuple[float, ...] | None = None
     outliers: tuple[Outlier, ...] = ()
+    tail_swing_deg: tuple[float, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """The recording as in ``fit.json``."""
@@ -123,6 +126,7 @@ class FittedRecording:
                 Outlier(o.number("time_s"), o.whole("link"), o.number("off_rad"))
                 for o in (table.tables("outliers") if "outliers" in table else ())
             ),
+            table.numbers_or_nan("tail_swing_deg") if "tail_swing_deg" in table else (),
         )
 
 

@@ -15,7 +15,7 @@ from pydpend.damping.parts import length_check
 from pydpend.damping.recording import FittedZero, Recording
 from pydpend.damping.result import DampingFit
 from pydpend.damping.result_parts import Estimate, estimates
-from pydpend.damping.shares import energy_curve, shares, unit_works
+from pydpend.damping.shares import energy_curve, shares, unit_works, with_measured
 from pydpend.damping.shooting import Progress, Solution, Track
 from pydpend.damping.uncertainty import covariance, identifiability
 from pydpend.information import check_errors
@@ -117,13 +117,17 @@ def judge(found: Found, progress: Progress | None = None, *, checked: bool = Tru
         inputs=tuple(
             replace(
                 r.described(zero),
-                tail_modes_hz=tuple(plausible.tail_modes_hz(r.track, r.span, fitted)),
+                **plausible.tail_of(r.track, r.span, fitted),
                 camera_numbers=numbers,
                 camera_numbers_sigma=numbers_sigma,
             )
             for r, zero, (numbers, numbers_sigma) in zip(recordings, zeros, seen, strict=True)
         ),
-        energy=tuple(energy_curve(tracks, path, names, values, fitted, k) for k in range(len(recordings))),
+        energy=tuple(
+            with_measured(curve, r, solution.zeros_rad[k], fitted) if checked else curve
+            for k, r in enumerate(recordings)
+            for curve in (energy_curve(tracks, path, names, values, fitted, k),)
+        ),
         residuals=shooting.residuals_of(tracks, path, solution.zeros_rad),
         chi2_slack=solution.chi2,
         slack=_slack_told(solution, relative),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy
@@ -196,8 +197,23 @@ def check_followed(names: Sequence[str], chi2: float) -> None:
         )
 
 
+SMALL_DEG = 20.0
+"""Swing up to which an oscillation is called small: its frequency is 0.8 % below that of none."""
+
 TAIL_S = 8.0
 """Length of the end of the motion in which its small oscillations are looked at, s."""
+
+
+def tail_of(track: Track, span: tuple[float, float], model: Model) -> dict[str, Any]:
+    """The end of a motion for `FittedRecording`: its swing of each link, deg, and its modes if that is small."""
+    t, phi, _ = track
+    last = phi[(t >= span[1] - TAIL_S) & (t <= span[1])]
+    last = last[np.isfinite(last).all(axis=1)]
+    if len(last) < 2:
+        return {"tail_modes_hz": (), "tail_swing_deg": ()}
+    swing = np.degrees(np.ptp(last, axis=0) / 2)
+    modes = tail_modes_hz(track, span, model) if swing.max() <= SMALL_DEG else ()
+    return {"tail_modes_hz": modes, "tail_swing_deg": tuple(swing.tolist())}
 
 
 def tail_modes_hz(track: Track, span: tuple[float, float], model: Model) -> tuple[float, ...]:

@@ -75,6 +75,8 @@ class EnergyCurve(TableResult):
         Energy taken out by each coefficient since the start, J.
     names : tuple of str
         The C coefficients.
+    measured_j : ndarray of float, shape (T,), optional
+        Energy of the measured angles, smoothed without the equations of motion, J; NaN where a link was not seen.
     """
 
     t_s: Floats
@@ -82,6 +84,7 @@ class EnergyCurve(TableResult):
     model_j: Floats
     works_j: Floats
     names: tuple[str, ...]
+    measured_j: Floats | None = None
 
     def to_columns(self) -> dict[str, Floats]:
         """The curve as columns of a table: ``energy.csv`` in the fit's folder.
@@ -89,20 +92,21 @@ class EnergyCurve(TableResult):
         Returns
         -------
         dict of str to ndarray, each of shape (T,)
-            ``time_s``, ``energy_j``, ``model_j`` and each coefficient's work (``mu_v1_j``, ...).
+            ``time_s``, ``energy_j``, ``model_j``, if known ``measured_j``, each coefficient's work (``mu_v1_j``, ...).
         """
         first = {"time_s": self.t_s, "energy_j": self.energy_j, "model_j": self.model_j}
+        first |= {} if self.measured_j is None else {"measured_j": self.measured_j}
         return first | {f"{name}_j": self.works_j[:, k] for k, name in enumerate(self.names)}
 
     @classmethod
     def of_columns(cls, columns: Mapping[str, Floats]) -> EnergyCurve:
         """The inverse of `to_columns`."""
-        first = ("time_s", "energy_j", "model_j")
+        first = ("time_s", "energy_j", "model_j", "measured_j")
         names = tuple(n.removesuffix("_j") for n in columns if n.endswith("_j") and n not in first)
         works = [columns[f"{name}_j"] for name in names]
         t = columns["time_s"]
         stacked = np.column_stack(works) if works else np.zeros((t.size, 0))
-        return cls(t, columns["energy_j"], columns["model_j"], stacked, names)
+        return cls(t, columns["energy_j"], columns["model_j"], stacked, names, columns.get("measured_j"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -316,6 +320,8 @@ class TenCoefficients:
         Of the ten, how many combinations the energies determine.
     condition : float
         Condition number of the ten works, scaled.
+    chi2 : float
+        Chi-square of the energies; beyond 1 it is in the standard errors. NaN where the energies' errors are not known.
     """
 
     values: dict[str, Estimate]
@@ -323,6 +329,7 @@ class TenCoefficients:
     weights: dict[str, list[float]]
     rank: int
     condition: float
+    chi2: float = math.nan
 
     def to_dict(self) -> dict[str, Any]:
         """The ten as in ``fit.json``."""
@@ -332,6 +339,7 @@ class TenCoefficients:
             "weights": self.weights,
             "rank": self.rank,
             "condition": self.condition,
+            "chi2": number(self.chi2),
             "warning": self.warning,
         }
 
@@ -345,6 +353,16 @@ class TenCoefficients:
             {name: weights.array(name, 3).tolist() for name in weights},
             table.whole("rank"),
             table.number("condition"),
+            table.number_or_nan("chi2"),
+        )
+
+    @property
+    def _misfit(self) -> str:
+        if not self.chi2 > 1.5:
+            return ""
+        return (
+            f" Chi-square of the energies is {self.chi2:.3g}, where noise alone gives 1: the standard errors are "
+            f"larger by {self.chi2**0.5:.3g} for that, and know nothing else of what is wrong with the model."
         )
 
     @property
@@ -360,5 +378,5 @@ class TenCoefficients:
             f"{self.condition:.2g}). The six mu_c are r mu of two joints times known masses and lengths, so only these "
             f"sums are physical: {sums}. The split of a joint's sum among its three is arbitrary: it may depart from "
             "the model's ratios by noise or where the model is wrong, and where the energies do not determine it, the "
-            "split nearest to these ratios is given. Do not compare single mu_c."
+            f"split nearest to these ratios is given. Do not compare single mu_c.{self._misfit}"
         )

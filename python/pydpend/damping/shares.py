@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pydpend.coefficients import JOINT_OF, LAW_OF, TERMS
+from pydpend.damping.recording import Recording
 from pydpend.damping.result_parts import EnergyCurve, Estimate
 from pydpend.damping.shooting import Trace, Track
+from pydpend.errors import AnglesError
+from pydpend.kinematics import LinkAngles
+from pydpend.link_states import states
 from pydpend.model import Model
 
 Floats = NDArray[np.float64]
@@ -76,6 +81,28 @@ def shares(
             slope = works * (member - fraction) / total
             out[group][label] = Estimate(fraction, float(np.sqrt(max(float(slope @ cov @ slope), 0.0))), "1")
     return out
+
+
+def with_measured(curve: EnergyCurve, recording: Recording, zeros_rad: Floats, model: Model) -> EnergyCurve:
+    """The curve with the energy of the measured angles (Fig. 19), smoothed without the equations of motion.
+
+    As it is where the angles are too few to be smoothed. ``zeros_rad`` (2,): of the angles.
+    """
+    t, phi, sigma = recording.track
+    if not curve.t_s.size:
+        return curve
+    near = slice(*np.searchsorted(t, (curve.t_s[0], curve.t_s[-1] + 1e-9)))
+    links = phi.shape[1]
+    try:
+        angles = LinkAngles(t[near], phi[near] - zeros_rad[:links], sigma[near])
+        moved = states(angles)
+    except AnglesError:
+        return curve
+    pad = ((0, 0), (0, 2 - links))
+    energy = model.energy(np.pad(moved.phi_rad, pad), np.pad(moved.w_rad_s, pad))
+    energy = np.where(np.isfinite(phi[near]).all(axis=1), energy, np.nan)
+    at = np.searchsorted(t[near], curve.t_s).clip(0, energy.size - 1)
+    return replace(curve, measured_j=energy[at])
 
 
 def energy_curve(

@@ -123,7 +123,10 @@ def fit_ten(
     u = found.x / size
     norm = np.linalg.norm(design, axis=0)
     scaled = design / norm
-    cov = invert(scaled.T @ scaled) / np.outer(norm, norm)
+    freedom = max(design.shape[0] - design.shape[1] + int(undetermined.sum()), 1)
+    chi2 = float(np.sum((design @ u - energy) ** 2)) / freedom
+    # As the fit of six: energies that scatter by more than their errors have larger ones.
+    cov = invert(scaled.T @ scaled) / np.outer(norm, norm) * max(1.0, chi2)
     spread = np.sqrt(np.diag(cov))
     factor = np.concatenate([np.ones(4), constants(model).ravel()])
     one = scaled[:, :10] - scaled[:, 10:] @ np.linalg.lstsq(scaled[:, 10:], scaled[:, :10], rcond=None)[0]
@@ -140,4 +143,5 @@ def fit_ten(
         {f"rmu{j + 1}": (share[j] / constants(model)[j]).tolist() for j in (0, 1)},
         10 - int(undetermined.sum()),
         float(np.linalg.cond(one / np.linalg.norm(one, axis=0))),
+        chi2 if all(p.sigma_j is not None for p in few) else float("nan"),
     )

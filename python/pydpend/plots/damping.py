@@ -18,15 +18,20 @@ from pydpend.trials import Spread, Trials
 
 
 def energy_figure(energy: EnergyCurve, zoom_s: float = 2.0) -> Figure:
-    """Energy of the motion and the model's, with the first ``zoom_s`` seconds beside (Fig. 19)."""
+    """Energy of the measured angles, of the fitted motion and of the start less losses (Fig. 19).
+
+    The first ``zoom_s`` seconds stand beside.
+    """
     t = energy.t_s
     with style():
         figure = new_figure(6.5, 3.0)
         whole, zoom = figure.subplots(1, 2, width_ratios=(2, 1))
         near = t <= t[0] + zoom_s
         for axes, keep in ((whole, slice(None)), (zoom, near)):
+            measured = () if energy.measured_j is None else (energy.measured_j,)
             for color, values, line, label in (
-                (COLORS[0], energy.energy_j, "-", "motion"),
+                *((COLORS[3], m, "-", "measured") for m in measured),
+                (COLORS[0], energy.energy_j, "-", "fitted motion"),
                 (COLORS[1], energy.model_j, "--", "start - losses"),
             ):
                 axes.plot(*thinned(t[keep], 1e3 * values[keep]), line, color=color, label=label)

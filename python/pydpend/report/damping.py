@@ -155,6 +155,8 @@ def _energy_sentence(fit: DampingFit) -> str:
         found = fit.shares.get(group, {})
         if not all(math.isfinite(c.value) for c in found.values()):
             return []
+        if not all(c.sigma < 1.0 for c in found.values()):
+            return []
         return [(n, f"{with_sigma(100 * c.value, 100 * c.sigma)} %") for n, c in found.items()]
 
     laws, joints = parts("law"), parts("joint")
@@ -232,9 +234,10 @@ def _residuals(left: Residuals, group: str, title: str) -> list[Block]:
     return out
 
 
-def _energy(curve: EnergyCurve, group: str, title: str) -> list[Block]:
+def _energy(curve: EnergyCurve, group: str, title: str, unit: str) -> list[Block]:
     t, energy, model = curve.t_s, curve.energy_j, curve.model_j
     near = t <= t[0] + ZOOM_S
+    measured = () if curve.measured_j is None else (curve.measured_j,)
     return [
         Chart(
             f"{group}-energy",
@@ -242,10 +245,11 @@ def _energy(curve: EnergyCurve, group: str, title: str) -> list[Block]:
             group,
             t,
             (
-                Series("of the fitted motion (J)", energy, 0),
-                Series("start minus all losses (J)", model, 1, dashed=True),
+                *(Series(f"of the measured angles ({unit})", m, 3) for m in measured),
+                Series(f"of the fitted motion ({unit})", energy, 0),
+                Series(f"start minus all losses ({unit})", model, 1, dashed=True),
             ),
-            y_label="energy (J)",
+            y_label=f"energy ({unit})",
             height=280,
         ),
         Chart(
@@ -254,10 +258,11 @@ def _energy(curve: EnergyCurve, group: str, title: str) -> list[Block]:
             f"{group}-zoom",
             t[near],
             (
-                Series("of the fitted motion (J)", energy[near], 0),
-                Series("start minus all losses (J)", model[near], 1, dashed=True),
+                *(Series(f"of the measured angles ({unit})", m[near], 3) for m in measured),
+                Series(f"of the fitted motion ({unit})", energy[near], 0),
+                Series(f"start minus all losses ({unit})", model[near], 1, dashed=True),
             ),
-            y_label="energy (J)",
+            y_label=f"energy ({unit})",
             height=200,
         ),
         Chart(
@@ -265,8 +270,8 @@ def _energy(curve: EnergyCurve, group: str, title: str) -> list[Block]:
             f"Energy{title}, of the fitted motion minus start less losses",
             group,
             t,
-            (Series("difference (mJ)", 1e3 * (energy - model), 2),),
-            y_label="difference (mJ)",
+            (Series(f"difference (m{unit})", 1e3 * (energy - model), 2),),
+            y_label=f"difference (m{unit})",
             height=180,
         ),
         Chart(
@@ -275,7 +280,7 @@ def _energy(curve: EnergyCurve, group: str, title: str) -> list[Block]:
             group,
             t,
             tuple(Series(n, curve.works_j[:, i], i % 6, dashed=i >= 6) for i, n in enumerate(curve.names)),
-            y_label="energy (J)",
+            y_label=f"energy ({unit})",
         ),
     ]
 
@@ -292,7 +297,9 @@ def sections(run: StoredRun, fit: DampingFit, predictions: Mapping[str, Predicti
         energy, left = recording.energy(), recording.residuals()
         title = f" of {name}" if len(names) > 1 else ""
         blocks += [] if left is None else _residuals(left, f"e{k}", title)
-        blocks += [] if energy is None else _energy(energy, f"e{k}", title)
+        blocks += (
+            [] if energy is None else _energy(energy, f"e{k}", title, "J" if fit.scale_known else "J/(kg m²)")
+        )
         if left is not None or energy is not None:
             blocks.append(Reset(f"e{k}"))
     out = [Section("damping", "Damping", (*blocks, *_constants(fit), *against_parts(fit), *_ten(fit)))]
