@@ -37,6 +37,15 @@ _NO_SEPARATORS = "|:&!~^"
 _COMMA_NUMBER = re.compile(r"[+-]?(\d+,\d*|,\d+)([eE][+-]?\d+)?")
 _MAY_BE_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
 
+_MINUS = "\N{MINUS SIGN}"
+"""The sign that programs with fine typography write for minus; it means nothing else."""
+_DASHES = "\N{HYPHEN}\N{NON-BREAKING HYPHEN}\N{FIGURE DASH}\N{EN DASH}\N{EM DASH}\N{HORIZONTAL BAR}"
+"""Signs that look like a minus, and may stand for a range or for nothing as well."""
+_DOUBLE = re.compile(r"([+-]?(?:\d+[.,]\d*|[.,]\d+))[dD]([+-]?\d+)|([+-]?\d+)[dD]([+-]\d+)")
+"""A double of Fortran, ``5.0D+00``. ``5D3`` may be a name."""
+_MAY_BE_DOUBLE = re.compile(r"[\d.,][dD][+-]?\d")
+"""Part of every such double."""
+
 _WHOLE = re.compile(r"[+-]?\d+")
 _SHORT_WHOLE = re.compile(r"[+-]?\d{1,2}")
 _POINT_NUMBER = re.compile(r"[+-]?(\d+\.\d*|\.\d+)([eE][+-]?\d+)?")
@@ -79,6 +88,7 @@ class Cells:
         units_line = 0
         units_may_come = True
         width = len(self.header)
+        is_odd = _MINUS in self.text or _MAY_BE_DOUBLE.search(self.text) is not None
         for line, row in self._rows():
             if line <= self.header_line or row[0].lstrip().startswith(_COMMENTS):
                 continue
@@ -86,7 +96,7 @@ class Cells:
                 self._wrong_width(line, row)
             if not any(f and not f.isspace() for f in row):
                 continue
-            here = [row[i].strip() for i in index]
+            here = [_plain(row[i].strip()) if is_odd else row[i].strip() for i in index]
             if units_may_come:
                 units_may_come = False
                 if all(_is_word(f) for f in here[:count]):
@@ -125,9 +135,6 @@ class Cells:
 
     def _row_of_time_decimals(self, fields: dict[int, list[str]], time: int, wanted: set[int]) -> int | None:
         """The first row in which a comma may be a decimal mark of the time; ``None`` where there is none.
-
-        Whole seconds and the value beside them may be one time, 0,125, and the column behind them, which nobody asked
-        for, the value.
 
         Whole seconds and the value beside them may be one time, 0,125, and the column behind them, which nobody asked
         for, the value.
@@ -197,8 +204,6 @@ class Cells:
 
     def _only_empty(self, row: list[str]) -> bool:
         """Whether a row has the header's fields and empty ones after them, or may be shorter.
-
-        It may if it is blank, or lacks LabVIEW's comment, which that writes in the first row alone.
 
         It may if it is blank, or lacks LabVIEW's comment, which that writes in the first row alone.
         """
@@ -348,9 +353,17 @@ def _is_in_seconds(name: str) -> bool:
     return name.strip().lower() in ("t", "time") if unit is None else unit.name == "s"
 
 
+def _plain(field: str) -> str:
+    """The field with a typographic minus and the exponent of a double of Fortran as every program writes them."""
+    plain = field.replace(_MINUS, "-")
+    double = _DOUBLE.fullmatch(plain)
+    return plain if double is None else f"{double[1] or double[3]}E{double[2] or double[4]}"
+
+
 def _is_word(field: str) -> bool:
     """Whether a field is neither a number nor empty, as the units under a header are."""
-    return field.lower() not in EMPTY and not re.match(r"[+-]?[.,]?\d", field) and not _is_number(field)
+    bare = field.lstrip(_DASHES)
+    return field.lower() not in EMPTY and not re.match(r"[+-]?[.,]?\d", bare) and not _is_number(field)
 
 
 def _is_number(field: str) -> bool:
@@ -416,9 +429,11 @@ class Numbers:
     def _not_a_number(self, row: int, column: str) -> NoReturn:
         field = self._fields[column][row]
         shown = repr(field if len(field) <= 40 else field[:40] + "...")
-        self._cells.refuse(
-            f"{shown} is not a number", "Remove the line or leave the field empty", self._at(row, column)
-        )
+        advice = "Remove the line or leave the field empty"
+        if field[0] in _DASHES:
+            shown += f" begins with a dash (U+{ord(field[0]):04X}) that is no minus sign, so it"
+            advice = "Write - for minus"
+        self._cells.refuse(f"{shown} is not a number", advice, self._at(row, column))
 
     def column(self, column: str) -> NDArray[np.float64]:
         """The numbers of a column (R,), NaN where there is none."""

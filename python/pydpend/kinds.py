@@ -6,13 +6,15 @@
 from __future__ import annotations
 
 import os
+import re
 import shlex
 from dataclasses import replace
 from pathlib import Path
 from typing import Literal, TypeAlias
 
 from pydpend import _native
-from pydpend.errors import IMPORT, Message, PydpendError, Setting, fault
+from pydpend.errors import IMPORT, Message, PydpendError, Setting, Step, fault
+from pydpend.terminal import is_plain, shell_word
 from pydpend.track_forms import NOUNS, Form, form_of
 
 Kind: TypeAlias = Literal[
@@ -60,15 +62,39 @@ def misplaced(path: str | os.PathLike[str], wanted: tuple[Kind, ...]) -> Message
     """
     form = tracks_form(path)
     if form is None:
-        said: Message | None = _native.misplaced(os.fspath(path), list(wanted))
-        return said
+        return _pastable(_native.misplaced(os.fspath(path), list(wanted)), os.fspath(path))
     if "tracks" in wanted:
         return None
     name = os.fspath(path)
-    out = shlex.quote(str(Path(name).with_suffix(".parquet")))
-    command = IMPORT.command.format(file=shlex.quote(name), out=out)
+    out = shell_word(str(Path(name).with_suffix(".parquet")))
+    command = IMPORT.command.format(file=shell_word(name), out=out)
     call = IMPORT.call.format(name=repr(name))
     return fault(name, f"it is {NOUNS[form]}", "Next: " + replace(IMPORT, command=command, call=call))
+
+
+def _pastable(said: Message | None, name: str) -> Message | None:
+    """The message with the next step in a form that can be pasted, whatever the file is called."""
+    if said is None or is_plain(name):
+        return said
+    return Message(tuple(_pasted(part, name) if isinstance(part, Step) else part for part in said.parts))
+
+
+_SHELL_WORD = re.compile(r"'(?:[^']|'\\'')*'")
+_PYTHON_TEXT = re.compile(r'"(?:[^"\\]|\\.)*"')
+
+
+def _pasted(step: Step, name: str) -> Step:
+    """The step with the name in forms that a shell and Python read, which its plain quotes are not."""
+    stem = os.path.splitext(name)[0]
+    # A name that is not UTF-8 comes back with its bytes lost.
+    lossy = os.fsencode(stem).decode("utf-8", "replace")
+
+    def word(match: re.Match[str]) -> str:
+        (bare,) = shlex.split(match[0])
+        return shell_word(stem + bare[len(lossy) :] if bare.startswith(lossy) else bare)
+
+    call = _PYTHON_TEXT.sub(lambda _: repr(name), step.call)
+    return replace(step, command=_SHELL_WORD.sub(word, step.command), call=call)
 
 
 def expect(

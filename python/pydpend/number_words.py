@@ -23,10 +23,13 @@ def number(word: str) -> float:
     try:
         if "_" in word:
             raise ValueError
-        return float(word)
+        value = float(word)
     except ValueError:
         advice = f". Write {word.replace(',', '.')}" if re.fullmatch(r"[+-]?\d*,\d+", word) else ""
         raise ValueError(f"{word!r} is not a number{advice}") from None
+    if not math.isfinite(value):
+        raise ValueError(f"{word!r} is not a finite number")
+    return value
 
 
 def numbers(text: str, setting: str, *, is_pair: bool = True) -> list[float]:
@@ -67,7 +70,7 @@ def numbers(text: str, setting: str, *, is_pair: bool = True) -> list[float]:
         out = [number(word) for word in text.split(",")]
     except ValueError:
         out = []
-    if not out or not all(map(math.isfinite, out)):
+    if not out:
         raise OptionError(
             fault(
                 Setting(setting),

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import re
+import shlex
 from typing import Any, TextIO
 
 _OBEYED = re.compile(
@@ -26,6 +28,26 @@ def shown(text: str) -> str:
         return known or (f"\\x{code:02x}" if code < 0x80 else f"\\u{{{code:x}}}")
 
     return _OBEYED.sub(written, text)
+
+
+def is_plain(text: str) -> bool:
+    """Whether a text is shown by a terminal as it is."""
+    return _OBEYED.search(text) is None
+
+
+def shell_word(name: str) -> str:
+    r"""A name as a word to paste into a shell; what is no character to be seen is written out, ``$'dr\xf6p.mp4'``.
+
+    That form is read by bash, zsh and ksh.
+    """
+    if is_plain(name):
+        return shlex.quote(name)
+
+    def written(match: re.Match[str]) -> str:
+        return "".join(f"\\x{byte:02x}" for byte in os.fsencode(match[0]))
+
+    quoted = name.replace("\\", r"\\").replace("'", r"\'")
+    return f"$'{_OBEYED.sub(written, quoted)}'"
 
 
 class Shown:

@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 from pydpend.cli import COMMANDS, main, parser
 from pydpend.cli.words import options_of
-from pydpend.errors import OptionError
+from pydpend.errors import AnglesError, OptionError
+from pydpend.kinematics import read_angles
 from pydpend.number_words import numbers
 
 from tests.end_to_end.test_output import angles, nodes, refused
@@ -162,3 +163,15 @@ def test_standard_output_is_no_output(
     ends = {"file": "the output is a file", "folder": "the results need a folder"}
     refused(words.split(), f"-: standard output is not possible: {ends[what]}")
     assert sorted(p.name for p in tmp_path.iterdir()) == before
+
+
+@pytest.mark.parametrize("word", ["nan", "inf", "-inf", "1e400"])
+def test_a_number_that_is_not_finite_is_the_options_fault(
+    word: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for given in (["fit", "a.csv", "--hanging"], ["analyse", "a.csv", "--hanging"], ["fit", "a.csv", "--start"],
+                  ["animate", "run", "--speed"], ["export", "n.csv", "--px-per-m"]):  # fmt: skip
+        assert main([*given[:-1], f"{given[-1]}={word}", "-o", "out"]) == 2
+        assert f"{given[-1]}: {word!r} is not a finite number" in capsys.readouterr().err
+    with pytest.raises(AnglesError, match=r"hanging_rad: .* is no angle at which links hang"):
+        read_angles(DEMO / "motion.parquet", hanging_rad=float(word))

@@ -52,6 +52,9 @@ READ: dict[str, str | bytes] = {
     "comments": "# a, b\n% c\n" + HEAD + "# d\n0.5,0.65\n% e\n// f, g, h\n1,1.65\n",
     "units": HEAD + "s,V\n0.5,0.65\n1,1.65\n",
     "units in brackets": HEAD + "(s),[V]\n0.5,0.65\n1,1.65\n",
+    "doubles of Fortran": HEAD.replace(",", " ") + " 5.0D-01 0.065D+01\n 1D+00 1.65d0\n",
+    "doubles of Fortran with decimal commas": "time_s;voltage_v\n5,0D-01;0,65\n1;1,65D+00\n",
+    "a typographic minus in exponents": HEAD + "5e\u22121,0.65\n1,1.65\n",
     "whole numbers in one row": "time_s,voltage_v,note\n0.5,0.65,12\n1,1.65,\n",
     "a sentence above with the names in it": "the columns time_s and voltage_v follow\n"
     + HEAD
@@ -96,6 +99,13 @@ REFUSED: dict[str, tuple[str | bytes, str]] = {
     "no header": ("0.5,0.65\n1,1.65\n", "line 1: there is no header line with the names time_s, voltage_v"),
     "no header, spaces": ("0.5 0.65\n1 1.65\n", "line 1: there is no header line"),
     "underscores": (HEAD + "0.5,1_0\n", "'1_0' is not a number"),
+    "a dash for minus": (
+        HEAD + "\u20130.5,0.65\n",
+        "line 2, column time_s: '\u20130.5' begins with a dash (U+2013) that is no minus sign, so it is not a number. "
+        "Write - for minus",
+    ),
+    "what may be a name": (HEAD + "0.5,5D3\n", "line 2, column voltage_v: '5D3' is not a number"),
+    "two minus signs": (HEAD + "0.5,\u2212-5\n", "line 2, column voltage_v: '--5' is not a number"),
     "other scripts' digits": (HEAD + "0.5,\u0661\n", "is not a number"),
     "a unit in the field": (HEAD + "0.5,0.65 V\n", "line 2, column voltage_v: '0.65 V' is not a number"),
     "a unit with digits that is not known": (
@@ -260,3 +270,10 @@ def test_a_tdms_file_that_is_cut_says_so_and_nothing_else(
     assert "\n" not in str(caught.value)
     # npTDMS prints what it meets.
     assert capfd.readouterr() == ("", "")
+
+
+def test_a_typographic_minus_is_a_minus(tmp_path: Path) -> None:
+    for minus in ("\u2212", "-"):
+        found = read(tmp_path, f"time_s;voltage_v\n{minus}1;{minus}0,65\n1;{minus}6,5e{minus}2\n")
+        assert found.values["time_s"].tolist() == [-1.0, 1.0]
+        assert found.values["voltage_v"].tolist() == [-0.65, -0.065]

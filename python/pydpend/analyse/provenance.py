@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import platform
-import shlex
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ from pydpend.analyse.contents import about
 from pydpend.analyse.folder import Digests, RunFolder
 from pydpend.analyse.options import Options, all_options
 from pydpend.option_fields import flag_of
+from pydpend.terminal import shell_word
 
 FILES = ("rig", "encoder", "calibration", "model", "zero")
 """Options that may name a file or a folder."""
@@ -56,7 +56,7 @@ def command(options: Options, folder: Path) -> str:
             words.append(f"{flag}={value}")
         else:
             words += [flag, str(value)]
-    return shlex.join(words)
+    return " ".join(map(shell_word, words))
 
 
 def readme(run: RunFolder) -> str:

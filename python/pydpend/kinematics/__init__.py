@@ -1,6 +1,7 @@
 """Angles of the links: the table every later stage starts from, and the ways from nodes to it.
 
-``table``, ``names``, ``files``: the result, its columns and its file forms. ``structure``: what hangs on what.
+``table``, ``names``, ``files``: the result, its columns and its file forms. ``structure``, ``ground``: what hangs on
+what.
 ``markers``: image to world. ``pose``, ``linkage``, ``pairwise``: the estimators. ``body_view``, ``camera``,
 ``camera_slopes``: what the camera does to the angles. ``unwrap``: turns. ``zero``, ``swing``, ``vertical``: rests,
 where the motion says that the links hang, where the picture does; ``rests``, ``hanging``: which of them is the zero.

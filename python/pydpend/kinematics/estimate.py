@@ -12,6 +12,7 @@ from pydpend.errors import CHECK, AnglesError, Setting, fault
 from pydpend.kinematics.axes import Axes, directions
 from pydpend.kinematics.camera_slopes import zero_slopes
 from pydpend.kinematics.estimators import Method, Seen, Wishes, estimate, poses_of
+from pydpend.kinematics.ground import check_ground
 from pydpend.kinematics.hanging import HORIZONTAL, VERTICAL, Raw, is_direction, zero_for
 from pydpend.kinematics.linkage import Linkage
 from pydpend.kinematics.linkage_frames import LinkageAngles, fit_joints
@@ -94,8 +95,9 @@ def angles(
     Raises
     ------
     AnglesError
-        For a body never seen, or in one marker only; no rest found, or one in which the links are held and do not
-        hang; a turn that may be lost; links that turn too little for a linkage.
+        For a body never seen, or in one marker only; links in the wrong order, where the rig has no pivot; no rest
+        found, or one in which the links are held and do not hang; a turn that may be lost; links that turn too little
+        for a linkage.
     """
     if method is not None:
         raise AnglesError(
@@ -113,6 +115,8 @@ def angles(
     if isinstance(ending, dict) and ending.get("kind") != "complete":
         why = nodes.damage or ending.get("reason") or ending.get("kind")
         notes.append(f"the node table is not of the whole recording ({why})")
+    if bodies is None:
+        notes += check_ground(raw.structure, seen.poses, label)
     phi, left_out = _unwrapped(nodes, raw.theta, markers, label, gaps, notes)
     _check_hanging(raw.structure, zero, label)
     raw = _with_directions(raw, seen, nodes, zero, axis or {}, wishes)

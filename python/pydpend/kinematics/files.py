@@ -102,6 +102,9 @@ def read_angles(
     if hanging.shape not in ((), (phi.shape[1],)):
         problem = f"{hanging.size} angles for {phi.shape[1]} link(s)"
         raise AnglesError(fault(Setting("hanging_rad"), problem, "Give one number, or one per link"))
+    if not np.isfinite(hanging).all():
+        problem = f"{hanging_rad} is no angle at which links hang"
+        raise AnglesError(fault(Setting("hanging_rad"), problem, "Give finite numbers"))
     phi = (phi - hanging) * (-1.0 if clockwise else 1.0)
     if camera is not None and clockwise:
         camera = -camera

@@ -72,8 +72,6 @@ def parse_zero(text: str) -> str | list[float] | None:
 
     A word that `angles` knows, or angles in degrees (``12.5,-3``) as rad.
 
-    A word that `angles` knows, or angles in degrees (``12.5,-3``) as rad.
-
     Raises OptionError for degrees that may be read in two ways.
     """
     if text in ("rest", "reference_frame") or is_direction(text):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shlex
 from pathlib import Path
 
 from pydpend.report import damping, recording
@@ -60,14 +59,18 @@ def beside_each_other(parts: list[recording.Part]) -> Table:
     return Table(header, rows, numbers=frozenset(range(1, len(header))))
 
 
+_WORD = re.compile(r"""(?:\$'(?:[^'\\]|\\.)*'|'[^']*'|"[^"]*"|\\.|[^\s'"\\])+""")
+"""A word of a command line with its quotes."""
+
+
 def in_lines(command: str) -> str:
     """A command line with each option on a line of its own, still to be copied as it is."""
     lines: list[list[str]] = [[]]
-    for word in shlex.split(command):
+    for word in _WORD.findall(command):
         if word.startswith("-") and not re.match(r"-\.?\d", word):
             lines.append([])
         lines[-1].append(word)
-    return " \\\n    ".join(shlex.join(line) for line in lines)
+    return " \\\n    ".join(" ".join(line) for line in lines)
 
 
 def _reproduce(run: StoredRun) -> list[Block]:
