@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from pydpend.errors import SELECT, AnglesError, fault
+from pydpend.errors import SELECT, AnglesError, Setting, fault
 from pydpend.json_text import plain
 from pydpend.kinematics import LinkAngles
 from pydpend.link_states import LinkStates, states
@@ -24,6 +24,9 @@ from pydpend.tabular import TableResult, html_rows
 from pydpend.typed import typed
 
 Array = npt.NDArray[np.float64]
+
+START = Setting("start_s") + " and " + Setting("stop_s")
+"""How a part of a recording is taken."""
 
 LEAST_SWINGS = 3
 """Whole swings that a period and a decay take, at least."""
@@ -161,7 +164,7 @@ def ring_down(
     turns, phi, sigma = _turning_points(moving)
     if turns.size < 2 * LEAST_SWINGS + 1:
         problem = f"{turns.size} turning points, which are fewer than {LEAST_SWINGS} swings"
-        raise AnglesError(fault(one.name, problem, "Give a longer recording, or its swing by start and stop"))
+        raise AnglesError(fault(one.name, problem, "Give a longer recording, or another part with " + START))
     middle = float(np.median(phi[1:-1] / 2 + (phi[:-2] + phi[2:]) / 4))
     amplitude = np.abs(phi - middle)
     crossings, crossing_sigma = _crossings(moving, middle, turns)
@@ -172,15 +175,19 @@ def ring_down(
             fault(
                 one.name,
                 f"its half swings take {half.min():.3g} to {half.max():.3g} s: this is no single pendulum's free swing",
-                "Give the part that swings freely by start and stop",
+                "Give the part that swings freely with " + START,
             )
         )
     period = _period(crossings, crossing_sigma, turns, amplitude)
     # A rise of the period that is nearer gravity's 1/16 than none.
-    decay = _decay(turns, amplitude, sigma, in_gravity=period[2] > 1 / 32)
+    in_gravity = period[2] > 1 / 32
+    decay = _decay(turns, amplitude, sigma, in_gravity=in_gravity)
     at = float(np.sqrt(amplitude[0] * amplitude[-1]))
     powers = np.array([{"viscous": 1.0, "quadratic": at, "dry": 1 / at}[law] for law in decay.laws])
     whole = period[0] * (1 + period[2] * at**2)
+    if in_gravity:
+        powers = powers * [float(_wide(law, np.array(at))) for law in decay.laws]
+        whole += period[0] * float(_beyond(np.array(at)))
     decrement = whole * float(powers @ decay.rates)
     error = whole * float(np.sqrt(powers @ decay.covariance @ powers))
     return RingDown(
@@ -251,27 +258,40 @@ def _period(
 ) -> tuple[float, float, float, float]:
     """Period of a small swing and its rise with the amplitude squared, each with its standard uncertainty.
 
-    Each passage is at ``t0 + T0 sum (1/2)(1 + k A^2 + 11/3072 A^4)``: least squares over all passages.
+    Each passage is at ``t0 + T0 sum (1/2)(1 + k A^2 + ...)``, the rest as in gravity where k is: least squares over all
+    passages.
     """
     mean = np.interp((crossings[1:] + crossings[:-1]) / 2, turns, amplitude)
-    count = np.concatenate([[0.0], np.cumsum(np.full(mean.size, 0.5))])
-    square = np.concatenate([[0.0], np.cumsum(mean**2 / 2)])
-    quartic = np.concatenate([[0.0], np.cumsum(11 / 3072 * mean**4 / 2)])
+
+    def summed(halves: Array) -> Array:
+        return np.concatenate([[0.0], np.cumsum(halves) / 2])
+
+    count, square, rest = summed(np.ones(mean.size)), summed(mean**2), summed(_beyond(mean))
     side = np.arange(crossings.size) % 2
     # The middle may be off: passages to the right come late by what those to the left come early.
     t0 = 2 * float(np.median(np.diff(crossings)))
-    design = np.column_stack([np.ones(count.size), count + quartic, square, side])
+    weight = 1 / np.maximum(sigma, 1e-12 + 1e-6 * t0)
     if float(np.ptp(mean)) < 0.05 * float(mean.max()) or float(mean.max()) < 0.1:
         # Nothing tells the rise from the period itself: gravity's is taken.
-        design = np.column_stack([design[:, 0], count + quartic + square / 16, side])
-    weight = 1 / np.maximum(sigma, 1e-12 + 1e-6 * t0)
-    found, inverse, scale = _solved(design * weight[:, None], crossings * weight)
-    if design.shape[1] == 3:
+        design = np.column_stack([np.ones(count.size), count + square / 16 + rest, side])
+        found, inverse, scale = _solved(design * weight[:, None], crossings * weight)
         return float(found[1]), scale * float(np.sqrt(inverse[1, 1])), 1 / 16, float("nan")
-    k = float(found[2] / found[1])
+    k = 0.0
+    for beyond in (rest, 0 * rest):
+        design = np.column_stack([np.ones(count.size), count + beyond, square, side])
+        found, inverse, scale = _solved(design * weight[:, None], crossings * weight)
+        k = float(found[2] / found[1])
+        if k > 1 / 32:
+            break
     slope = np.array([-k, 1.0]) / found[1]
     error = float(np.sqrt(slope @ inverse[1:3, 1:3] @ slope))
     return float(found[1]), scale * float(np.sqrt(inverse[1, 1])), k, scale * error
+
+
+def _beyond(amplitude: Array) -> Array:
+    """The part of a pendulum's period, over that of a small swing, beyond ``1 + A^2 / 16``."""
+    a = np.clip(amplitude, 0.0, 3.1)
+    return np.asarray(2 / np.pi * scipy.special.ellipk(np.sin(a / 2) ** 2) - 1 - a**2 / 16)
 
 
 def _solved(design: Array, wanted: Array) -> tuple[Array, Array, float]:
@@ -327,9 +347,7 @@ def _decay(t: Array, amplitude: Array, sigma: Array, *, in_gravity: bool) -> _De
     allowed = {laws: fit for laws, fit in fits.items() if (fit[0] > 0).all()}
     if not allowed or amplitude[-1] >= amplitude[0]:
         raise AnglesError(
-            fault(
-                "swing", "the amplitude does not fall", "Give the part that swings freely by start and stop"
-            )
+            fault("swing", "the amplitude does not fall", "Give the part that swings freely with " + START)
         )
 
     def cost(laws: tuple[str, ...]) -> float:

@@ -128,6 +128,28 @@ def test_angles_and_encoder(tmp_path: Path) -> None:
         assert (tmp_path / "out/angles" / name).stat().st_size > 1000
 
 
+def test_other_mechanisms(tmp_path: Path) -> None:
+    page = "docs/how-to/mechanisms.md"
+    (tmp_path / "tests").symlink_to(ROOT / "tests")
+    done = followed(page, tmp_path)
+    assert done.returncode == 0, done.stderr
+    # The words are the page's; the numbers too, but for what a better tracker moves.
+    for line in re.findall(r"^    (phi_link\d: .*|link1: .*)$", (ROOT / page).read_text("utf-8"), re.M):
+        words = re.sub(r"[-+]?\d[\d.e-]*", "#", line)
+        matching = [p for p in done.stdout.splitlines() if re.sub(r"[-+]?\d[\d.e-]*", "#", p) == words]
+        assert any(p[:9] == line[:9] for p in matching), line
+    period = float(re.findall(r"period of small ones ([\d.]+)", done.stdout)[0])
+    assert period == pytest.approx(2 * math.pi * math.sqrt(0.225 / 9.81), rel=1e-4)
+    assert float(re.findall(r"viscous ([\d.]+)", done.stdout)[0]) == pytest.approx(0.025, rel=0.01)
+    scale = float(re.findall(r"scale ([\d.]+)", done.stdout)[0])
+    assert scale == pytest.approx(1, rel=1e-3)
+    python = "".join(indented(page, "import pydpend"))
+    done = shell(f".venv/bin/python - <<'END'\n{python}\nEND", tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "('link1', 'link2', 'link3') (600, 2)" in done.stdout
+    assert (tmp_path / "out/mechanisms/four-bar.png").stat().st_size > 1000
+
+
 OWN_FILES = """
 cp fixtures/demo/drop.mp4 fixtures/demo/hanging.mp4 .
 cp fixtures/demo/encoder.csv drop.csv

@@ -1,8 +1,12 @@
-"""Films of mechanisms with known markers, drawn by nothing of pydpend's: links with discs, any background."""
+"""Films of mechanisms with known markers, drawn by nothing of pydpend's: links with discs, any background.
+
+Usage: python -m tests.support.mechanism_films four-bar four-bar.mp4 [SEED]
+"""
 
 from __future__ import annotations
 
 import subprocess
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -224,6 +228,7 @@ def cluttered(rng: np.random.Generator) -> Mechanism:
 
 KINDS: dict[str, Callable[[np.random.Generator], Mechanism]] = {
     "double": double,
+    "bob": lambda r: chain(r, (180,), [[(180, 0)]], fps=100, frames=1500),
     "two a link": lambda r: chain(r, LENGTHS_PX, [[(45, 0), (130, 0)], [(30, 0), (105, 0)]]),
     "five a link": lambda r: chain(
         r,
@@ -292,3 +297,15 @@ def drawn(made: Mechanism, path: Path, seed: int) -> None:
             picture += rng.normal(0, NOISE, picture.shape)
             encoder.stdin.write(np.clip(np.round(picture), 0, 255).astype(np.uint8).tobytes())
     assert encoder.returncode == 0
+
+
+def main(words: Sequence[str]) -> int:
+    """Draws the film of one of `KINDS`: its name, the file, and a seed."""
+    kind, path, *seed = words
+    number = int(seed[0]) if seed else 4
+    drawn(KINDS[kind](np.random.default_rng(number)), Path(path), number)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -71,6 +71,17 @@ def test_a_linear_swing_has_the_textbook_decrement_and_q() -> None:
     assert found.to_dict()["laws"] == ["viscous"]
 
 
+def test_a_wide_swing_in_gravity() -> None:
+    found = dp.ring_down(swing(21, 25.0, 1.9, a=0.02))
+    assert found.period_s == pytest.approx(1.1, rel=2e-4)
+    assert found.amplitude_coefficient == pytest.approx(1 / 16, rel=0.02)
+    assert found.rates == pytest.approx([0.02], rel=0.01)
+    # Of two turning points a swing apart.
+    near = int(np.argmin(np.abs(found.amplitude_rad - found.at_amplitude_rad)))
+    measured = np.log(found.amplitude_rad[near - 1] / found.amplitude_rad[near + 1])
+    assert found.decrement == pytest.approx(measured, rel=0.06)
+
+
 def test_uncertainties_cover_the_truth() -> None:
     pulls = []
     for seed in range(3, 13):

@@ -29,6 +29,10 @@ def add_arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument(
         "--link", metavar="NAME", help="the link whose period and Q are told, where there are several"
     )
+    p.add_argument(
+        "--start-s", type=float, metavar="S", help="start of the free swing whose period is told, s"
+    )
+    p.add_argument("--stop-s", type=float, metavar="S", help="its end, s")
     p.add_argument("--points", metavar="A,B", help="markers and joints (default: all that are known)")
     p.add_argument(
         "--scale",
@@ -90,7 +94,7 @@ def _of_angles(args: argparse.Namespace) -> tuple[Any, dict[str, Any], list[str]
     if angles.links > 1 and args.link is None:
         return found.to_columns(), about, []
     try:
-        swing = ring_down(angles, args.link)
+        swing = ring_down(angles, args.link, start_s=args.start_s, stop_s=args.stop_s)
     except AnglesError as problem:
         return found.to_columns(), about, [f"no period is told: {problem}"]
     about["swing"] = swing.to_dict()
