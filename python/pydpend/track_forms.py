@@ -143,7 +143,7 @@ def _of_hdf5(path: Path) -> Form | None:
     try:
         with h5py.File(path, "r") as file:
             return _of_groups(file)
-    except (OSError, RuntimeError, ValueError, KeyError, TypeError):
+    except (OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeError):
         return None
 
 

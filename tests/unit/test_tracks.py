@@ -167,6 +167,21 @@ def test_another_table_of_pandas_is_not_deeplabcut_s(tmp_path: Path) -> None:
     same_places(dp.read_tracks(tmp_path / "dlc.h5", fps=RATE_HZ))
 
 
+def test_a_pickle_in_an_hdf5_makes_nothing_but_names(tmp_path: Path) -> None:
+    import h5py
+
+    pd.read_hdf(TRACKS / "deeplabcut.h5").to_hdf(tmp_path / "dlc.h5", key="df_with_missing", format="table")
+    with h5py.File(tmp_path / "dlc.h5", "r+") as file:
+        attributes = file["df_with_missing"].attrs
+        attributes["non_index_axes"] = np.bytes_(f"cposix\nsystem\n(Vtouch {tmp_path}/made\ntR.")
+
+    with pytest.raises(
+        dp.TableError, match=r"dlc\.h5: it cannot be read \(a pickle in it asks for posix\.system\)"
+    ):
+        dp.read_tracks(tmp_path / "dlc.h5", fps=RATE_HZ)
+    assert not (tmp_path / "made").exists()
+
+
 def test_decimal_commas_of_kinovea(tmp_path: Path) -> None:
     foreign_tracks.kinovea_csv(tmp_path / "k.csv", truth(), comma=True)
     same_places(dp.read_tracks(tmp_path / "k.csv", unit="px", image_px=IMAGE_PX))
@@ -315,6 +330,9 @@ def test_a_file_that_is_cut_off_is_read_in_part_or_refused_in_one_line(
 
 
 WORDS: dict[str, tuple[str, str, str]] = {
+    "tracks.xml": ('encoding="UTF-8"', 'encoding="pTF-8"', "is not XML .unknown encoding: pTF-8"),
+    "kinovea.kva": (";1000<", ";<", "a point of pin is '.*;.*;', and x;y;t is expected"),
+    "kinovea.csv": ('"339.1590381213845"', '"1e999"', "frame 0: the place of pin is not finite"),
     "deeplabcut.csv": ("0.91", "much", "line 5, column pin likelihood: 'much.*' is not a number"),
     "spots.csv": (",0.004,1,", ",soon,1,", "line 10, column POSITION_T: 'soon' is not a number"),
     "tab.trk": (
@@ -322,7 +340,6 @@ WORDS: dict[str, tuple[str, str, str]] = {
         '<property name="x" type="double">a3',
         "x of a step is 'a3",
     ),
-    "kinovea.kva": (";1000<", ";<", "a point of pin is '.*;.*;', and x;y;t is expected"),
     "model.xml": (' FRAME="0" ', ' FRAME="first" ', "FRAME of a Spot is 'first', which is not a number"),
     "qualisys.tsv": ("\t12.5\t", "\tdeep\t", "line 11, column pin Y: 'deep' is not a number"),
     "walk.trc": ("\n1\t0.000\t", "\n0\t0.000\t", "the frame is 0, and a whole number from 1 is expected"),

@@ -14,6 +14,18 @@ from pydpend.documents import read_bytes
 from pydpend.errors import TableError, fault
 from pydpend.raw_tracks import Floats
 
+EXTRA = "tracks"
+"""The choice of dependencies that has the libraries of HDF5 and NetCDF."""
+
+DAMAGE = (OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeError, IndexError, OverflowError)
+"""Exceptions of HDF5's libraries for a file that is damaged or of another layout."""
+
+
+def damaged(path: Path, problem: BaseException) -> TableError:
+    """The error for a file that a library cannot read, with what that says on one line."""
+    said = next(iter(str(problem).splitlines()), type(problem).__name__)
+    return TableError(fault(str(path), f"it cannot be read ({said})", "Copy or write it again"))
+
 
 def lines_of(path: Path) -> list[str]:
     """The lines of a text. Raises TableError if it cannot be read."""

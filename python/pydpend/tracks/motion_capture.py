@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
+import subprocess
+import sys
 import tempfile
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from pydpend.documents import unreadable
 from pydpend.errors import TableError, fault
 from pydpend.raw_tracks import Floats, RawTracks
 from pydpend.tracks.cells import library, lines_of, numbers_of
@@ -57,29 +63,54 @@ def _fields(line: str) -> list[str]:
 def c3d(path: Path, names: Sequence[str] = ()) -> RawTracks:
     """A C3D file, which ezc3d reads: points, their unit and rate; the residual is their uncertainty."""
     source = str(path)
-    ezc3d = library("ezc3d", source, "C3D", "export")
-    try:
-        # ezc3d takes names in UTF-8 only.
-        with tempfile.TemporaryDirectory() as folder:
-            plain = Path(folder) / "points.c3d"
-            shutil.copyfile(path, plain)
-            file = ezc3d.c3d(str(plain))
-        points = np.asarray(file["data"]["points"], dtype=np.float64)[:3].transpose(2, 1, 0)
-        residual = np.asarray(file["data"]["meta_points"]["residuals"], dtype=np.float64)[0].T
-        parameters = file["parameters"]["POINT"]
-        called = [str(v) for v in parameters["LABELS"]["value"]][: points.shape[1]]
-        unit = next((str(v) for v in parameters.get("UNITS", {}).get("value", [])), "")
-        rate = float(parameters["RATE"]["value"][0])
-        first = int(file["header"]["points"]["first_frame"])
-    except (OSError, RuntimeError, ValueError, KeyError, IndexError, TypeError) as problem:
-        said = next(iter(str(problem).splitlines()), type(problem).__name__)
-        raise TableError(fault(source, f"it cannot be read as C3D ({said})", "Copy it again")) from problem
+    library("ezc3d", source, "C3D", "export")
+    with tempfile.TemporaryDirectory() as folder:
+        content = _read_beside(path, Path(folder))
+    points = content["points"][:3].transpose(2, 1, 0)
+    residual = content["residuals"][0].T
+    called = [str(v) for v in content["labels"]][: points.shape[1]]
+    unit, rate, first = str(content["unit"]), float(content["rate"]), int(content["first"])
     called += [f"point{i + 1}" for i in range(len(called), points.shape[1])]
     points = np.where((residual >= 0)[..., None], points, np.nan)
     frame = first + np.arange(points.shape[0], dtype=np.int64)
     sigma, notes = _of_residual(residual, np.asarray(np.isfinite(points).all(axis=2)))
     return RawTracks("C3D", source, tuple(called), frame, points, frame / rate if rate > 0 else None, sigma=sigma,
                      unit=unit, is_y_up=True, notes=notes)  # fmt: skip
+
+
+READER = """
+import sys
+import ezc3d, numpy
+file = ezc3d.c3d("points.c3d")
+point = file["parameters"]["POINT"]
+numpy.savez(
+    "points.npz",
+    points=numpy.asarray(file["data"]["points"], dtype=float),
+    residuals=numpy.asarray(file["data"]["meta_points"]["residuals"], dtype=float),
+    labels=numpy.array([str(v) for v in point["LABELS"]["value"]], dtype=str),
+    unit=next((str(v) for v in point.get("UNITS", {}).get("value", [])), ""),
+    rate=float(point["RATE"]["value"][0]),
+    first=int(file["header"]["points"]["first_frame"]),
+)
+"""
+"""Program that reads a C3D by itself: ezc3d 1.7 ends the whole program on some damaged files."""
+
+
+def _read_beside(path: Path, folder: Path) -> dict[str, NDArray[Any]]:
+    """The content of a C3D, read by another process in ``folder``, where its name is one that ezc3d takes."""
+    try:
+        shutil.copyfile(path, folder / "points.c3d")
+    except OSError as problem:
+        raise TableError(unreadable(path, problem)) from problem
+    where = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
+    done = subprocess.run(
+        [sys.executable, "-c", READER], cwd=folder, env=where, capture_output=True, text=True, check=False
+    )
+    if done.returncode:
+        said = (done.stderr.strip().splitlines() or ["the reader ended at once"])[-1]
+        raise TableError(fault(str(path), f"it cannot be read as C3D ({said})", "Copy it again"))
+    with np.load(folder / "points.npz") as found:
+        return dict(found)
 
 
 def _of_residual(

@@ -177,6 +177,8 @@ def xml_root(path: Path) -> ElementTree.Element:
     """The outermost element of an XML file. Raises TableError naming the line at fault."""
     try:
         return ElementTree.fromstring(read_bytes(path, TableError))
+    except (LookupError, ValueError) as problem:  # an encoding that is not known
+        raise TableError(fault(str(path), f"is not XML ({problem})", "Save it as UTF-8")) from problem
     except ElementTree.ParseError as problem:
         line, column = problem.position
         said = str(problem).partition(":")[0]

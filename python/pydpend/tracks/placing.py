@@ -93,6 +93,11 @@ def placed(raw: RawTracks, wishes: Wishes) -> RawTracks:
     """
     if not raw.xyz.size:
         raise TableError(fault(raw.source, "it has no places", "Give a file with tracks in it"))
+    odd = np.argwhere(np.isinf(raw.xyz))
+    if odd.size:
+        t, n, _ = odd[0]
+        problem = f"the place of {raw.names[n]} is not finite"
+        raise TableError(fault(raw.source, problem, "Leave it empty", place=f"frame {raw.frame[t]}"))
     told = _Told(list(raw.notes), dict(raw.facts))
     chosen = _chosen(raw, wishes.nodes)
     t_s = _times(chosen, wishes.fps, told)

@@ -1,4 +1,4 @@
-"""Pose estimation in HDF5: DeepLabCut, SLEAP, and movement's NetCDF."""
+"""Pose estimation in HDF5: SLEAP, and movement's NetCDF."""
 
 from __future__ import annotations
 
@@ -11,48 +11,8 @@ import numpy as np
 
 from pydpend.errors import TableError, fault
 from pydpend.raw_tracks import Floats, RawTracks
-from pydpend.tracks.cells import library
-from pydpend.tracks.wide_text import PCUTOFF, names_of, of_deeplabcut
-
-EXTRA = "tracks"
-"""The choice of dependencies that has the libraries of these forms."""
-
-DAMAGE = (OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeError, IndexError)
-"""Exceptions of HDF5's libraries for a file that is damaged or of another layout."""
-
-
-def _damaged(path: Path, problem: BaseException) -> TableError:
-    said = next(iter(str(problem).splitlines()), type(problem).__name__)
-    return TableError(fault(str(path), f"it cannot be read ({said})", "Copy or write it again"))
-
-
-def deeplabcut_h5(path: Path, names: Sequence[str] = ()) -> RawTracks:
-    """DeepLabCut's table in HDF5, which pandas and PyTables read."""
-    pandas = library("pandas", str(path), "HDF5 of DeepLabCut", EXTRA)
-    library("tables", str(path), "HDF5 of DeepLabCut", EXTRA)
-    try:
-        frame = pandas.read_hdf(path)
-    except DAMAGE as problem:
-        raise _damaged(path, problem) from problem
-    return of_deeplabcut_frame(frame, str(path))
-
-
-def of_deeplabcut_frame(frame: Any, source: str) -> RawTracks:
-    """DeepLabCut's DataFrame: columns by scorer, individual (of several), body part and coordinate."""
-    levels = list(frame.columns.names)
-    if not {"bodyparts", "coords"} <= set(levels):
-        problem = f"its columns have the levels {', '.join(map(str, levels))}, not bodyparts and coords"
-        raise TableError(fault(source, problem, "Give the table as DeepLabCut wrote it"))
-    part, coordinate = levels.index("bodyparts"), levels.index("coords")
-    person = levels.index("individuals") if "individuals" in levels else part
-    columns = [(str(c[person]), str(c[part]), str(c[coordinate])) for c in frame.columns]
-    try:
-        numbers, values = np.asarray(frame.index, dtype=float), frame.to_numpy(dtype=float)
-    except (TypeError, ValueError) as problem:
-        raise TableError(
-            fault(source, f"it is no table of numbers ({problem})", "Give the table as DeepLabCut wrote it")
-        ) from problem
-    return of_deeplabcut(source, numbers, columns, values)
+from pydpend.tracks.cells import DAMAGE, EXTRA, damaged, library
+from pydpend.tracks.wide_text import PCUTOFF, names_of
 
 
 def sleap_h5(path: Path, names: Sequence[str] = ()) -> RawTracks:
@@ -70,7 +30,7 @@ def sleap_h5(path: Path, names: Sequence[str] = ()) -> RawTracks:
                 score = _ordered(file["point_scores"], ("frame", "track", "node"), ("track", "node", "frame"))
             shape = _video_shape(file)
     except DAMAGE as problem:
-        raise _damaged(path, problem) from problem
+        raise damaged(path, problem) from problem
     count = places.shape[0]
     called = names_of(tracks[: places.shape[1]], nodes)
     xy = places.reshape(count, -1, 2)
@@ -109,7 +69,7 @@ def sleap_slp(path: Path, names: Sequence[str] = ()) -> RawTracks:
         nodes = [str(n) for n in labels.skeletons[0].node_names]
         shape = None if video is None else video.shape
     except DAMAGE as problem:
-        raise _damaged(path, problem) from problem
+        raise damaged(path, problem) from problem
     groups = [t.name for t in labels.tracks] or [f"animal{i + 1}" for i in range(values.shape[1])]
     notes = [] if len(labels.videos) < 2 else [f"of {len(labels.videos)} films the first alone is read"]
     count = values.shape[0]
@@ -142,7 +102,7 @@ def opened(path: Path) -> Any:
         with xarray.open_dataset(path, engine=engine) as dataset:
             return dataset.load()
     except DAMAGE as problem:
-        raise _damaged(path, problem) from problem
+        raise damaged(path, problem) from problem
 
 
 def of_dataset(dataset: Any, source: str) -> RawTracks:

@@ -16,7 +16,7 @@ from pydpend.nodes import Nodes, nodes_of_dataset
 from pydpend.output import AnyPath, path_of
 from pydpend.raw_tracks import RawTracks
 from pydpend.track_forms import Form, form_of, form_of_columns
-from pydpend.tracks import marked, motion_capture, particles, pose_files, wide_text
+from pydpend.tracks import deeplabcut, marked, motion_capture, particles, pose_files, wide_text
 from pydpend.tracks.merging import merged
 from pydpend.tracks.placing import Wishes, placed
 from pydpend.typed import typed
@@ -30,7 +30,7 @@ READERS: dict[Form, Callable[[Path, Sequence[str]], RawTracks]] = {
     "kinovea_text": wide_text.kinovea_text,
     "kinovea_kva": marked.kinovea_kva,
     "deeplabcut_csv": wide_text.deeplabcut_csv,
-    "deeplabcut_h5": pose_files.deeplabcut_h5,
+    "deeplabcut_h5": deeplabcut.deeplabcut_h5,
     "sleap_h5": pose_files.sleap_h5,
     "sleap_slp": pose_files.sleap_slp,
     "sleap_csv": wide_text.sleap_csv,
@@ -137,7 +137,7 @@ def _raw(source: Any, names: Sequence[str]) -> RawTracks:
     if hasattr(source, "data_vars"):
         return pose_files.of_dataset(source, "the dataset")
     if getattr(getattr(source, "columns", None), "nlevels", 1) > 1:
-        return pose_files.of_deeplabcut_frame(source, "the table")
+        return deeplabcut.of_deeplabcut_frame(source, "the table")
     table = of_frame(source, "the table", ())
     form = form_of_columns(table.header)
     if form == "nodes":
