@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from pydpend.damping import DampingFit, fit_damping
 from pydpend.damping.omitted import left_out
@@ -40,6 +41,21 @@ def test_standard_errors_hold_what_it_does(fit: DampingFit) -> None:
     # Without it the errors were tens of standard errors.
     assert far > 10
     assert DampingFit.from_json(fit.to_json()).omitted == fit.omitted
+
+
+def test_a_bias_of_the_angles_is_named_and_in_the_errors() -> None:
+    angles = measured(released(14, 12.0, 500.0), 14, 0.05)
+    phi = angles.phi_rad
+    bias = np.radians(0.15) * np.column_stack([np.cos(2 * phi[:, 0]), np.sin(3 * phi[:, 1])])
+    fit = fit_damping(replace(angles, phi_rad=phi + bias), MODEL, laws="mu_v2,mu_q1,mu_q2,rmu1,rmu2,mu_v1")
+    assert fit.within_noise is False
+    assert fit.omitted is not None
+    assert fit.omitted.tried == ("angle_maps",)
+    assert fit.omitted.explains
+    assert "a bias of the angles that repeats with them" in fit.notes[-1]
+    held = [abs(e.value - getattr(TRUTH, n)) < 1.96 * e.sigma for n, e in fit.coefficients.items()]
+    # Without it one in four held.
+    assert sum(held) >= 5
 
 
 def test_nothing_is_tried_where_the_model_is_right() -> None:

@@ -13,7 +13,7 @@ from pydpend.coefficients import FREE, FULL, RATIOS, parameters, ratios_of
 from pydpend.damping import camera, shooting
 from pydpend.damping.compare import compare_terms
 from pydpend.damping.of_motion import pendulum_of_decay, without_load
-from pydpend.damping.omitted import Wider, explained, left_out
+from pydpend.damping.omitted import BIAS, Wider, explained, left_out
 from pydpend.damping.plausible import check_followed, modes_hz
 from pydpend.damping.prediction import held_out
 from pydpend.damping.profile import fit_energy
@@ -151,14 +151,22 @@ def _with_omitted(
     def wider(more: tuple[str, ...]) -> Wider | None:
         laws = [n for n in FULL if n in names or n in more]
         freed = [n for n in FREE if n in options.freed or n in more]
+        maps = options.angle_maps or more == BIAS
+        chosen = replace(bare, free=freed, angle_maps=maps)
         try:
-            found = fit_trajectory(recordings, model, laws, replace(bare, free=freed), checked=False)
+            found = fit_trajectory(recordings, model, laws, chosen, checked=False)
         except FitError:
             return None
         further = {n: found.freed[n] for n in freed if n in found.freed}
         return Wider(found.chi2, bool(found.within_noise), found.coefficients, further)
 
-    groups = left_out(names, options.freed, links=recordings[0].angles.links, scale_known=model.scale_known)
+    groups = left_out(
+        names,
+        options.freed,
+        links=recordings[0].angles.links,
+        scale_known=model.scale_known,
+        maps=options.angle_maps,
+    )
     omitted = explained(names, fit.coefficients, fit.chi2, groups, wider)
     if omitted is None:
         return fit

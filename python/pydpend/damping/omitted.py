@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pydpend.coefficients import FREE, FULL, JOINT_OF, OF_LOAD, WORDS
 from pydpend.damping.result_parts import Estimate
 from pydpend.documents import Table
+from pydpend.errors import Setting
 
 Floats = NDArray[np.float64]
 
@@ -22,6 +23,10 @@ EXPLAINED = 0.5
 """Part of chi-square's excess over 1 that a wider fit may leave of what it explains."""
 
 
+BIAS = ("angle_maps",)
+"""The wider fit with maps of the angles' bias in place of further laws."""
+
+
 @dataclass(frozen=True)
 class Omitted:
     """A wider fit beside one that does not describe the angles to within their noise.
@@ -29,7 +34,7 @@ class Omitted:
     Attributes
     ----------
     tried : tuple of str
-        Laws that were added, all at once.
+        Laws that were added, all at once; ``angle_maps`` for maps of the angles' bias.
     found : dict of str to Estimate
         Those of them that are beyond `CERTAIN` standard errors from zero.
     chi2, before : float
@@ -54,7 +59,8 @@ class Omitted:
     def explains(self) -> bool:
         """Whether the laws that were found are most of what is wrong."""
         excess = max(self.before - 1, 0.0)
-        return bool(self.found) and (self.within_noise or self.chi2 - 1 < EXPLAINED * excess)
+        named = bool(self.found) or self.tried == BIAS
+        return named and (self.within_noise or self.chi2 - 1 < EXPLAINED * excess)
 
     @property
     def sentence(self) -> str:
@@ -62,9 +68,17 @@ class Omitted:
         if not self.explains:
             return (
                 "no law that was left out explains what is beyond the noise "
-                f"({', '.join(self.tried)} tried together: "
+                f"({', '.join(self.tried)} tried last: "
                 f"chi-square {self.chi2:.3g} in place of {self.before:.3g}): it is in the angles, or of a law that is "
                 "not known here, and the standard errors know of it only what differs between blocks of a second"
+            )
+        if self.tried == BIAS:
+            return (
+                "warning: what is beyond the noise is explained by a bias of the angles that repeats with them (of the "
+                f"tracking, or of the camera): with maps of it chi-square is {self.chi2:.3g} in place of "
+                f"{self.before:.3g}. The standard errors hold what it changes; "
+                + str(Setting("angle_maps", True))
+                + " learns it"
             )
         named = ", ".join(
             f"{n} {e.value:.3g} +- {e.sigma:.1g} {e.unit} ({WORDS.get(n, n)})" for n, e in self.found.items()
@@ -104,15 +118,19 @@ class Omitted:
 
 
 def left_out(
-    names: Sequence[str], freed: Sequence[str], *, links: int, scale_known: bool
+    names: Sequence[str], freed: Sequence[str], *, links: int, scale_known: bool, maps: bool = False
 ) -> list[tuple[str, ...]]:
-    """Laws that a fit of ``names`` left out, in groups to add: those that only dissipate, then the others too."""
+    """Laws that a fit of ``names`` left out, in groups to add: those that only dissipate, then the others too.
+
+    Maps of the angles' bias are the last, of two links and where there are none (``maps``).
+    """
     able = [n for n in FULL if n not in names and (scale_known or n not in OF_LOAD)]
     # A tilt turns both angles alike, as their free zeros do.
     further = [n for n in FREE if n not in (*freed, "tilt")]
     if links == 1:
         able, further = ([n for n in some if JOINT_OF[n] == "upper"] for some in (able, further))
-    return [tuple(some) for some in (able, [*able, *further]) if some]
+    groups = [tuple(some) for some in (able, [*able, *further]) if some]
+    return groups if maps or links == 1 else [*groups, BIAS]
 
 
 @dataclass(frozen=True)

@@ -118,7 +118,7 @@ def answer(fit: DampingFit, predictions: Mapping[str, Prediction], scale: Stored
         header.append("95 % interval")
     rows = []
     for name, c in fit.coefficients.items():
-        unit = with_squares(c.unit)
+        unit = "" if c.unit == "1" else with_squares(c.unit)
         row = [meaning(name, links), name, quantity(c.value, c.sigma, unit)]
         if fit.camera_sigma:
             row.append(_of_camera(fit.camera_sigma.get(name), c.sigma))
