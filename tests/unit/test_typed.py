@@ -48,6 +48,7 @@ NEVER = (object(), 1j)
 GIVEN: dict[str, Any] = {
     "nodes": rig.film(np.arange(50) / 50, np.zeros((50, 2)), 1),
     "result": motion(),
+    "places": dp.places(rig.film(np.arange(50) / 50, np.zeros((50, 2)), 1)),
     "angles": motion(),
     "video": motion(),
     "encoder": motion(),

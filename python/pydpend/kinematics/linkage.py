@@ -76,6 +76,7 @@ class Linkage:
         slope = np.outer(row, v / length if length > 0 else v).reshape(-1)
         return length, float(np.sqrt(slope @ self.covariance_px2 @ slope))
 
+    @typed()
     def vector_sigma_px(self, vector: int) -> Floats:
         """Standard uncertainties of one of the shape's vectors.
 

@@ -86,7 +86,7 @@ class Places(TableResult):
         return out
 
 
-@typed("scale", "origin")
+@typed()
 def places(
     nodes: Nodes,
     points: Sequence[str] | None = None,
