@@ -16,7 +16,7 @@ from contextvars import ContextVar
 from dataclasses import dataclass, replace
 from typing import Protocol, TypeAlias
 
-from pydpend.terminal import shown
+from pydpend.terminal import shortened, shown
 
 
 class _Part:
@@ -175,7 +175,7 @@ class PydpendError(Exception):
 
     def __str__(self) -> str:
         """The message on one line; what it quotes of names and files does nothing to a terminal."""
-        return shown(str(self.message))
+        return shortened(shown(str(self.message)))
 
 
 class TrackerError(PydpendError):

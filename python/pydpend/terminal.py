@@ -30,6 +30,15 @@ def shown(text: str) -> str:
     return _OBEYED.sub(written, text)
 
 
+_LONG = re.compile(r"[^\s/]{300,}")
+"""Words longer than the name of any file."""
+
+
+def shortened(text: str) -> str:
+    """Text in which a word that is longer than any file's name, as a key of a damaged file may be, is cut."""
+    return _LONG.sub(lambda match: f"{match[0][:60]}...{match[0][-10:]}", text)
+
+
 def is_plain(text: str) -> bool:
     """Whether a text is shown by a terminal as it is."""
     return _OBEYED.search(text) is None

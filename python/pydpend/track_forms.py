@@ -84,7 +84,8 @@ def form_of(path: str | os.PathLike[str], *, is_sure: bool = True) -> Form | Non
     ``is_sure``: a table of ``t``, ``x`` and ``y``, which may be anything, is OSP Tracker's only if its title is above.
     """
     file = Path(path)
-    if not file.is_file():
+    # Of a name that no file can have pathlib raises what this does not.
+    if not os.path.isfile(file):
         return None
     try:
         with file.open("rb") as opened:

@@ -260,3 +260,34 @@ def test_ctrl_c_is_heard_while_the_rig_is_sought(tmp_path: Path) -> None:
         # A second, and as much again for a machine that does other things too.
         assert time.monotonic() - asked[0] < 2.0
         thread.join()
+
+
+def test_what_is_longer_than_any_name_is_cut_in_messages(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    long = "k" * 5000
+    key, word = tmp_path / "key.toml", tmp_path / "word.toml"
+    key.write_text(f'inputs = ["a.csv"]\n{long} = 1\n')
+    word.write_text(f'inputs = ["a.csv"]\nmethod = "{long}"\n')
+    (tmp_path / "c.json").write_text(f'{{"{long}": 1}}')
+    (tmp_path / "a.csv").write_text(f"time_s,{long}\n0,1\n1,{long}\n")
+    data = str(tmp_path / "a.csv")
+    for words in (
+        ["analyse", "--config", str(key)],
+        ["analyse", "--config", str(word)],
+        ["fit", data, "--laws", long],
+        ["fit", data, f"--{long}"],
+        ["fit", data, "--columns", long],
+        ["fit", data, "--start", long],
+        ["fit", data, "--method", long],
+        ["fit", data],
+        ["compare", data, data, "--column", long, "--calibration", str(tmp_path / "c.json")],
+        [long],
+    ):
+        assert main([*words, "-o", str(tmp_path / "out")]) == 2
+        said = capsys.readouterr().err
+        assert said.count("\n") == 1
+        assert len(said) < 1500, said
+    # A path of many folders, each with the longest name, is as it is.
+    path = "/".join(["n" * 255] * 3)
+    assert path in str(dp.PydpendError(f"{path}: there is none"))

@@ -9,14 +9,15 @@ import subprocess
 from collections.abc import Callable
 from dataclasses import fields
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 import pydpend as dp
 import pytest
-from pydpend import _typing
+from pydpend import _typing, tracking
 from pydpend.analyse import Options, plan
 from pydpend.cli import analyse as command
+from pydpend.cli import main
 from pydpend.errors import ArgumentError, OptionError, TrackerError
 from pydpend.option_fields import flag_of
 from pydpend.reading_options import WORDS, OpenOptions, ReadingOptions
@@ -184,3 +185,52 @@ def test_a_fault_of_a_camera_s_file_says_its_kind(tmp_path: Path) -> None:
         with pytest.raises(TrackerError) as raised:
             call()
         assert raised.value.kind == kind, raised.value
+
+
+def test_the_threads_that_analyse_is_given_are_those_of_tracking(
+    film: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    used: list[int | None] = []
+
+    def track(*args: Any, threads: int | None = None, **kwargs: Any) -> dp.Nodes:
+        used.append(threads)
+        return dp.track(*args, threads=threads, **kwargs)
+
+    monkeypatch.setattr(tracking, "track", track)
+    words = ["analyse", str(film), "--quiet", "--zero", "reference_frame", "--no-overlay", "-o"]
+    tables = []
+    for count in (1, 2):
+        # What comes after tracking needs a longer decay than this film has.
+        main([*words, str(tmp_path / f"run{count}"), "--threads", str(count)])
+        (table,) = (tmp_path / f"run{count}").rglob("nodes.parquet")
+        tables.append(table.read_bytes())
+    assert used == [1, 2]
+    assert tables[0] == tables[1]
+    capsys.readouterr()
+    for wrong in ("0", "-1", "two", "1.5"):
+        assert main([*words, str(tmp_path / "none"), f"--threads={wrong}"]) == 2
+        assert "--threads" in capsys.readouterr().err
+    assert not (tmp_path / "none").exists()
+
+
+def test_a_count_of_a_damaged_film_says_so_by_its_status(tmp_path: Path) -> None:
+    whole = ROOT / "fixtures" / "demo" / "drop.mp4"
+    damaged, cut = tmp_path / "damaged.mp4", tmp_path / "cut.mkv"
+    data = bytearray(whole.read_bytes())
+    data[len(data) // 2 : len(data) // 2 + 400] = bytes(400)
+    damaged.write_bytes(data)
+    program = ROOT / "target" / "release" / "tracker"
+    subprocess.run(["ffmpeg", "-v", "error", "-i", whole, "-c", "copy", "-frames:v", "500", cut], check=True)
+    cut.write_bytes(cut.read_bytes()[:-5000])
+    for film, status, said in (
+        (whole, 0, "5001"),
+        (damaged, 1, "cannot be decoded"),
+        (cut, 1, "the file ends"),
+    ):
+        counted = subprocess.run(
+            [program, "info", "--count", film], capture_output=True, text=True, check=False
+        )
+        assert counted.returncode == status, counted
+        assert said in counted.stdout + counted.stderr
+        # Without a count nothing of it is decoded.
+        assert subprocess.run([program, "info", film], capture_output=True, check=False).returncode == 0

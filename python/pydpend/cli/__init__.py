@@ -23,7 +23,7 @@ from pydpend.cli.words import RENAMED, CommandLine, unknown_command, unknown_opt
 from pydpend.errors import PydpendError, listed, speaking
 from pydpend.number_words import number
 from pydpend.output import keeping
-from pydpend.terminal import Shown
+from pydpend.terminal import Shown, shortened
 
 COMMANDS: tuple[str, ...] = (
     "analyse",
@@ -78,7 +78,7 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> Any:
         """Ends the program with one line."""
-        self.exit(2, f"{self.prog}: {message}. See `{self.prog} --help`\n")
+        self.exit(2, f"{self.prog}: {shortened(message)}. See `{self.prog} --help`\n")
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         choices: Iterable[Any] | None = action.choices
@@ -196,7 +196,7 @@ def main(argv: list[str] | None = None) -> int:
         try:
             args, front = _parse(words)
         except _Refused as problem:
-            print(f"pydpend: {problem}", file=sys.stderr)
+            print(f"pydpend: {shortened(str(problem))}", file=sys.stderr)
             return 2
         with speaking(front):
             return _run(args)
@@ -222,5 +222,5 @@ def _run(args: argparse.Namespace) -> int:
     except OSError as error:
         # A full disk or a folder that may not be written; the reason is the system's.
         named = "" if error.filename is None else f"{os.fsdecode(error.filename)}: "
-        print(f"pydpend: {named}{error.strerror or error}", file=sys.stderr)
+        print(f"pydpend: {shortened(named)}{error.strerror or error}", file=sys.stderr)
         return 2

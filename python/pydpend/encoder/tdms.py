@@ -20,6 +20,9 @@ from pydpend.errors import EncoderError, Setting, fault
 Floats = NDArray[np.float64]
 T = TypeVar("T")
 
+DAMAGED = "the TDMS file is damaged: its segments do not hold what their headers say"
+NOT_WHOLE = "the TDMS file is not whole, or not as the format has it: readings may be missing"
+
 
 def read_tdms(
     path: Path, channel: str | None, time_channel: str | None, rate_hz: float | None
@@ -44,15 +47,13 @@ def _heard(path: Path) -> Iterator[list[str]]:
 
     class Ear(logging.Handler):
         def emit(self, record: logging.LogRecord) -> None:
-            what = " ".join(record.getMessage().split())
             if record.name == "nptdms.scaling":
                 # Its values would be the converter's steps and not volts.
                 raise EncoderError(
-                    fault(str(path), f"the scale of a channel is not known ({what})", "Export it as CSV")
+                    fault(str(path), "a channel has a scale of a kind that is not known", "Export it as CSV")
                 )
-            note = f"the TDMS file is not whole ({what})"
-            if note not in said:
-                said.append(note)
+            if NOT_WHOLE not in said:
+                said.append(NOT_WHOLE)
 
     ear, console = Ear(), log_manager.console_handler
     level = console.level
@@ -72,10 +73,7 @@ def _asked(path: Path, ask: Callable[[], T]) -> T:
     except EncoderError:
         raise
     except Exception as problem:  # npTDMS raises what its parser happens to meet, and Exception itself
-        said = " ".join(str(problem).split())[:200] or type(problem).__name__
-        raise EncoderError(
-            fault(str(path), f"the TDMS file is damaged ({said})", "Copy it again")
-        ) from problem
+        raise EncoderError(fault(str(path), DAMAGED, "Copy it again")) from problem
 
 
 def _read(
