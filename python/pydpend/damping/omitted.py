@@ -67,7 +67,7 @@ class Omitted:
         """The laws in words; a warning where they explain it."""
         if not self.explains:
             return (
-                "no law that was left out explains what is beyond the noise "
+                "no law that was left out and no bias of the angles explains what is beyond the noise "
                 f"({', '.join(self.tried)} tried last: "
                 f"chi-square {self.chi2:.3g} in place of {self.before:.3g}): it is in the angles, or of a law that is "
                 "not known here, and the standard errors know of it only what differs between blocks of a second"
