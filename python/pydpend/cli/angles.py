@@ -5,6 +5,7 @@ or CSV by the ending of OUT.
 
   pydpend angles drop.parquet -o angles.parquet --figure angles.pdf
   pydpend angles drop.parquet --zero hanging.parquet --link-length-m 0.1719 -o angles.csv
+  pydpend angles four-bar.parquet --estimator linkage --zero vertical -o angles.csv
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ def add_arguments(p: argparse.ArgumentParser) -> None:
         "--estimator",
         choices=("rigid", "linkage", "pairwise"),
         default="rigid",
-        help="pose of each body (default), both links through their joints, or the paper's pairs",
+        help="pose of each body (default), all links through their joints, or the paper's pairs",
     )
     p.add_argument(
         "--zero",

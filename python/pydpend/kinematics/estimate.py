@@ -50,8 +50,8 @@ def angles(
         Where each marker is in each of T frames.
     estimator : {"rigid", "linkage", "pairwise"}
         ``"rigid"``: weighted least-squares pose of each body by itself, robust against a bad marker. ``"linkage"``:
-        one or two links and the joints they share fitted together; needs a pivot that stays in place. ``"pairwise"``:
-        the paper's Eqs. 30-32 with a circular mean.
+        all links and the joints they share fitted together, loops too; needs pivots that stay in place. ``"pairwise"``:
+        the paper's Eqs. 30-32 with a circular mean. A link of one marker has its angle from its joint by the first two.
     zero : str, float, sequence of float or Nodes
         ``"rest"`` finds the stretches in which all links hang still, and believes them if nothing in the recording
         contradicts that (docs/explanation/angles.md); ``"vertical"`` is the picture's vertical, with the camera's roll

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pydpend.errors import AnglesError, fault
+from pydpend.errors import AnglesError, Setting, fault
 from pydpend.kinematics.markers import BodyMarkers
 from pydpend.kinematics.table import Floats
 
@@ -46,7 +46,11 @@ def pair_angles(markers: BodyMarkers, reference_px: Floats | None = None) -> Pai
     total, k = w.shape
     if k < 2:
         raise AnglesError(
-            fault("nodes", f"the body {markers.name} has one node, so no pair", "Give it two nodes")
+            fault(
+                "nodes",
+                f"the body {markers.name} has one node, so no pair",
+                "Use " + Setting("estimator", "rigid") + ", which takes its angle from its joint",
+            )
         )
     if reference_px is None:
         complete = np.flatnonzero((w > 0).all(axis=1))

@@ -17,7 +17,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from pydpend.errors import AnglesError, Setting, fault
+from pydpend.errors import AnglesError, fault
 from pydpend.kinematics.markers import BodyMarkers
 from pydpend.kinematics.scale import (
     PRIOR_DOF,
@@ -180,10 +180,7 @@ def fit_pose(markers: BodyMarkers) -> Pose:
             fault(
                 "nodes",
                 f"the body {markers.name} never shows two of its nodes in one frame",
-                "One marker has no angle of its own: use "
-                + Setting("estimator", "linkage")
-                + ", or give the body two "
-                "nodes",
+                "A body of one marker has its angle from its joint: leave the nodes that are never seen out of the rig",
             )
         )
     template, scale2 = _template(markers)
