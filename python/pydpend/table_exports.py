@@ -14,11 +14,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pydpend.columns import read_columns
 from pydpend.datasets import table_dataset
 from pydpend.errors import TableError, fault
 from pydpend.tabular import TableResult
 
 Columns = Mapping[str, NDArray[Any]]
+
+
+class StoredTable(TableResult):
+    """A table of numbers in a file, with all its columns: angles, states, or places of points."""
+
+    def __init__(self, path: Path) -> None:
+        """Reads it. Raises TableError naming line and column of what is no number."""
+        self._columns = read_columns(path, ("time_s",), None, error=TableError).values
+
+    def to_columns(self) -> dict[str, NDArray[Any]]:
+        """The columns of the file, in its order."""
+        return self._columns
+
 
 EXCEL_ROWS = 1_048_576
 """Rows of a sheet of Excel, with the header."""

@@ -161,13 +161,13 @@ def test_uneven_times_are_read_and_told(tmp_path: Path) -> None:
 WRONG: list[tuple[dict[str, Any], str]] = [
     ({"t_s": [0, 1]}, r"t_s and xy_px: the shapes are \(2,\) and \(3, 2, 2\)"),
     ({"t_s": [0, 1, 1]}, r"t_s, frame 2: its time 1.0 s comes after 1.0 s of frame 1"),
-    ({"t_s": "abc"}, "t_s: it is no array of numbers"),
+    ({"t_s": "abc"}, "t_s: an array of numbers is needed, and this is 'abc'"),
     ({"names": ["a"]}, "names: 1 names for 2 nodes"),
     ({"names": ["a", "a"]}, "names: the name 'a' is empty or there twice"),
     ({"bodies": {"rod": ["n0", "n7"]}}, "bodies: the body 'rod' has a node 'n7' that is not there"),
     ({"bodies": {"rod": ["n0"], "bar": ["n0"]}}, "bodies: the node 'n0' is in 'rod' and in 'bar'"),
     ({"bodies": ["rod"]}, "bodies: 1 bodies for 2 nodes"),
-    ({"bodies": "rod"}, "bodies: 'rod' is a text"),
+    ({"bodies": "rod"}, "bodies: a dictionary or a sequence, each text, is needed, and this is 'rod'"),
     ({"bodies": {"n1": ["n0"]}}, "bodies: the node 'n1' is in no body, and a body has its name"),
     ({"sigma_px": [1, 2, 3, 4]}, "sigma_px: its shape does not fit"),
     ({"sigma_px": 0.0}, "sigma_px, frame 0: the uncertainty of n0 is 0 px"),
@@ -178,7 +178,7 @@ WRONG: list[tuple[dict[str, Any], str]] = [
 @pytest.mark.parametrize(("change", "said"), WRONG)
 def test_arrays_that_do_not_fit_are_named(change: dict[str, Any], said: str) -> None:
     given: dict[str, Any] = {"t_s": [0, 1, 2], "xy_px": np.arange(12.0).reshape(3, 2, 2)} | change
-    with pytest.raises(dp.ArgumentError, match=said):
+    with pytest.raises(dp.PydpendError, match=said):
         dp.Nodes.from_arrays(given.pop("t_s"), given.pop("xy_px"), **given)
 
 

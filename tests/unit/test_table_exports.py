@@ -189,8 +189,16 @@ def test_the_command_writes_angles_and_states(tmp_path: Path, capsys: pytest.Cap
     assert main(command) == 0
     assert json.loads(capsys.readouterr().out)["frames"] == 1001
     assert "w1_rad_s" in of_storage(tmp_path / "s.mot")
+    # A table of states or points is written with all its columns.
+    for name, states in (("st.parquet", dp.states(gapped())), ("pt.csv", dp.states(gapped()))):
+        dp.export(states, tmp_path / name)
+        if name == "pt.csv":
+            text = (tmp_path / name).read_text("utf-8")
+            (tmp_path / name).write_text(text.replace("phi", "x_n").replace("_rad", "_m"), "utf-8")
+        assert main(["export", str(tmp_path / name), "-o", str(tmp_path / f"{name}.mot")]) == 0
+        assert len(of_storage(tmp_path / f"{name}.mot")) == len(states.to_columns())
     some_nodes().write(tmp_path / "n.parquet")
     assert main(["export", str(tmp_path / "n.parquet"), "--states", "-o", str(tmp_path / "n.mat")]) == 2
     assert "n.parquet is no angles table" in capsys.readouterr().err
     assert main(["export", str(angles), "--px-per-m", "9", "-o", str(tmp_path / "b.mot")]) == 2
-    assert "--px-per-m: angles have no scale" in capsys.readouterr().err
+    assert "--px-per-m: a table has no scale" in capsys.readouterr().err
