@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from pydpend.errors import ArgumentError, Setting, TableError, fault
 from pydpend.nodes import STATUS_WORDS, Nodes
-from pydpend.output import whole
+from pydpend.output import path_of, whole
 from pydpend.table_exports import TABLE_WRITERS, write_excel, write_netcdf
 from pydpend.tabular import TableResult
 from pydpend.typed import typed
@@ -66,7 +66,7 @@ def export(
         If the form cannot hold the table (C3D and TRC need one rate, C3D ends at frame 65534 counted from 1, a sheet of
         Excel at row 1048576), a library for it is not installed, or the file cannot be written.
     """
-    target = Path(os.fsdecode(path))
+    target = path_of(path)
     known: tuple[str, ...] = tuple(WRITERS if isinstance(result, Nodes) else TABLE_WRITERS)
     ending = target.suffix.lower()
     if ending not in known:

@@ -26,8 +26,15 @@ _READ: ContextVar[frozenset[tuple[int, int]]] = ContextVar("_READ", default=froz
 
 
 def path_of(path: AnyPath) -> Path:
-    """A name as a path; bytes that are not UTF-8 become surrogates, as everywhere in Python."""
-    return Path(os.fsdecode(path))
+    """A name as a path; bytes that are not UTF-8 become surrogates, as everywhere in Python.
+
+    Raises ArgumentError for an empty name, which Python takes for the folder that it is in, and for one with a NUL.
+    """
+    name = os.fsdecode(path)
+    if not name or "\0" in name:
+        problem = "holds a NUL, as no name of a file does" if name else "is empty"
+        raise ArgumentError(fault(repr(name), f"the name {problem}", "Give the name of a file"))
+    return Path(name)
 
 
 def _identity(path: Path) -> tuple[int, int] | None:

@@ -21,11 +21,14 @@ import numpy as np
 import numpy.typing as npt
 
 from pydpend.argument_types import of_type
-from pydpend.errors import Setting, Text, WrongTypeError, fault, listed
+from pydpend.errors import ArgumentError, Setting, Text, WrongTypeError, fault, listed
 
 P = ParamSpec("P")
 R = TypeVar("R")
 C = TypeVar("C", bound=type)
+
+LARGE = 1 << 31
+"""Whole numbers from this on may be too large for what takes them."""
 
 Accepts = Callable[[Any], bool]
 
@@ -58,11 +61,27 @@ def typed(*own: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
                     several = signature.parameters[name].kind is inspect.Parameter.VAR_POSITIONAL
                     for one in value if several else (value,):
                         check(name, one, hints[name])
-            return function(*args, **kwargs)
+            try:
+                return function(*args, **kwargs)
+            except OverflowError as problem:
+                refused = _out_of_range(given)
+                if refused is None:
+                    raise
+                raise refused from problem
 
         return call
 
     return decorate
+
+
+def _out_of_range(given: Mapping[str, Any]) -> ArgumentError | None:
+    """The error for a whole number that is negative or too large for what takes it; None if there is none."""
+    for name, value in given.items():
+        for one in value if isinstance(value, (list, tuple)) else (value,):
+            if _is_whole(one) and not 0 <= one < LARGE:
+                said = str(one) if abs(one) < 10**LONGEST else "a number of many digits"
+                return ArgumentError(fault(Setting(name), f"{said} is out of range", "Give one within it"))
+    return None
 
 
 def typed_class(*own: str) -> Callable[[C], C]:

@@ -233,3 +233,30 @@ def test_what_a_type_means_to_a_caller(hint: Any, right: tuple[Any, ...], wrong:
     for value in wrong:
         with pytest.raises(dp.WrongTypeError, match=r"^x: "):
             check("x", value, hint)
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: dp.read_angles(""), "'': the name is empty"),
+        (lambda: dp.export(some_nodes(), ""), "'': the name is empty"),
+        (lambda: dp.read_angles("a\0b"), "'a\\x00b': the name holds a NUL"),
+        (lambda: dp.write_angles(motion(), "a\0b.csv"), "'a\\x00b.csv': the name holds a NUL"),
+        (
+            lambda: dp.detect(np.zeros((9, 9), np.uint8), depth_bits=10**30),
+            f"depth_bits: {10**30} is out of range",
+        ),
+        (lambda: dp.track("a", frames=(0, 10**30)), f"frames: {10**30} is out of range"),
+        (lambda: dp.track("a", fps=10**400), "fps: a number of many digits is out of range"),
+        (lambda: dp.Film("clean", seed=-1), "seed: -1 is out of range"),
+        (lambda: dp.Film("clean", frames=2).image(-1), "frame: -1 is out of range"),
+        (lambda: dp.states(motion(), seed=-1), "seed: -1 is below 0"),
+        (lambda: dp.states(motion(), stretch_s=float("nan")), "stretch_s: nan is no length"),
+        (lambda: dp.find_rest(motion(), float("nan")), "at_least_s: nan is no length"),
+    ],
+)
+def test_a_value_of_the_right_type_that_cannot_be_is_one_line(call: Callable[[], object], said: str) -> None:
+    with pytest.raises(dp.PydpendError) as refused:
+        call()
+    assert str(refused.value).startswith(said)
+    assert "\n" not in str(refused.value)
