@@ -457,6 +457,7 @@ def info(
     dict
         ``name``, ``container``, ``codec``, ``width``, ``height`` (px), ``pixel_aspect`` (width to height of a pixel,
         "16:15"), ``pixel_aspect_origin`` ("recording", or "user" where it was given), ``depth_bits``,
+        ``pixel_damage`` (whether damage to pixels is "noticed", "partly", "unnoticed" or "unknown"),
         ``declared_frames``, ``rate_hz``, ``rate_origin``, ``time_base`` (numerator and denominator of s per tick),
         ``size_bytes``, ``sha256_first_mib``, ``converted_from``, ``warnings`` and ``details``; ``frames`` that are
         there by their packets, without decoding any, and what its times are (``time``: ``kind``, ``rate_hz``,

@@ -90,7 +90,17 @@ RUST_GROUPS: dict[str, tuple[tuple[str, ...], ...]] = {
     "tracker": (
         ("message", "name", "csv_text", "error", "setting_words", "stop", "output", "packed", "kind"),
         (
-            *("pixel_aspect", "gaps", "frame", "gray", "camera", "observation", "timing", "peak_level"),
+            *(
+                "pixel_aspect",
+                "pixel_damage",
+                "gaps",
+                "frame",
+                "gray",
+                "camera",
+                "observation",
+                "timing",
+                "peak_level",
+            ),
             *("rig", "wanted"),
         ),
         ("source",),

@@ -11,6 +11,7 @@ use crate::error::{Error, Fault, Result};
 use crate::gaps::{Gaps, Reason};
 use crate::message::Message;
 use crate::pixel_aspect::{AspectOrigin, PixelAspect};
+use crate::pixel_damage::PixelDamage;
 
 /// Storage of the samples of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -187,6 +188,8 @@ pub struct SourceInfo {
     pub format: PixelFormat,
     /// Significant bits of a sample.
     pub depth_bits: u32,
+    /// Whether damage to its pixels is noticed.
+    pub pixel_damage: PixelDamage,
     /// Frames that the header declares.
     pub declared_frames: Option<u64>,
     /// Seconds per tick.

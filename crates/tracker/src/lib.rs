@@ -61,6 +61,7 @@ mod packed;
 pub mod peak_level;
 pub mod pipeline;
 pub mod pixel_aspect;
+pub mod pixel_damage;
 pub mod residual;
 pub mod rig;
 pub(crate) mod rigid;

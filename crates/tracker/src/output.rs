@@ -1,12 +1,13 @@
 //! Writes files whole under their names or not at all, and never over what is read.
 //!
-//! Owns: [`NewFile`], [`check`]. Must not: know what is in a file.
+//! Owns: [`NewFile`], [`check`], [`discard`]. Must not: know what is in a file.
 
 use std::fs::{self, File};
 use std::io::{self, Write};
 use std::os::unix::fs::{FileTypeExt, MetadataExt};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use tempfile::TempPath;
 
@@ -56,6 +57,7 @@ impl NewFile {
         if name.len() > LONGEST_NAME {
             return Err(io::Error::from(io::ErrorKind::InvalidFilename));
         }
+        let mut begun = unfinished();
         loop {
             let (process, number) = (std::process::id(), MADE.fetch_add(1, Ordering::Relaxed));
             let aside = target.with_file_name(format!(".pydpend-{process}-{number}.writing"));
@@ -63,6 +65,7 @@ impl NewFile {
                 Err(e) if e.kind() == io::ErrorKind::AlreadyExists => continue,
                 made => {
                     let (target, file) = (target.to_owned(), made?);
+                    begun.push(aside.clone());
                     return Ok(Self { target, file, aside: Some(TempPath::try_from_path(aside)?) });
                 }
             }
@@ -88,7 +91,11 @@ impl NewFile {
         if lasting {
             self.file.sync_all()?;
         }
+        let mut unfinished = unfinished();
+        let begun_as = aside.to_path_buf();
         aside.persist(&self.target).map_err(|e| e.error)?;
+        unfinished.retain(|path| *path != begun_as);
+        drop(unfinished);
         // The new name itself is on disk once the folder is; a file system that cannot do that has no more.
         if lasting && let Ok(folder) = File::open(folder(&self.target)) {
             let _ = folder.sync_all();
@@ -105,6 +112,24 @@ pub fn write(target: &Path, bytes: &[u8]) -> io::Result<()> {
     let new = NewFile::create(target)?;
     new.file().write_all(bytes)?;
     new.publish(false)
+}
+
+/// Files that have not got their names; some of them may be gone.
+static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+fn unfinished() -> MutexGuard<'static, Vec<PathBuf>> {
+    UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Takes away all files that have not got their names, for a process that ends at once: no file is begun or gets its name any more.
+pub fn discard() {
+    let unfinished = unfinished();
+    for path in &*unfinished {
+        // It may be gone.
+        let _ = fs::remove_file(path);
+    }
+    // Whoever begins or ends a file waits for the end of the process.
+    std::mem::forget(unfinished);
 }
 
 /// Files begun by this process, so that each has a name of its own.

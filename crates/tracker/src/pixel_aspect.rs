@@ -108,6 +108,11 @@ impl PixelAspect {
         }
     }
 
+    /// Width and height, in lowest terms.
+    pub fn parts(self) -> [u32; 2] {
+        [self.width, self.height]
+    }
+
     /// Width over height.
     pub fn ratio(self) -> f64 {
         f64::from(self.width) / f64::from(self.height)

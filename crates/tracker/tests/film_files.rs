@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a failure here is a failed test")]
 
 use std::path::Path;
+use std::process::Command;
 
 use tracker::error::FaultKind;
 use tracker::frame::TimeBase;
@@ -13,7 +14,7 @@ use tracker::setup::{Setup, find};
 use tracker::source::{Ending, OpenOptions, open};
 use tracker::synth::encode::Codec;
 use tracker::synth::scene::{LinkMotion, Marker};
-use tracker::synth::{Film, Scene, Truth, WriteOptions, preset, write};
+use tracker::synth::{Film, Scene, Truth, View, WriteOptions, preset, write};
 use tracker::table::NodeTable;
 
 /// The paper's layout in a small image, 12 frames.
@@ -153,6 +154,83 @@ fn rates_that_are_no_whole_number_are_kept() {
     assert_eq!(film.time_base(), TimeBase { numerator: 1001, denominator: 30000 });
     let options = WriteOptions { quality: Some(0), ..WriteOptions::default() };
     assert_eq!(round_trip(&film, &folder.path().join("a.mp4"), &options).0, 0);
+}
+
+/// A scene filmed with pixels of a height in widths.
+fn with_pixels_of(height: f64, mut scene: Scene) -> Film {
+    scene.camera.view = Some(View { pixel_height: height, ..View::default() });
+    Film::new(&scene).unwrap()
+}
+
+#[test]
+fn films_say_the_shape_of_their_pixels_or_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    // 176 px are shown as 160 and as 220, which Matroska can say.
+    for (height, aspect) in [(1.1, "10:11"), (0.8, "5:4"), (1.009, "1:1")] {
+        let film = with_pixels_of(height, scene(8));
+        for (name, codec) in [
+            ("a.mp4", Some(Codec::H264)),
+            ("b.mov", Some(Codec::Mjpeg)),
+            ("c.mkv", Some(Codec::Ffv1)),
+            ("d.avi", Some(Codec::Raw)),
+            ("e.avi", Some(Codec::Mjpeg)),
+            ("f.mkv", Some(Codec::H264)),
+            ("g.y4m", None),
+        ] {
+            let path = folder.path().join(name);
+            let options = WriteOptions { codec, replace: true, ..WriteOptions::default() };
+            write(&film, &path, &options, &mut |_| Ok(())).unwrap();
+            let said = Command::new(env!("CARGO_BIN_EXE_tracker"))
+                .args(["info", "--json"])
+                .arg(&path)
+                .output()
+                .unwrap();
+            let facts: serde_json::Value = serde_json::from_slice(&said.stdout).unwrap();
+            assert_eq!(facts["pixel_aspect"], aspect, "{name} {height}: {facts}");
+            assert_eq!(facts["warnings"], serde_json::json!([]), "{name} {height}");
+        }
+    }
+    let film = with_pixels_of(1.1, scene(8));
+    let message = |film: &Film, name: &str| {
+        write(film, &folder.path().join(name), &WriteOptions::default(), &mut |_| Ok(()))
+            .unwrap_err()
+            .to_string()
+    };
+    for name in ["a.mraw", "a.cih", "a.tif", "%d.tif", "%d.png", "%d.bmp"] {
+        let said = message(&film, name);
+        assert!(said.contains("cannot say that its pixels 0.9091 wide (10:11)"), "{said}");
+    }
+    let said = message(&with_pixels_of(1.25, scene(8)), "h.mkv");
+    assert!(said.contains("whole pixels, and 176 px of pixels 0.8000 wide (4:5) are 140.80"), "{said}");
+}
+
+#[test]
+fn markers_and_angles_of_pixels_that_are_not_square_are_those_of_the_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    for (height, aspect) in [(1.2, "5:6"), (0.75, "4:3")] {
+        let mut scene = preset("clean", 52_400).unwrap();
+        scene.frames = 240;
+        let film = with_pixels_of(height, scene);
+        let path = folder.path().join("film.mkv");
+        let options = WriteOptions { replace: true, ..WriteOptions::default() };
+        write(&film, &path, &options, &mut |_| Ok(())).unwrap();
+        for rig in [None, Some(film.rig(0))] {
+            let settings = RunSettings {
+                input: path.to_str().unwrap().into(),
+                rig,
+                collect: true,
+                ..RunSettings::default()
+            };
+            let table = run(&settings, &mut Silent).unwrap().table.unwrap();
+            let rig = &table.meta.rig;
+            assert_eq!((rig.pixel_aspect.to_string().as_str(), rig.nodes.len()), (aspect, 9));
+            let s = score(&Tracked::from(&table), &Truth::of(&film), LIMIT_PX).unwrap();
+            assert_eq!((s.wrong, s.switches, s.false_positives), (0, 0, 0), "{aspect}");
+            // Sigmas are in square pixels, which are as high as the recorded ones; errors across are of recorded widths.
+            let ratio = s.error_over_sigma.unwrap();
+            assert!((0.7..=1.4).contains(&ratio), "{aspect}: {ratio}");
+        }
+    }
 }
 
 #[test]

@@ -3,6 +3,63 @@
 use super::*;
 
 #[test]
+fn pictures_of_a_longer_film_are_not_taken_for_this_ones() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let film = |frames: &str, output: &str| {
+        ["film", "--preset", "clean", "-q", "--force", "--frame-count", frames, "-o", output]
+            .map(str::to_owned)
+    };
+    // Other names, other endings, folders and links that lead nowhere are read by nobody as frames of this film.
+    fs::create_dir_all(at.join("frm/050.png")).unwrap();
+    for name in ["frm/cover.png", "frm/7.tif", "frm/a007.png", "frm/007b.png"] {
+        fs::write(at.join(name), b"mine").unwrap();
+    }
+    symlink("nowhere", at.join("frm/060.png")).unwrap();
+    fs::write(at.join("precious"), b"precious").unwrap();
+    done(at, &film("6", "frm/%03d.png"));
+    done(at, &film("6", "frm/%03d.png"));
+    let before = names_in(&at.join("frm"));
+    let first = fs::read(at.join("frm/000.png")).unwrap();
+    // Fewer frames; other digits, which read as the same numbers; one number far off; a link to a file.
+    let said = "frames (003.png, 004.png, 005.png). Remove them, or choose a new folder";
+    refused(
+        at,
+        &film("3", "frm/%03d.png"),
+        &format!("3 pictures there are not this film's and would be taken for its {said}"),
+    );
+    refused(at, &film("6", "frm/%d.png"), "6 pictures there are not this film's");
+    refused(at, &film("6", "frm/%04d.png"), "6 pictures there are not this film's");
+    assert_eq!(names_in(&at.join("frm")), before);
+    for (made, name) in [("frm/99999.png", "99999.png"), ("frm/070.png", "070.png")] {
+        match name {
+            "070.png" => symlink("../precious", at.join(made)).unwrap(),
+            _ => fs::write(at.join(made), b"mine").unwrap(),
+        }
+        let rig = ["--rig".to_owned(), "rig.toml".to_owned()];
+        refused(
+            at,
+            &[&film("6", "frm/%03d.png")[..], &rig].concat(),
+            &format!("1 pictures there are not this film's and would be taken for its frames ({name})"),
+        );
+        assert!(fs::symlink_metadata(at.join(made)).is_ok() && !at.join("rig.toml").exists());
+        fs::remove_file(at.join(made)).unwrap();
+    }
+    assert_eq!(fs::read(at.join("precious")).unwrap(), b"precious");
+    assert!(fs::read(at.join("frm/000.png")).unwrap() == first);
+    for n in 3..6 {
+        fs::remove_file(at.join(format!("frm/00{n}.png"))).unwrap();
+    }
+    done(at, &film("3", "frm/%03d.png"));
+    // Where the pattern names the only number in a name, other numbers belong to other films.
+    done(at, &film("3", "frm/one_%d.png"));
+    done(at, &film("2", "frm/two_%d.png"));
+    let info = run(at, &["info", "frm/%03d.png", "--fps", "1000", "--json"]);
+    let facts: serde_json::Value = serde_json::from_str(&info.out).unwrap();
+    assert_eq!(facts["frames"], 3, "{}", info.out);
+}
+
+#[test]
 fn what_is_read_is_never_replaced() {
     let folder = folder_with(&["film.mp4", "film.mraw", "film.cih", "rig.toml"]);
     let at = folder.path();

@@ -81,3 +81,33 @@ fn a_signal_is_heard_while_the_rig_is_sought() {
     // What was detected is kept where it can be gone on with, and nothing else is left.
     assert_eq!(names_in(at), ["clutter.cih", "clutter.mraw", "t.parquet.partial", "u.parquet.partial"]);
 }
+
+#[test]
+fn a_signal_is_heard_while_a_film_is_encoded() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    for name in ["-TERM", "-INT"] {
+        // x264's slowest ways take it a good part of a second for each picture, of which it holds sixty.
+        let mut child = Command::new(env!("CARGO_BIN_EXE_tracker"))
+            .args(["film", "--preset", "noisy", "--frame-count", "3000", "--x264-preset", "veryslow", "-q"])
+            .args(["-o", "film.mp4", "--truth", "truth.csv", "--rig", "rig.toml"])
+            .current_dir(at)
+            .stdin(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        let begun = Instant::now();
+        let is_encoding =
+            || fs::read_dir(at).unwrap().any(|e| e.unwrap().metadata().is_ok_and(|m| m.len() > 10_000));
+        while !is_encoding() {
+            assert!(begun.elapsed() < Duration::from_secs(120) && child.try_wait().unwrap().is_none());
+            std::thread::sleep(Duration::from_millis(50));
+        }
+        let asked = Instant::now();
+        assert!(Command::new("kill").args([name, &child.id().to_string()]).status().unwrap().success());
+        assert_eq!(child.wait().unwrap().code(), Some(130), "{name}");
+        // A second, and as much again for a machine that does other things too.
+        assert!(asked.elapsed() < Duration::from_secs(2), "{name}: {:?}", asked.elapsed());
+        assert!(names_in(at).is_empty(), "{name}: {:?}", names_in(at));
+    }
+}

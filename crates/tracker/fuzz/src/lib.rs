@@ -18,6 +18,8 @@ pub mod name;
 pub mod output;
 #[path = "../../src/pixel_aspect.rs"]
 pub mod pixel_aspect;
+#[path = "../../src/pixel_damage.rs"]
+pub mod pixel_damage;
 #[path = "../../src/rig.rs"]
 pub mod rig;
 #[path = "../../src/setting_words.rs"]

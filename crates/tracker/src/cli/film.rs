@@ -1,6 +1,6 @@
 //! The subcommand `film`: a scene in, a film and its truth out.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::csv_text::Cells;
 use crate::error::Error;
@@ -63,7 +63,7 @@ pub struct Args {
     /// Part by which the lens moves the picture's corners outwards; below 0 is a barrel; replaces the scene's.
     #[arg(long, value_name = "K", allow_negative_numbers = true)]
     k1: Option<f64>,
-    /// Height of a pixel in widths; replaces the scene's.
+    /// Height of a pixel in widths; replaces the scene's. The film says so beyond a hundredth.
     #[arg(long, value_name = "H")]
     pixel_height: Option<f64>,
     /// Codec of a video file: h264 (small, lossy, plays everywhere), ffv1 (without loss, 8 to 16 bit), mjpeg (pictures,
@@ -133,9 +133,18 @@ pub fn run(args: Args) -> anyhow::Result<u8> {
         let mut outputs = vec![path.clone()];
         outputs.extend(args.output.iter().flat_map(|o| film_files(&film, o)).chain(args.truth.clone()));
         output::check(&outputs, &reads, args.force).map_err(Error::Film)?;
+    }
+    if let Some(output) = &args.output {
+        film_to(output, &film, &args, reads)?;
+    }
+    if let Some(path) = &args.rig {
         film.rig(0).write(path)?;
     }
-    let Some(output) = &args.output else { return Ok(0) };
+    Ok(0)
+}
+
+/// Writes the film and its truth.
+fn film_to(output: &Path, film: &Film, args: &Args, reads: Vec<PathBuf>) -> anyhow::Result<()> {
     let options = WriteOptions {
         codec: args.codec,
         quality: args.quality,
@@ -147,12 +156,12 @@ pub fn run(args: Args) -> anyhow::Result<u8> {
         replace: args.force,
         reads,
     };
-    let mut watch = Watch::new(args.quiet);
+    let mut watch = Watch::without_end(args.quiet);
     watch.stage(Stage::Draw, Some(film.frames()));
-    write(&film, output, &options, &mut |done| {
+    write(film, output, &options, &mut |done| {
         watch.progress(done);
-        if watch.interrupted() { Err(Error::Interrupted) } else { Ok(()) }
+        Ok(())
     })?;
     watch.finish();
-    Ok(0)
+    Ok(())
 }

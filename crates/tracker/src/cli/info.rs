@@ -182,6 +182,7 @@ fn as_text(source: &dyn FrameSource, seen: &Seen, times: &Times, front: &Command
     row("size", format!("{} x {} px", info.width, info.height));
     row("pixel aspect", aspect_words(info));
     row("pixels", format!("{}, {} bit", format_name(info.format), info.depth_bits));
+    row("pixel damage", info.pixel_damage.words().to_owned());
     if let Some(from) = &info.converted_from {
         row("converted", format!("from {from}, once for each frame"));
     }
@@ -261,6 +262,7 @@ fn as_json(source: &dyn FrameSource, seen: &Seen, times: &Times, front: &Command
         "pixel_aspect_origin": info.pixel_aspect_origin,
         "pixel_format": format_name(info.format),
         "depth_bits": info.depth_bits,
+        "pixel_damage": info.pixel_damage,
         "converted_from": info.converted_from,
         "declared_frames": info.declared_frames,
         "decoded_frames": seen.counted.map(|frames| frames - seen.damage.undecoded.frames),

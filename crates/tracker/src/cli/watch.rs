@@ -9,6 +9,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use super::print;
+use crate::output;
 use crate::pipeline::{Candidates, Observer, Stage};
 use anyhow::anyhow;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -35,6 +36,11 @@ pub fn listen(program: &'static str) -> anyhow::Result<()> {
             FIRST.get_or_init(Instant::now);
             ASKED.fetch_add(1, Ordering::Relaxed);
             if !WATCHED.load(Ordering::Relaxed) {
+                output::discard();
+                if std::io::stderr().is_terminal() {
+                    // In place of the bar.
+                    eprint!("\r\x1b[K");
+                }
                 print::say(program, "interrupted");
                 std::process::exit(INTERRUPTED.into());
             }
@@ -55,6 +61,11 @@ impl Watch {
     /// Begins to watch; shows nothing if `quiet` or if standard error is no terminal.
     pub fn new(quiet: bool) -> Self {
         WATCHED.store(true, Ordering::Relaxed);
+        Self::without_end(quiet)
+    }
+
+    /// A watch over a command that has nothing to close: ctrl-c ends it at once, whatever it waits for.
+    pub fn without_end(quiet: bool) -> Self {
         let target = if quiet || !std::io::stderr().is_terminal() {
             ProgressDrawTarget::hidden()
         } else {

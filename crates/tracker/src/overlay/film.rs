@@ -16,6 +16,7 @@ use crate::message::Setting;
 use crate::observation::Observation;
 use crate::output;
 use crate::pipeline::{self, Observer, Stage};
+use crate::pixel_aspect::PixelAspect;
 use crate::rig::Rig;
 use crate::source::{self, OpenOptions};
 use crate::synth::encode::{Codec, VideoSettings, VideoWriter};
@@ -103,6 +104,7 @@ pub fn film(
             width: overlay.size[0] as u32 & !1,
             height: overlay.size[1] as u32 & !1,
             depth_bits: 8,
+            pixel_aspect: PixelAspect::SQUARE,
             time_base: TimeBase { numerator: 1, denominator: u64::from(settings.play_fps) },
             codec: Codec::H264,
             quality: Some(settings.quality),
@@ -116,9 +118,7 @@ pub fn film(
     while let Some(frame) = source.next_frame()? {
         if observer.interrupted() {
             // Without a picture there is no film: what was begun goes with the writer.
-            if !filmed.frame.is_empty() {
-                writer.finish()?;
-            }
+            writer.cut()?;
             return Err(Error::Interrupted);
         }
         while t < table.frames() && (table.rows.frame[t] as u64) < frame.index {

@@ -71,7 +71,7 @@ fn in_words_of_today(before: &Value) -> Value {
 
 /// The facts that tell one recording from another. Its rate, known for certain only when it was read through, follows from that.
 fn identity(facts: &SourceFacts) -> SourceFacts {
-    SourceFacts { rate_hz: None, rate_origin: RateOrigin::Unknown, ..facts.clone() }
+    SourceFacts { pixel_damage: None, rate_hz: None, rate_origin: RateOrigin::Unknown, ..facts.clone() }
 }
 
 impl State {

@@ -34,6 +34,8 @@ pub(super) struct Canvas<'a> {
     pub(super) uneven: [f64; 2],
     pub(super) even: bool,
     pub(super) ground: Option<&'a [f32]>,
+    /// Width and height of a pixel, whose area is 1.
+    pub(super) sides: [f64; 2],
 }
 
 impl<'a> Canvas<'a> {
@@ -47,6 +49,7 @@ impl<'a> Canvas<'a> {
             uneven: scene.light.uneven,
             even: scene.light.uneven == [0.0; 2],
             ground: None,
+            sides: scene.pixel_aspect().sides(),
         }
     }
 
@@ -99,32 +102,35 @@ impl<'a> Canvas<'a> {
         };
     }
 
-    /// Calls `paint` with each pixel of a disc and its coverage.
+    /// Calls `paint` with each pixel of a disc and its coverage. It is about a place in the picture; its radius is in units of
+    /// the square of a pixel's area, so that it covers as many pixels whatever their shape.
     pub(super) fn each_of_disc(
         &mut self,
         [cx, cy]: [f64; 2],
         r: f64,
         mut paint: impl FnMut(&mut Self, usize, usize, f64),
     ) {
-        for y in Self::span(cy - r, cy + r, self.height) {
-            let (top, bottom) = (y as f64 - 0.5, y as f64 + 0.5);
+        let [wide, high] = self.sides;
+        for y in Self::span(cy - r / high, cy + r / high, self.height) {
+            let (top, bottom) = ((y as f64 - 0.5) * high, (y as f64 + 0.5) * high);
             // The widest chord of this row.
-            let near = if cy < top {
-                top - cy
-            } else if cy > bottom {
-                cy - bottom
+            let middle = cy * high;
+            let near = if middle < top {
+                top - middle
+            } else if middle > bottom {
+                middle - bottom
             } else {
                 0.0
             };
             if near >= r {
                 continue;
             }
-            let half = (r * r - near * near).sqrt();
+            let half = (r * r - near * near).sqrt() / wide;
             let row = Self::span(cx - half, cx + half, self.width);
             self.touch(y, &row);
             for x in row {
-                let px = x as f64;
-                let c = disc_rectangle_area(cx, cy, r, [px - 0.5, px + 0.5], [top, bottom]);
+                let sides = [(x as f64 - 0.5) * wide, (x as f64 + 0.5) * wide];
+                let c = disc_rectangle_area(cx * wide, middle, r, sides, [top, bottom]);
                 if c > 0.0 {
                     paint(self, x, y, c);
                 }

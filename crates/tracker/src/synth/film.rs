@@ -31,8 +31,10 @@ pub struct Film {
     /// For each marker the index of its link.
     pub(super) marker_links: Vec<usize>,
     pub(super) time_base: TimeBase,
-    /// The camera that sees the links' plane; `None` is one that looks straight at it.
+    /// The camera that sees the links' plane, in square pixels; `None` is one that looks straight at it.
     pub(super) camera: Option<Camera>,
+    /// Width to height of the recorded pixels; they are square where there is no camera.
+    pub(super) pixel_aspect: PixelAspect,
 }
 
 impl Film {
@@ -75,6 +77,7 @@ impl Film {
             marker_links: scene.markers.iter().filter_map(|m| scene.link_index(&m.link)).collect(),
             time_base: scene.time_base()?,
             camera: camera(scene),
+            pixel_aspect: scene.pixel_aspect(),
             scene: scene.clone(),
         })
     }
@@ -102,6 +105,11 @@ impl Film {
     /// Bytes per pixel of a recorded frame: 1 up to 8 bits, else 2.
     pub fn bytes_per_pixel(&self) -> usize {
         if self.scene.camera.depth_bits > 8 { 2 } else { 1 }
+    }
+
+    /// Width to height of a pixel, as the film says it.
+    pub fn pixel_aspect(&self) -> PixelAspect {
+        self.pixel_aspect
     }
 
     /// The form in which recorded frames are stored.
@@ -135,7 +143,7 @@ impl Film {
         Rig {
             schema: RIG_SCHEMA,
             image_px: scene.image_px,
-            pixel_aspect: PixelAspect::SQUARE,
+            pixel_aspect: self.pixel_aspect,
             reference_frame: Some(index),
             region: None,
             lens: None,
@@ -154,13 +162,24 @@ impl Film {
 
     /// The place in the picture of a place of the links' plane.
     pub(super) fn seen(&self, plane: [f64; 2]) -> [f64; 2] {
-        self.camera.map_or(plane, |c| c.to_picture(plane.into()).into())
+        let Some(camera) = self.camera else { return plane };
+        self.pixel_aspect.to_recorded(camera.to_picture(self.spread(&camera, plane))).into()
     }
 
-    /// The magnification of small things from the plane to the picture: the root of what their area gains.
+    /// A place of the plane in lengths of square pixels, so that things keep the number of recorded pixels that they cover.
+    fn spread(&self, camera: &Camera, plane: [f64; 2]) -> Vector2<f64> {
+        if self.pixel_aspect.is_square() {
+            return plane.into();
+        }
+        let middle = Vector2::from(self.scene.image_px.map(|n| (f64::from(n) - 1.0) / 2.0));
+        camera.middle() + (Vector2::from(plane) - middle) * self.pixel_aspect.ratio().sqrt()
+    }
+
+    /// The magnification of small things from the plane to the picture: the root of what their area in recorded pixels gains.
     pub(super) fn scale(&self, plane: [f64; 2]) -> f64 {
         self.camera.map_or(1.0, |c| {
-            c.slopes(c.to_picture(Vector2::from(plane))).by_picture.determinant().abs().powf(-0.5)
+            let there = c.to_picture(self.spread(&c, plane));
+            c.slopes(there).by_picture.determinant().abs().powf(-0.5)
         })
     }
 
@@ -173,8 +192,10 @@ impl Film {
         }
         let [from, to] = quad.u.map(|u| Vector2::from(self.seen(pose.point([u, 0.0]))));
         let along = (to - from).normalize();
-        let half =
-            0.5 * (quad.v[1] - quad.v[0]) * self.scale(pose.point([0.5 * (quad.u[0] + quad.u[1]), 0.0]));
+        // Recorded pixels that are wide make a bar across them narrow.
+        let narrow = along.component_mul(&Vector2::from(self.pixel_aspect.sides())).norm();
+        let middle = pose.point([0.5 * (quad.u[0] + quad.u[1]), 0.0]);
+        let half = 0.5 * (quad.v[1] - quad.v[0]) * self.scale(middle) * narrow;
         Some(Quad {
             origin: from.into(),
             along: along.into(),
@@ -235,8 +256,12 @@ fn glints(scene: &Scene) -> Vec<Glint> {
 /// The camera of a scene.
 fn camera(scene: &Scene) -> Option<Camera> {
     let v = scene.camera.view?;
-    let size_px = scene.image_px.map(f64::from);
+    let aspect = scene.pixel_aspect();
+    let [w, h] = scene.image_px.map(f64::from);
+    let size_px = [w * aspect.ratio(), h];
+    // What the film says of its pixels is no error of the camera.
+    let height = if aspect.is_square() { v.pixel_height } else { 1.0 };
     let focal_px = v.focal_widths * size_px[0];
     let (tilt, towards) = (v.tilt_deg.to_radians(), v.towards_deg.to_radians());
-    Some(Camera::tilted(tilt, towards, focal_px, v.k1, v.pixel_height, size_px))
+    Some(Camera::tilted(tilt, towards, focal_px, v.k1, height, size_px))
 }

@@ -14,9 +14,16 @@ use crate::error::{Error, Fault, Place, Result};
 use crate::frame::TimeBase;
 use crate::kind::{self, Kind};
 use crate::message::PRINT_SCENE;
+use crate::pixel_aspect::PixelAspect;
 
 /// Version of the scene's form; a file with a higher one is refused.
 pub const SCENE_SCHEMA: u32 = 1;
+
+/// Part by which pixels may be higher or lower than wide before films say so: some five times what makers of sensors and lenses keep
+/// to, and more than what containers lose by rounding.
+const UNSAID_PART: f64 = 0.01;
+/// A pixel's width in units of the finest step of its height.
+const HEIGHT_STEPS: u64 = 10_000;
 
 /// Everything that makes a film.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -108,7 +115,8 @@ pub struct View {
     pub focal_widths: f64,
     /// Part by which the lens moves the picture's corners outwards; below 0 is a barrel.
     pub k1: f64,
-    /// Height of a pixel, in widths.
+    /// Height of a pixel, in widths. Where it is off 1 by more than a hundredth the film says so; less is an error of the camera of
+    /// which its films say nothing.
     pub pixel_height: f64,
 }
 
@@ -394,6 +402,15 @@ impl Scene {
     /// [`Error::Film`] if a value has no TOML form (a seed above 2^63 has none).
     pub fn to_toml(&self) -> Result<String> {
         toml::to_string_pretty(self).map_err(|e| Error::Film(Fault::new("scene", e.to_string())))
+    }
+
+    /// Width to height of a pixel, as films of the scene say it.
+    pub fn pixel_aspect(&self) -> PixelAspect {
+        let height = self.camera.view.map_or(1.0, |v| v.pixel_height);
+        if (height - 1.0).abs() <= UNSAID_PART {
+            return PixelAspect::SQUARE;
+        }
+        PixelAspect::new(HEIGHT_STEPS, (height * HEIGHT_STEPS as f64).round() as u64).unwrap_or_default()
     }
 
     /// Index of a link by its name.

@@ -2,6 +2,8 @@
 //!
 //! Owns: [`Sink`], [`files`]. Must not: make frames.
 
+use std::collections::HashSet;
+use std::ffi::OsStr;
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -13,6 +15,9 @@ use super::write_options::{WriteOptions, codec_of, ending};
 use crate::error::{Error, Fault, FaultKind, Place, Result};
 use crate::name::{self, text};
 use crate::output::{self, NewFile};
+
+/// Pictures that are named where there are too many.
+const SHOWN: usize = 3;
 
 type Pages = tiff::encoder::TiffEncoder<BufWriter<File>>;
 
@@ -47,6 +52,44 @@ pub fn files(film: &Film, path: &Path) -> Vec<PathBuf> {
     }
 }
 
+/// Refuses pictures beside those of a film at `path` that whoever reads the folder or the pattern would take for more of its
+/// frames: those of a longer film that was there before. Nothing is taken away, as nothing tells whose they are.
+pub(super) fn check_folder(film: &Film, path: &Path) -> Result<()> {
+    let own: Vec<PathBuf> = files(film, path);
+    let file_name = path.file_name().map(text).unwrap_or_default();
+    let Some((head, _, tail)) = split(&file_name).filter(|_| image_kind(&ending(path)).is_some()) else {
+        return Ok(());
+    };
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    // A folder that is not there is made.
+    let Ok(entries) = std::fs::read_dir(folder) else { return Ok(()) };
+    let own: HashSet<&OsStr> = own.iter().filter_map(|p| p.file_name()).collect();
+    let is_number = |n: &str| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit());
+    let mut others: Vec<String> = entries
+        .flatten()
+        .filter(|e| !own.contains(e.file_name().as_os_str()) && e.path().is_file())
+        .map(|e| text(e.file_name()))
+        .filter(|n| n.strip_prefix(head).and_then(|n| n.strip_suffix(tail)).is_some_and(is_number))
+        .collect();
+    if others.is_empty() {
+        return Ok(());
+    }
+    others.sort();
+    let some = others.iter().take(SHOWN).cloned().collect::<Vec<_>>().join(", ");
+    let more = if others.len() > SHOWN { ", ..." } else { "" };
+    Err(Error::Film(
+        Fault::new(
+            text(path),
+            format!(
+                "{} pictures there are not this film's and would be taken for its frames ({some}{more})",
+                others.len()
+            ),
+        )
+        .of_kind(FaultKind::Exists)
+        .advice("Remove them, or choose a new folder"),
+    ))
+}
+
 impl Sink {
     pub(super) fn create(film: &Film, path: &Path, options: &WriteOptions) -> Result<Self> {
         let name = text(path);
@@ -56,6 +99,7 @@ impl Sink {
             return y4m_head(film, out, "standard output").map(|out| Self::Y4m(out, None, name));
         }
         let ending = ending(path);
+        check_aspect(film, &name, &ending)?;
         match ending.as_str() {
             "mp4" | "mov" | "mkv" | "avi" => return video(film, path, options).map(Self::Video),
             "mraw" | "cih" => return Ok(Self::Mraw(MrawWriter::create(path, film, options.bits)?)),
@@ -123,6 +167,13 @@ impl Sink {
         }
     }
 
+    /// Leaves no file, and does not wait for what is being encoded.
+    pub(super) fn abandon(self) {
+        if let Self::Video(v) = self {
+            v.abandon();
+        }
+    }
+
     pub(super) fn finish(self) -> Result<()> {
         let publish = |new: NewFile, name: &str| new.publish(true).map_err(|e| cannot_write(name, &e));
         match self {
@@ -155,6 +206,7 @@ fn video(film: &Film, path: &Path, options: &WriteOptions) -> Result<VideoWriter
             width,
             height,
             depth_bits: scene.camera.depth_bits,
+            pixel_aspect: film.pixel_aspect(),
             time_base: film.time_base(),
             codec,
             quality: options.quality,
@@ -177,15 +229,30 @@ fn y4m_head(film: &Film, mut out: Box<dyn Write + Send>, name: &str) -> Result<B
     };
     writeln!(
         out,
-        "YUV4MPEG2 W{w} H{h} F{}:{} Ip A1:1 C{colour} XCOLORRANGE=FULL",
-        base.denominator, base.numerator
+        "YUV4MPEG2 W{w} H{h} F{}:{} Ip A{} C{colour} XCOLORRANGE=FULL",
+        base.denominator,
+        base.numerator,
+        film.pixel_aspect()
     )
     .map_err(|e| failed(name, e))?;
     Ok(out)
 }
 
-/// The name of image `index` if `pattern` has one `%d`, `%5d` or `%05d` in it.
-fn numbered(pattern: &str, index: u64) -> Option<String> {
+/// Refuses pixels that are not square in a form that cannot say so: its reader would take them for square ones.
+fn check_aspect(film: &Film, name: &str, ending: &str) -> Result<()> {
+    let aspect = film.pixel_aspect();
+    if aspect.is_square() || ["mp4", "mov", "mkv", "avi", "y4m"].contains(&ending) {
+        return Ok(());
+    }
+    Err(Error::Film(
+        Fault::new(name, format!("a .{ending} written here cannot say that its {}", aspect.words()))
+            .of_kind(FaultKind::Unsupported)
+            .advice("Name it .mp4, .mov, .mkv, .avi or .y4m"),
+    ))
+}
+
+/// A pattern with one `%d`, `%5d` or `%05d` in it: what is before and behind, and the number of digits.
+fn split(pattern: &str) -> Option<(&str, usize, &str)> {
     let (before, rest) = pattern.split_once('%')?;
     let end = rest.find('d')?;
     let digits = &rest[..end];
@@ -193,7 +260,12 @@ fn numbered(pattern: &str, index: u64) -> Option<String> {
         return None;
     }
     let width: usize = if digits.is_empty() { 0 } else { digits.parse().ok().filter(|&w| w < 20)? };
-    Some(format!("{before}{index:0width$}{}", &rest[end + 1..]))
+    Some((before, width, &rest[end + 1..]))
+}
+
+/// The name of image `index` of a pattern.
+fn numbered(pattern: &str, index: u64) -> Option<String> {
+    split(pattern).map(|(before, width, behind)| format!("{before}{index:0width$}{behind}"))
 }
 
 #[cfg(test)]

@@ -5,7 +5,8 @@ use std::sync::Arc;
 use super::{Film, Scene};
 use crate::error::Result;
 use crate::frame::{Ending, Frame, FrameSource, PixelFormat, RateClaims, RateOrigin, SourceInfo};
-use crate::pixel_aspect::{AspectOrigin, PixelAspect};
+use crate::pixel_aspect::AspectOrigin;
+use crate::pixel_damage::{self, PixelDamage};
 
 /// Frames of a [`Film`], made when they are asked for.
 #[derive(Debug)]
@@ -37,10 +38,11 @@ impl SyntheticSource {
             },
             width: scene.image_px[0],
             height: scene.image_px[1],
-            pixel_aspect: PixelAspect::SQUARE,
+            pixel_aspect: film.pixel_aspect(),
             pixel_aspect_origin: AspectOrigin::Recording,
             format: film.format(),
             depth_bits: scene.camera.depth_bits,
+            pixel_damage: PixelDamage::of(pixel_damage::SAMPLES),
             declared_frames: Some(scene.frames),
             time_base,
             rate_hz: Some(time_base.denominator as f64 / time_base.numerator as f64),

@@ -41,7 +41,7 @@ impl Film {
     /// Truth of a frame.
     pub fn truth(&self, index: u64) -> FrameTruth {
         let scene = &self.scene;
-        let size = scene.image_px.map(f64::from);
+        let border = Border { size_px: scene.image_px.map(f64::from), sides: self.pixel_aspect.sides() };
         let time_s = self.time_s(index);
         let mut poses = Vec::new();
         let n = instants(self, index, &mut poses);
@@ -88,7 +88,7 @@ impl Film {
                     }
                 }
                 nodes[j].visible +=
-                    visible_part(at, m.radius_px * self.scale(plane), &quads, &discs, size) / n as f64;
+                    visible_part(at, m.radius_px * self.scale(plane), &quads, &discs, &border) / n as f64;
             }
         }
         self.mechanism.poses(time_s, &mut poses);
@@ -99,13 +99,23 @@ impl Film {
     }
 }
 
-/// Part of the disc about `(x, y)` that `quads` and `discs` (x, y, radius) leave free, inside an image of `size`.
+/// The picture: its size, and the width and height of its pixels, whose area is 1.
+struct Border {
+    size_px: [f64; 2],
+    sides: [f64; 2],
+}
+
+/// Part of the disc about `(x, y)` that `quads` and `discs` (x, y, radius) leave free, inside the picture. Radii are in units of the
+/// square of a pixel's area.
 ///
 /// Exact where one rectangle or the border hides some of it; where several things do, by 4096 points of equal area
-/// on the disc (miscounted on the edges only, under 0.01).
-fn visible_part([x, y]: [f64; 2], r: f64, quads: &[Quad], discs: &[[f64; 3]], size: [f64; 2]) -> f64 {
+/// on the disc (miscounted on the edges only, under 0.01), as for rectangles in pixels that are not square.
+fn visible_part([x, y]: [f64; 2], r: f64, quads: &[Quad], discs: &[[f64; 3]], border: &Border) -> f64 {
+    let Border { size_px: size, sides: [wide, high] } = *border;
     let area = std::f64::consts::PI * r * r;
-    let inside = disc_rectangle_area(x, y, r, [-0.5, size[0] - 0.5], [-0.5, size[1] - 0.5]) / area;
+    let edges = |end: f64, side: f64| [-0.5 * side, (end - 0.5) * side];
+    let inside =
+        disc_rectangle_area(x * wide, y * high, r, edges(size[0], wide), edges(size[1], high)) / area;
     if inside <= 0.0 {
         return 0.0;
     }
@@ -113,16 +123,18 @@ fn visible_part([x, y]: [f64; 2], r: f64, quads: &[Quad], discs: &[[f64; 3]], si
     let mut single = 0.0;
     let mut near = 0;
     for q in quads {
-        let hidden = q.disc_area(x, y, r) / area;
+        // A circle about the disc, where that is none in the picture.
+        let reach = r * wide.max(high);
+        let hidden = q.disc_area(x, y, reach) / (area * (reach / r).powi(2));
         if hidden >= 1.0 - 1e-12 {
             return 0.0;
         }
         if hidden > 1e-12 {
-            near += 1;
+            near += if wide == high { 1 } else { 2 };
             single = hidden;
         }
     }
-    let covers = |d: &&[f64; 3]| (d[0] - x).hypot(d[1] - y) < d[2] + r;
+    let covers = |d: &&[f64; 3]| ((d[0] - x) * wide).hypot((d[1] - y) * high) < d[2] + r;
     let discs_near = discs.iter().filter(covers).count();
     match (near, discs_near, cut) {
         (0, 0, _) => inside.min(1.0),
@@ -135,13 +147,15 @@ fn visible_part([x, y]: [f64; 2], r: f64, quads: &[Quad], discs: &[[f64; 3]], si
                 for k in 0..N {
                     // Turned from ring to ring so that no ray runs along an edge.
                     let angle = (f64::from(k) + 0.618 * f64::from(i)) * std::f64::consts::TAU / f64::from(N);
-                    let (px, py) = (x + radius * angle.cos(), y + radius * angle.sin());
+                    let (px, py) = (x + radius * angle.cos() / wide, y + radius * angle.sin() / high);
                     let hidden = px < -0.5
                         || py < -0.5
                         || px > size[0] - 0.5
                         || py > size[1] - 0.5
                         || quads.iter().any(|q| q.contains(px, py))
-                        || discs.iter().any(|d| (d[0] - px).powi(2) + (d[1] - py).powi(2) < d[2] * d[2]);
+                        || discs.iter().any(|d| {
+                            ((d[0] - px) * wide).powi(2) + ((d[1] - py) * high).powi(2) < d[2] * d[2]
+                        });
                     free += u32::from(!hidden);
                 }
             }
@@ -158,32 +172,53 @@ mod tests {
         Quad { origin: [0.0, 0.0], along: [1.0, 0.0], across: [0.0, 1.0], u, v }
     }
 
+    /// A picture of square pixels.
+    fn square(side: f64) -> Border {
+        Border { size_px: [side; 2], sides: [1.0; 2] }
+    }
+
     #[test]
     fn half_behind_a_bar_is_one_half() {
         let q = plain([20.0, 50.0], [0.0, 50.0]);
-        assert!((visible_part([20.0, 25.0], 4.0, &[q], &[], [99.0, 99.0]) - 0.5).abs() < 1e-12);
-        assert_eq!(visible_part([30.0, 25.0], 4.0, &[q], &[], [99.0, 99.0]), 0.0);
-        assert!((visible_part([60.0, 25.0], 4.0, &[q], &[], [99.0, 99.0]) - 1.0).abs() < 1e-12);
+        assert!((visible_part([20.0, 25.0], 4.0, &[q], &[], &square(99.0)) - 0.5).abs() < 1e-12);
+        assert_eq!(visible_part([30.0, 25.0], 4.0, &[q], &[], &square(99.0)), 0.0);
+        assert!((visible_part([60.0, 25.0], 4.0, &[q], &[], &square(99.0)) - 1.0).abs() < 1e-12);
     }
 
     #[test]
     fn two_bars_over_the_same_half_hide_it_once() {
         let q = plain([20.0, 50.0], [0.0, 50.0]);
-        let v = visible_part([20.0, 25.0], 4.0, &[q, q], &[], [99.0, 99.0]);
+        let v = visible_part([20.0, 25.0], 4.0, &[q, q], &[], &square(99.0));
         assert!((v - 0.5).abs() < 0.01, "{v}");
     }
 
     #[test]
     fn the_border_cuts() {
-        let v = visible_part([-0.5, 20.0], 5.0, &[], &[], [40.0, 40.0]);
+        let v = visible_part([-0.5, 20.0], 5.0, &[], &[], &square(40.0));
         assert!((v - 0.5).abs() < 1e-12, "{v}");
-        let corner = visible_part([-0.5, -0.5], 5.0, &[], &[], [40.0, 40.0]);
+        let corner = visible_part([-0.5, -0.5], 5.0, &[], &[], &square(40.0));
         assert!((corner - 0.25).abs() < 1e-12, "{corner}");
     }
 
     #[test]
+    fn what_hides_is_counted_in_pixels_that_are_not_square_too() {
+        // Twice as wide as high: the disc is half as wide in them as it is high.
+        let [wide, high] = [2f64.sqrt(), 0.5f64.sqrt()];
+        let border = Border { size_px: [40.0; 2], sides: [wide, high] };
+        assert!((visible_part([-0.5, 20.0], 5.0, &[], &[], &border) - 0.5).abs() < 1e-12);
+        let half = 5.0 / wide;
+        for (from, free) in [(20.0, 0.5), (20.0 + half, 1.0), (20.0 - half, 0.0)] {
+            let v = visible_part([20.0, 20.0], 5.0, &[plain([from, 60.0], [0.0, 60.0])], &[], &border);
+            assert!((v - free).abs() < 0.01, "{from}: {v}");
+        }
+        let beside = [20.0, 20.0 + 8.0 / high, 5.0];
+        assert!(visible_part([20.0, 20.0], 5.0, &[], &[beside], &border) < 1.0);
+        assert_eq!(visible_part([20.0, 20.0], 5.0, &[], &[[20.0 + 11.0 / wide, 20.0, 5.0]], &border), 1.0);
+    }
+
+    #[test]
     fn a_marker_in_front_hides() {
-        let v = visible_part([20.0, 20.0], 4.0, &[], &[[20.0, 20.0, 2.0]], [40.0, 40.0]);
+        let v = visible_part([20.0, 20.0], 4.0, &[], &[[20.0, 20.0, 2.0]], &square(40.0));
         assert!((v - 0.75).abs() < 0.01, "{v}");
     }
 }

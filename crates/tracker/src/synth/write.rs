@@ -13,7 +13,7 @@ use std::path::Path;
 use rayon::prelude::*;
 
 use super::film::Film;
-use super::sink::{Sink, files};
+use super::sink::{Sink, check_folder, files};
 use super::truth_table::TruthWriter;
 use super::write_options::WriteOptions;
 use crate::error::{Error, Result};
@@ -35,6 +35,7 @@ pub fn write(
     progress: &mut dyn FnMut(u64) -> Result<()>,
 ) -> Result<()> {
     options.check(path)?;
+    check_folder(film, path)?;
     let mut outputs = files(film, path);
     outputs.extend(options.truth.clone());
     output::check(&outputs, &options.reads, options.replace).map_err(Error::Film)?;
@@ -54,14 +55,17 @@ pub fn write(
             (samples, with_truth.then(|| film.truth(i)))
         };
         let made: Vec<_> = threads::install(|| (first..end).into_par_iter().map(one).collect());
-        for (samples, true_frame) in &made {
+        for ((samples, true_frame), done) in made.iter().zip(first + 1..) {
             sink.write(film, samples)?;
             if let (Some(table), Some(t)) = (&mut truth, true_frame) {
                 table.write(t)?;
             }
+            if let Err(stopped) = progress(done) {
+                sink.abandon();
+                return Err(stopped);
+            }
         }
         first = end;
-        progress(end)?;
     }
     sink.finish()?;
     truth.map_or(Ok(()), TruthWriter::finish)

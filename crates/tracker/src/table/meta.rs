@@ -17,6 +17,7 @@ use crate::gaps::Damage;
 use crate::message::TRACK;
 use crate::name::{self, shown, text};
 use crate::pixel_aspect::{AspectOrigin, PixelAspect};
+use crate::pixel_damage::PixelDamage;
 use crate::rig::Rig;
 use crate::timing::Timing;
 
@@ -44,6 +45,9 @@ pub struct SourceFacts {
     pub pixel_aspect_origin: AspectOrigin,
     /// Significant bits of a sample.
     pub depth_bits: u32,
+    /// Whether damage to its pixels is noticed; tables of earlier versions do not say it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pixel_damage: Option<PixelDamage>,
     /// Frames that the header declares.
     pub declared_frames: Option<u64>,
     /// Frames per second of recorded time; of a finished run what [`TableMeta::time`] says.
@@ -81,6 +85,7 @@ impl SourceFacts {
             pixel_aspect: info.pixel_aspect,
             pixel_aspect_origin: info.pixel_aspect_origin,
             depth_bits: info.depth_bits,
+            pixel_damage: Some(info.pixel_damage),
             declared_frames: info.declared_frames,
             rate_hz: info.rate_hz,
             rate_origin: info.rate_origin,

@@ -53,6 +53,7 @@ pub(crate) fn meta(names: &[(String, usize)], bodies: &[String]) -> TableMeta {
             pixel_aspect: PixelAspect::SQUARE,
             pixel_aspect_origin: crate::pixel_aspect::AspectOrigin::Recording,
             depth_bits: 12,
+            pixel_damage: None,
             declared_frames: Some(9),
             rate_hz: Some(1000.0),
             rate_origin: RateOrigin::CameraHeader,

@@ -16,7 +16,7 @@ const COUNT: usize = 40;
 const LARGER: &str = "scale=392:232:flags=neighbor,noise=alls=12:all_seed=1";
 
 /// How a packet is damaged: its last two thirds become noise, or zeros, or one bit in its middle is turned over.
-const WAYS: [&str; 3] = ["noise", "zeros", "one bit"];
+pub const WAYS: [&str; 3] = ["noise", "zeros", "one bit"];
 
 /// A film's name in the table, its file, its codec's options, and in which ways each damage to it must be told.
 type Film = (&'static str, &'static str, &'static [&'static str], [bool; 3]);
@@ -36,7 +36,7 @@ const FILMS: [Film; 8] = [
 ];
 
 /// A part of a film or folder that can be damaged: the file, and place and length of a picture's data in it.
-fn places(path: &Path) -> Vec<(PathBuf, usize, usize)> {
+pub fn places(path: &Path) -> Vec<(PathBuf, usize, usize)> {
     if !path.to_str().unwrap().contains('%') {
         return packets(path).into_iter().map(|(at, size)| (path.to_owned(), at, size)).collect();
     }
@@ -47,7 +47,7 @@ fn places(path: &Path) -> Vec<(PathBuf, usize, usize)> {
     files.iter().map(|f| (f.clone(), 0, length(f))).collect()
 }
 
-fn damage(bytes: &mut [u8], at: usize, size: usize, way: &str, seed: u32) {
+pub fn damage(bytes: &mut [u8], at: usize, size: usize, way: &str, seed: u32) {
     match way {
         "noise" => noise(&mut bytes[at + size / 3..at + size], seed),
         "zeros" => bytes[at + size / 3..at + size].fill(0),

@@ -21,6 +21,8 @@ pub(super) struct Boxes {
     /// The edit list of the first video track plays a piece slower or faster, or joins several: the stamps that it
     /// makes are not the camera's.
     pub edits_change_time: bool,
+    /// Seconds at which the edit list of that track ends, where it begins with a pause.
+    pub ends_after_pause_s: Option<f64>,
     /// XML of a camera, as Sony's `NonRealTimeMeta`.
     pub xml: Option<String>,
 }
@@ -54,7 +56,7 @@ impl Boxes {
                 let mut bytes = Vec::new();
                 Read::by_ref(&mut file).take(body).read_to_end(&mut bytes)?;
                 if &name == b"moov" {
-                    found.edits_change_time = edits_change_time(&bytes);
+                    (found.edits_change_time, found.ends_after_pause_s) = edit_list(&bytes);
                     for meta in children(&bytes).filter(|c| &c.0 == b"meta") {
                         found.xml = found.xml.take().or_else(|| xml(&bytes[meta.1]));
                     }
@@ -122,24 +124,30 @@ fn inside<'a>(bytes: &'a [u8], path: &[&[u8; 4]]) -> Option<&'a [u8]> {
     })
 }
 
-/// Whether the first video track of a `moov` has an edit list of several pieces, or with one of another speed.
-fn edits_change_time(moov: &[u8]) -> bool {
+/// Whether the first video track of a `moov` has an edit list of several pieces, or with one of another speed; and where the list
+/// ends, s, if it begins with a pause.
+fn edit_list(moov: &[u8]) -> (bool, Option<f64>) {
     let video = children(moov).filter(|c| &c.0 == b"trak").map(|c| &moov[c.1]).find(|trak| {
         let handler = inside(trak, &[b"mdia", b"hdlr"]);
         handler.and_then(|h| h.get(8..12)) == Some(b"vide")
     });
-    let Some(list) = video.and_then(|trak| inside(trak, &[b"edts", b"elst"])) else { return false };
+    let Some(list) = video.and_then(|trak| inside(trak, &[b"edts", b"elst"])) else { return (false, None) };
     let is_long = list.first() == Some(&1);
     let entry = if is_long { 20 } else { 12 };
     let entries = list.get(8..).unwrap_or_default().chunks_exact(entry);
     let count = word(list, 4).unwrap_or(0) as usize;
+    let entries: Vec<&[u8]> = entries.take(count).collect();
     // A piece that begins nowhere is a pause.
-    let speeds: Vec<u32> = entries
-        .take(count)
-        .filter(|e| !begins_nowhere(e, is_long))
-        .filter_map(|e| word(e, entry - 4))
-        .collect();
-    speeds.len() > 1 || speeds.iter().any(|&s| s != 0x1_0000)
+    let speeds: Vec<u32> =
+        entries.iter().filter(|e| !begins_nowhere(e, is_long)).filter_map(|e| word(e, entry - 4)).collect();
+    let shown = |e: &&[u8]| if is_long { long(e, 0) } else { word(e, 0).map(u64::from) };
+    // Nothing is the rest of a film that is not ended yet.
+    let whole = entries.iter().map(shown).try_fold(0u64, |sum, n| sum.checked_add(n.filter(|n| *n > 0)?));
+    let movie = inside(moov, &[b"mvhd"]).unwrap_or_default();
+    let scale = word(movie, if movie.first() == Some(&1) { 20 } else { 12 }).filter(|n| *n > 0);
+    let pauses = entries.first().is_some_and(|e| begins_nowhere(e, is_long));
+    let ends = scale.zip(whole).filter(|_| pauses).map(|(scale, whole)| whole as f64 / f64::from(scale));
+    (speeds.len() > 1 || speeds.iter().any(|&s| s != 0x1_0000), ends)
 }
 
 fn begins_nowhere(entry: &[u8], is_long: bool) -> bool {
@@ -183,7 +191,7 @@ mod tests {
             (&[(1000, 0, ONE), (1000, 5000, ONE)], true),
             (&[], false),
         ] {
-            assert_eq!(edits_change_time(&moov(edits)), changes, "{edits:?}");
+            assert_eq!(edit_list(&moov(edits)).0, changes, "{edits:?}");
         }
     }
 
@@ -191,12 +199,12 @@ mod tests {
     fn boxes_that_lie_say_nothing() {
         let whole = moov(&[(8000, 0, 0x8000)]);
         for cut in 0..whole.len() {
-            edits_change_time(&whole[..cut]);
+            edit_list(&whole[..cut]);
             let mut bytes = whole.clone();
             bytes[cut] ^= 0xff;
-            edits_change_time(&bytes);
+            edit_list(&bytes);
         }
-        assert!(!edits_change_time(b"\0\0\0\x04trak"));
+        assert!(!edit_list(b"\0\0\0\x04trak").0);
         assert_eq!(header(b"\0\0\0\x01moov\xff\xff\xff\xff\xff\xff\xff\xff", 100), None);
     }
 

@@ -266,7 +266,11 @@ impl Demuxer {
             return None;
         }
         let start = if stream.start_time == ffi::AV_NOPTS_VALUE { 0 } else { stream.start_time };
-        start.checked_add(self.duration()?)
+        let end = start.checked_add(self.duration()?)?;
+        // The library's length has the pause in it, where that and what is shown are less than the whole film; so has its start.
+        let base = stream.time_base;
+        let shown = self.boxes().ends_after_pause_s.map(|s| s * f64::from(base.den) / f64::from(base.num));
+        Some(shown.filter(|s| *s < end as f64).map_or(end, |s| s as i64))
     }
 
     /// Byte offset that the reader has reached.

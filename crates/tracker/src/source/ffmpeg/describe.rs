@@ -12,6 +12,7 @@ use crate::error::{Error, Fault, FaultKind, Result};
 use crate::frame::{RateOrigin, SourceInfo, TimeBase};
 use crate::message::Message;
 use crate::pixel_aspect::PixelAspect;
+use crate::pixel_damage::PixelDamage;
 use crate::source::orientation::Orientation;
 use crate::source::{OpenOptions, clock};
 
@@ -70,6 +71,7 @@ pub(super) fn describe(
         pixel_aspect_origin,
         format: layout.format,
         depth_bits: layout.depth_bits,
+        pixel_damage: PixelDamage::of(&codec_name(parameters.codec_id)),
         declared_frames: indexed.map(|(there, hidden)| there - hidden).or(declared),
         time_base,
         rate_hz,

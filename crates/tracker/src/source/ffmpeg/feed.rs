@@ -12,7 +12,7 @@ use super::demux::{Demuxer, Packet, Read};
 use super::fields::{FieldOrder, Fields};
 use super::frame_numbers::FrameNumbers;
 use super::inside::Inside;
-use super::slice_sums::SliceSums;
+use super::slice_sums::{self, SliceSums};
 use super::slots::Slots;
 use super::structure::{Fit, Structure};
 use super::tags::Tags;
@@ -130,6 +130,11 @@ impl Feed {
     /// Whether the first packets are single fields.
     pub(super) fn has_single_fields(&self) -> bool {
         self.has_single_fields
+    }
+
+    /// Whether the first packets carry sums of their pixels, right or wrong.
+    pub(super) fn has_sums(&self) -> bool {
+        self.sums.is_some() && self.ahead().any(|p| slice_sums::are_there(p.bytes()))
     }
 
     /// Frames that the container declares and that were never in it: the recorder left them out.

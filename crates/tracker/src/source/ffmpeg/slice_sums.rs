@@ -1,7 +1,7 @@
 //! Checks the sums of FFV1's slices (RFC 9043): FFmpeg's decoder compares them too, but hands out such a picture as a good one,
 //! with the slice of the picture before in the place of the damaged one.
 //!
-//! Owns: [`SliceSums`]. Must not: decode.
+//! Owns: [`SliceSums`], [`are_there`]. Must not: decode.
 
 use ffmpeg_next::ffi;
 
@@ -48,6 +48,11 @@ impl SliceSums {
         self.is_stale |= is_known || sums == Sums::Wrong || sums == Sums::None && self.has_sums;
         self.is_stale
     }
+}
+
+/// Whether a packet is made of slices that have sums, right or wrong.
+pub(super) fn are_there(packet: &[u8]) -> bool {
+    sums(packet) != Sums::None
 }
 
 /// Goes over the slices from the packet's end, where the length of each stands.
@@ -135,6 +140,7 @@ mod tests {
     #[test]
     fn a_stream_without_sums_is_not_doubted() {
         let mut sums_of = SliceSums { has_sums: false, is_stale: false };
+        assert!(!are_there(b"\x80\x00 version 1 has neither") && are_there(&packet(&[b"\x80\x00slice"])));
         assert!(!sums_of.is_damaged(b"\x80\x00 version 1 has neither lengths nor sums", false, false));
     }
 }

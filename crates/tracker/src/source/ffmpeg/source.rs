@@ -24,6 +24,7 @@ use crate::frame::{Bytes, Ending, Frame, FrameSource, SourceInfo};
 use crate::gaps::{Gaps, Reason};
 use crate::message::Setting;
 use crate::pixel_aspect::PixelAspect;
+use crate::pixel_damage::{self, PixelDamage};
 use crate::source::orientation::Orientation;
 use crate::source::{Input, Interlaced, OpenOptions};
 
@@ -130,6 +131,9 @@ impl FfmpegSource {
                     info.warnings.push(fields::warning(name, order));
                 }
             }
+        }
+        if feed.has_sums() {
+            info.pixel_damage = PixelDamage::of(pixel_damage::FFV1_WITH_SUMS);
         }
         // Where each field is a packet, so is it where the container counts.
         if feed.has_single_fields() {

@@ -5,14 +5,36 @@
 use std::sync::OnceLock;
 
 /// Bits of a code that are looked up at once; longer codes are rare.
-const QUICK: usize = 9;
+const QUICK: usize = 11;
 /// Longest code, bits.
 const LONGEST: usize = 16;
+/// Coefficients of a block.
+const BLOCK: u32 = 64;
+
+/// The meaning of a code.
+#[derive(Clone, Copy, Default)]
+struct Code {
+    /// Bits of the code and of the number behind it; 0 where there is no such code.
+    bits: u8,
+    /// Coefficients of a block that it goes on by; [`BLOCK`] at its end.
+    coefficients: u8,
+    /// Bits of the number behind it: 0 where it only goes on.
+    size: u8,
+}
+
+impl Code {
+    fn new(length: usize, value: u8) -> Self {
+        let (run, size) = (value >> 4, value & 15);
+        // Without a number it is the block's end, or sixteen coefficients of 0.
+        let coefficients = if size == 0 && run < 15 { BLOCK as u8 } else { run + 1 };
+        Self { bits: length as u8 + size, coefficients, size }
+    }
+}
 
 /// The codes of one table.
 pub(super) struct Codes {
-    /// For each beginning of [`QUICK`] bits the code's length, 0 for a longer one or none, and its value.
-    quick: Vec<(u8, u8)>,
+    /// For each beginning of [`QUICK`] bits the code; of a longer one, or none, 0 bits.
+    quick: Box<[Code; 1 << QUICK]>,
     /// For each length the first code, the one past the last, and where its value stands.
     lengths: [(u32, u32, usize); LONGEST + 1],
     values: Vec<u8>,
@@ -21,7 +43,7 @@ pub(super) struct Codes {
 impl Codes {
     /// The codes of a table of how many there are of each length, and what they stand for; `None` if there are no such codes.
     pub(super) fn new(counts: &[u8; 16], values: &[u8]) -> Option<Self> {
-        let mut quick = vec![(0, 0); 1 << QUICK];
+        let mut quick = Box::new([Code::default(); 1 << QUICK]);
         let mut lengths = [(0, 0, 0); LONGEST + 1];
         let (mut code, mut place) = (0u32, 0);
         for length in 1..=LONGEST {
@@ -30,7 +52,7 @@ impl Codes {
             for value in values.get(place..place + n)? {
                 if length <= QUICK {
                     let first = (code as usize) << (QUICK - length);
-                    quick.get_mut(first..first + (1 << (QUICK - length)))?.fill((length as u8, *value));
+                    quick.get_mut(first..first + (1 << (QUICK - length)))?.fill(Code::new(length, *value));
                 }
                 code += 1;
             }
@@ -70,9 +92,30 @@ impl<'a> Bits<'a> {
         Self { data, at: 0, bits: 0, count: 0 }
     }
 
-    /// Takes bytes up to a marker. Behind it and behind the end nothing more comes.
+    /// Takes bytes up to a marker, 32 bits or more where there are so many. Behind it and behind the end nothing more comes.
+    #[inline(always)]
     fn fill(&mut self) {
-        while self.count <= 56 {
+        if self.count >= 32 {
+            return;
+        }
+        if let Some(next) = self.data.get(self.at..).and_then(|rest| rest.first_chunk::<8>()) {
+            let next = u64::from_be_bytes(*next);
+            // The highest bit of each byte of ones, and maybe of one beside such a byte.
+            let ones = (!next).wrapping_sub(0x0101_0101_0101_0101) & next & 0x8080_8080_8080_8080;
+            if ones == 0 && self.count >= 0 {
+                let bytes = (63 - self.count) as usize / 8;
+                self.bits |= (next & !(u64::MAX >> (8 * bytes))) >> self.count;
+                self.count += 8 * bytes as i32;
+                self.at += bytes;
+                return;
+            }
+        }
+        self.fill_by_bytes();
+    }
+
+    #[cold]
+    fn fill_by_bytes(&mut self) {
+        while (0..=56).contains(&self.count) {
             let Some(&byte) = self.data.get(self.at) else { return };
             if byte == 0xff {
                 if self.data.get(self.at + 1) != Some(&0) {
@@ -86,55 +129,58 @@ impl<'a> Bits<'a> {
         }
     }
 
-    fn skip(&mut self, n: u32) -> Result<(), String> {
+    fn skip(&mut self, n: u32) {
         self.bits <<= n;
         self.count -= n as i32;
-        if self.count < 0 { Err("its data end before its last block".to_owned()) } else { Ok(()) }
     }
 
-    fn code(&mut self, codes: &Codes) -> Result<u8, String> {
-        // A code and what follows it take 32 bits at most.
-        if self.count < 32 {
-            self.fill();
+    /// Takes a code and the number behind it.
+    #[inline(always)]
+    fn code(&mut self, codes: &Codes) -> Result<Code, String> {
+        // They take 31 bits at most.
+        self.fill();
+        let code = codes.quick[(self.bits >> (64 - QUICK)) as usize];
+        if code.bits == 0 {
+            return self.long_code(codes);
         }
-        let (length, value) = codes.quick[(self.bits >> (64 - QUICK)) as usize];
-        if length > 0 {
-            return self.skip(u32::from(length)).map(|()| value);
-        }
+        self.skip(u32::from(code.bits));
+        Ok(code)
+    }
+
+    #[cold]
+    fn long_code(&mut self, codes: &Codes) -> Result<Code, String> {
         for length in QUICK + 1..=LONGEST {
             let code = (self.bits >> (64 - length)) as u32;
             let (first, end, place) = codes.lengths[length];
             if (first..end).contains(&code) {
-                self.skip(length as u32)?;
-                return Ok(codes.values[place + (code - first) as usize]);
+                let code = Code::new(length, codes.values[place + (code - first) as usize]);
+                self.skip(u32::from(code.bits));
+                return Ok(code);
             }
         }
-        self.skip(LONGEST as u32)?;
+        self.skip(LONGEST as u32);
+        self.is_there()?;
         Err("its data hold a code that is none".to_owned())
+    }
+
+    /// Whether all bits that were used are there.
+    fn is_there(&self) -> Result<(), String> {
+        if self.count < 0 { Err("its data end before its last block".to_owned()) } else { Ok(()) }
     }
 
     /// Goes through the coefficients of a block.
     pub(super) fn block(&mut self, dc: &Codes, ac: &Codes) -> Result<(), String> {
-        let size = self.code(dc)?;
-        if size > 15 {
-            return Err("its data hold a code that is none".to_owned());
+        // The first code is that of the sum, which has a size and no run.
+        self.code(dc)?;
+        let mut at = 1;
+        let mut last = Code::default();
+        while at < BLOCK {
+            last = self.code(ac)?;
+            at += u32::from(last.coefficients);
         }
-        self.skip(u32::from(size))?;
-        let mut k = 1;
-        while k < 64 {
-            let value = self.code(ac)?;
-            let (run, size) = (usize::from(value >> 4), u32::from(value & 15));
-            k += run + 1;
-            if size == 0 {
-                if run < 15 {
-                    break;
-                }
-                continue;
-            }
-            if k > 64 {
-                return Err("its data hold a block of more than 64 coefficients".to_owned());
-            }
-            self.skip(size)?;
+        self.is_there()?;
+        if at > BLOCK && last.size > 0 {
+            return Err("its data hold a block of more than 64 coefficients".to_owned());
         }
         Ok(())
     }

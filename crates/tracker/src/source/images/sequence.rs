@@ -14,6 +14,7 @@ use crate::frame::{Ending, Frame, FrameSource, RateClaims, SourceInfo};
 use crate::gaps::{Reason, keep_reason};
 use crate::message::Message;
 use crate::name::text;
+use crate::pixel_damage::PixelDamage;
 use crate::source::OpenOptions;
 
 /// Bytes of pictures decoded ahead at most.
@@ -91,7 +92,8 @@ fn size_of_most<'a>(
     let Some(best) = (0..pictures.len()).rev().max_by_key(|i| like(&pictures[*i].2)) else {
         let (path, problem) = problem.map_or_else(Default::default, |(p, e)| (p.display().to_string(), e));
         return Err(Error::Source(Fault::new(path, problem).of_kind(FaultKind::Damaged).advice(
-            "Check that the pictures were copied whole; a file with several pictures is given by itself, without its folder",
+            "Check that the pictures were copied whole, or save them as gray of 8 or 16 bit; a file with several pictures is given by \
+             itself, without its folder",
         )));
     };
     let usual = &pictures[best].2;
@@ -143,13 +145,14 @@ impl SequenceSource {
         let info = SourceInfo {
             name: name.to_owned(),
             container: "pictures".into(),
-            codec: ending,
+            codec: ending.clone(),
             width: first.width,
             height: first.height,
             pixel_aspect,
             pixel_aspect_origin,
             format: format(first.depth_bits),
             depth_bits: first.depth_bits,
+            pixel_damage: PixelDamage::of(&ending),
             declared_frames: Some(files.len() as u64),
             time_base,
             rate_hz,

@@ -14,6 +14,7 @@ use crate::frame::{Ending, Frame, FrameSource, RateClaims, SourceInfo};
 use crate::gaps::{Reason, keep_reason};
 use crate::message::Message;
 use crate::name::path;
+use crate::pixel_damage::PixelDamage;
 use crate::source::OpenOptions;
 use crate::source::orientation::Orientation;
 use crate::source::raw::RawFrames;
@@ -119,6 +120,7 @@ impl StackSource {
             pixel_aspect_origin,
             format: format(layout.bits),
             depth_bits: layout.bits.max(8),
+            pixel_damage: PixelDamage::of("tiff"),
             declared_frames: declared.as_ref().map(|d| d.pictures),
             time_base,
             rate_hz,

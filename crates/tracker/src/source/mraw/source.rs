@@ -15,6 +15,7 @@ use crate::frame::{
 };
 use crate::message::Setting;
 use crate::pixel_aspect::PixelAspect;
+use crate::pixel_damage::{self, PixelDamage};
 use crate::source::raw::{RawFrames, Stored};
 use crate::source::{OpenOptions, clock};
 
@@ -149,6 +150,7 @@ fn info(name: &str, header: &Header, packing: &Packing, options: &OpenOptions) -
         pixel_aspect_origin,
         format: packing.format,
         depth_bits: packing.depth_bits,
+        pixel_damage: PixelDamage::of(pixel_damage::SAMPLES),
         declared_frames: header.total_frames,
         time_base,
         rate_hz: options

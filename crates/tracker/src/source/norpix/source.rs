@@ -16,6 +16,7 @@ use crate::error::{Error, Fault, FaultKind, Place, Result};
 use crate::frame::{Bytes, Ending, Frame, FrameSource, PixelFormat, RateClaims, RateOrigin, SourceInfo};
 use crate::message::Message;
 use crate::pixel_aspect::PixelAspect;
+use crate::pixel_damage::{self, PixelDamage};
 use crate::source::images::picture_file;
 use crate::source::raw::{RawFrames, Stored};
 use crate::source::{OpenOptions, clock};
@@ -114,6 +115,7 @@ impl NorpixSource {
             pixel_aspect_origin,
             format,
             depth_bits,
+            pixel_damage: pixel_damage_of(&header.form),
             declared_frames: (header.declared > 0).then_some(header.declared),
             time_base: times.time_base,
             rate_hz: times.rate_hz,
@@ -270,6 +272,10 @@ fn ending(header: &Header, pictures: &[Recorded], size: u64, warnings: &mut Vec<
             header.declared
         ),
     }
+}
+
+fn pixel_damage_of(form: &Form) -> PixelDamage {
+    PixelDamage::of(if matches!(form, Form::Jpeg) { "jpeg" } else { pixel_damage::SAMPLES })
 }
 
 fn codec(header: &Header) -> String {

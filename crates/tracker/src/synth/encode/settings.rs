@@ -5,6 +5,7 @@ use std::io::ErrorKind;
 use crate::error::{Error, Fault};
 use crate::frame::TimeBase;
 use crate::message::Setting;
+use crate::pixel_aspect::PixelAspect;
 use crate::setting_words::words;
 
 /// Codec of a video file.
@@ -37,6 +38,8 @@ pub struct VideoSettings {
     pub height: u32,
     /// Significant bits per sample; above 8, frames have two bytes per sample, little-endian.
     pub depth_bits: u32,
+    /// Width to height of a pixel.
+    pub pixel_aspect: PixelAspect,
     /// Seconds per frame.
     pub time_base: TimeBase,
     /// Codec.

@@ -26,6 +26,11 @@ impl VideoWriter {
         match *self {}
     }
 
+    /// Leaves no file.
+    pub fn abandon(self) {
+        match self {}
+    }
+
     /// Ends the file.
     ///
     /// # Errors

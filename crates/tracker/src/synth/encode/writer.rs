@@ -30,6 +30,8 @@ pub struct VideoWriter {
     height: u32,
     bytes_per_pixel: usize,
     next: i64,
+    /// Packets in the file.
+    packets: u64,
 }
 
 /// An error of FFmpeg's as ours.
@@ -70,6 +72,8 @@ impl VideoWriter {
         context.set_format(pixel);
         context.set_time_base(time_base);
         context.set_frame_rate(Some(time_base.invert()));
+        let aspect = sample_aspect(&name, path, settings)?;
+        context.set_aspect_ratio(aspect);
         // Levels are what the camera recorded, from 0 to the top.
         context.set_color_range(color::Range::JPEG);
         if output.format().flags().contains(format::Flags::GLOBAL_HEADER) {
@@ -102,6 +106,8 @@ impl VideoWriter {
         stream.set_time_base(time_base);
         stream.set_avg_frame_rate(time_base.invert());
         stream.set_rate(time_base.invert());
+        // SAFETY: the stream belongs to the output, which lives and of which nothing is written yet.
+        unsafe { (*stream.as_mut_ptr()).sample_aspect_ratio = aspect.into() };
         // No random identifiers and no version: the same film makes the same bytes.
         let mut exact = Dictionary::new();
         exact.set("fflags", "+bitexact");
@@ -119,6 +125,7 @@ impl VideoWriter {
             height: settings.height,
             bytes_per_pixel: if settings.depth_bits > 8 { 2 } else { 1 },
             next: 0,
+            packets: 0,
         })
     }
 
@@ -171,6 +178,7 @@ impl VideoWriter {
                     packet.set_duration(1);
                     packet.rescale_ts(self.time_base, self.stream_time_base);
                     packet.write_interleaved(&mut self.output).map_err(failed(&self.name, "writing"))?;
+                    self.packets += 1;
                 }
                 Err(ffmpeg::Error::Eof) => return Ok(()),
                 Err(ffmpeg::Error::Other { errno }) if errno == ffmpeg::error::EAGAIN => return Ok(()),
@@ -186,6 +194,29 @@ impl VideoWriter {
     pub fn finish(mut self) -> Result<()> {
         self.encoder.send_eof().map_err(failed(&self.name, "encoding"))?;
         self.drain()?;
+        self.end()
+    }
+
+    /// Ends the file at once with the frames that are encoded, without those that the encoder still holds; without any there is no
+    /// file.
+    ///
+    /// # Errors
+    /// [`Error::Film`] if the file's end cannot be written.
+    pub fn cut(self) -> Result<()> {
+        if self.packets == 0 {
+            self.abandon();
+            return Ok(());
+        }
+        self.end()
+    }
+
+    /// Leaves no file.
+    pub fn abandon(self) {
+        release(self.encoder);
+    }
+
+    fn end(mut self) -> Result<()> {
+        release(self.encoder);
         self.output.write_trailer().map_err(failed(&self.name, "writing the end"))?;
         // Closed first: what FFmpeg still holds goes into the file.
         drop(self.output);
@@ -193,19 +224,57 @@ impl VideoWriter {
     }
 }
 
+/// Closes an encoder beside the caller's work: x264 first ends the pictures that it has begun, which takes it seconds where they are
+/// large.
+fn release(encoder: encoder::Video) {
+    // Without a thread to be had the closure is dropped here, and the encoder with it.
+    let _ = std::thread::Builder::new().name("encoder".into()).spawn(move || drop(encoder));
+}
+
 /// The reason for which a file of this ending holds at most 1000 frames per second, as FFmpeg writes it; `None` if it holds more.
 /// Matroska has the exact time from frame to frame beside its time stamps only where that is longer than a tick.
 fn up_to_1000_hz(path: &Path) -> Option<&'static str> {
-    match path.extension()?.to_string_lossy().to_ascii_lowercase().as_str() {
+    match ending(path).as_str() {
         "mkv" | "mk3d" | "webm" => Some("keeps time stamps in milliseconds"),
         "avi" => Some("is written with frames 1 ms or more apart"),
         _ => None,
     }
 }
 
+/// Width to height of a pixel as FFmpeg has it: 0 for square ones, of which nothing is said.
+///
+/// Matroska has the width at which pictures are shown in its place, a whole number of pixels: where that is another ratio by more
+/// than 10^-4, which would turn angles by 0.003 deg, it is refused.
+fn sample_aspect(name: &str, path: &Path, settings: &VideoSettings) -> Result<Rational> {
+    let aspect = settings.pixel_aspect;
+    if aspect.is_square() {
+        return Ok(Rational(0, 1));
+    }
+    let shown = f64::from(settings.width) * aspect.ratio();
+    let is_rounded = ["mkv", "mk3d", "webm"].contains(&ending(path).as_str());
+    if is_rounded && (shown.round() / shown - 1.0).abs() > 1e-4 {
+        let problem = format!(
+            "Matroska keeps the width at which pictures are shown in whole pixels, and {} px of {} are {shown:.2}",
+            settings.width,
+            aspect.words()
+        );
+        return Err(fault(name, problem, "Name it .mp4, .mov or .avi, which keep the ratio"));
+    }
+    let [width, height] = aspect.parts().map(i32::try_from);
+    match (width, height) {
+        (Ok(width), Ok(height)) => Ok(Rational(width, height)),
+        _ => Err(fault(name, format!("{} are no ratio that it holds", aspect.words()), "")),
+    }
+}
+
+/// The ending of a name in lower case.
+fn ending(path: &Path) -> String {
+    path.extension().map(text).unwrap_or_default().to_ascii_lowercase()
+}
+
 /// The container that the ending of `path` names, writing into `new` and nowhere else.
 fn muxer(name: &str, path: &Path, new: &NewFile) -> Result<format::context::Output> {
-    let ending = path.extension().map(text).unwrap_or_default();
+    let ending = ending(path);
     let file = new.file().try_clone().map_err(|e| cannot_write(name, &e))?;
     let stream = match new.is_stream() {
         true => StreamIo::from_write(file),
