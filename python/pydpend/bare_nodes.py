@@ -30,7 +30,9 @@ def is_bare(path: Path) -> bool:
         if file.read(4) != b"PAR1":
             return not Path(f"{path}.json").exists()
     try:
-        return b"pydpend.schema_version" not in (pq.read_metadata(str(path.absolute())).metadata or {})
+        # A file, because pyarrow takes no name that is not UTF-8.
+        with path.open("rb") as file:
+            return b"pydpend.schema_version" not in (pq.read_metadata(file).metadata or {})
     except PARQUET_FAULTS:
         return False
 

@@ -163,9 +163,9 @@ def states(
         For times that do not increase, a link with fewer than 50 angles, a sigma that is negative.
     """
     if not stretch_s > 0:
-        raise AnglesError(fault(Setting("stretch_s"), f"{stretch_s} is no length", "Give s, above 0"))
+        raise AnglesError(fault("stretch_s", f"{stretch_s} is no length", "Give s, above 0"))
     if seed < 0:
-        raise AnglesError(fault(Setting("seed"), f"{seed} is below 0", "Give 0 or more"))
+        raise AnglesError(fault("seed", f"{seed} is below 0", "Give 0 or more"))
     of_type("angles", angles, LinkAngles, like=_LIKE_ANGLES)
     t, phi, sigma = _checked(angles)
     links = phi.shape[1]

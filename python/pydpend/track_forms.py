@@ -102,7 +102,9 @@ def form_of(path: str | os.PathLike[str], *, is_sure: bool = True) -> Form | Non
         from pydpend.columns import PARQUET_FAULTS
 
         try:
-            return form_of_columns(pq.read_schema(str(file.absolute())).names)
+            # A file, because pyarrow takes no name that is not UTF-8.
+            with file.open("rb") as opened:
+                return form_of_columns(pq.read_schema(opened).names)
         except PARQUET_FAULTS:
             return None
     # The second byte is C3D's key, the first the block in which its parameters begin.

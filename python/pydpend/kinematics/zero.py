@@ -82,7 +82,7 @@ def find_rest(angles: LinkAngles, at_least_s: float = REST_AT_LEAST_S) -> list[R
         Empty if there is none.
     """
     if not at_least_s > 0:
-        raise AnglesError(fault(Setting("at_least_s"), f"{at_least_s} is no length", "Give s, above 0"))
+        raise AnglesError(fault("at_least_s", f"{at_least_s} is no length", "Give s, above 0"))
     t, phi = angles.t_s, angles.phi_rad
     step = angles.step_s
     if not np.isfinite(step):
