@@ -35,7 +35,9 @@ _NO_SEPARATORS = "|:&!~^"
 """Characters that part the fields of some tables, and are not known here."""
 
 _COMMA_NUMBER = re.compile(r"[+-]?(\d+,\d*|,\d+)([eE][+-]?\d+)?")
-_MAY_BE_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
+_MAY_BE_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}")
+_BELOW_THOUSAND = re.compile(r"[+-]?\d{1,3}")
+_POINTS_IN_MILLIONS = re.compile(r"[+-]?\d{1,3}(\.\d{3}){2,}")
 
 _MINUS = "\N{MINUS SIGN}"
 """The sign that programs with fine typography write for minus; it means nothing else."""
@@ -414,6 +416,7 @@ class Numbers:
                 self._at(row, column),
             )
         if sure is None:
+            self._refuse_thousands_by_points()
             return False
         for column, fields in self._fields.items():
             for row, field in enumerate(fields):
@@ -425,6 +428,41 @@ class Numbers:
                         self._at(row, column),
                     )
         return True
+
+    def _refuse_thousands_by_points(self) -> None:
+        """Refuses columns as 1.031, 969: with three decimals here and none there, its points may mean thousands.
+
+        A point that can only be a decimal one, as in 0.5, tells of the whole file. It does not tell of a column with
+        1.250 and 969: who writes the last zero of decimals writes them in every row.
+        """
+        doubtful: list[tuple[str, int, int]] = []
+        points_are_decimal = False
+        for column, fields in self._fields.items():
+            pointed = [row for row, field in enumerate(fields) if "." in field]
+            odd = next((row for row in pointed if not _MAY_BE_THOUSANDS.fullmatch(fields[row])), None)
+            if odd is not None:
+                many = next((row for row in pointed if _POINTS_IN_MILLIONS.fullmatch(fields[row])), None)
+                if many is not None:
+                    self._cells.refuse(
+                        f"{fields[many]!r} has marks between thousands",
+                        "Write numbers without them",
+                        self._at(many, column),
+                    )
+                points_are_decimal |= _POINT_NUMBER.fullmatch(fields[odd]) is not None
+                continue
+            whole = [row for row, field in enumerate(fields) if _WHOLE.fullmatch(field)] if pointed else []
+            if whole and all(_BELOW_THOUSAND.fullmatch(fields[row]) for row in whole):
+                doubtful.append((column, pointed[0], whole[0]))
+        for column, row, beside in doubtful:
+            fields = self._fields[column]
+            if points_are_decimal and not any("." in f and f.endswith("0") for f in fields):
+                continue
+            self._cells.refuse(
+                f"{fields[row]!r} may be {fields[row]} or {fields[row].replace('.', '')}: each point in the column has "
+                f"three digits behind it, and {fields[beside]!r} in line {self._lines[beside]} has no point",
+                f"Write no marks between thousands, or every number with its decimals ({fields[beside]}.000)",
+                self._at(row, column),
+            )
 
     def _not_a_number(self, row: int, column: str) -> NoReturn:
         field = self._fields[column][row]

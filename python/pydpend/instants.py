@@ -35,14 +35,25 @@ _LONGEST_S = 1e8
 """Three years: no recording is as long, and stamps (s since 1970, 20240501120000) are above."""
 _SINCE_1970_S = (946_684_800.0, 4_102_444_800.0)
 """Seconds since 1970 of the years 2000 to 2100: the clock of a computer, in a column that is in s."""
-_SERIAL_DAYS = (3e4, 6e4)
-"""Days since 1900, as spreadsheets store them, of the years 1982 to 2064."""
-_SERIAL_SPAN_DAYS = 0.1
-"""A recording of days as numbers spans less, 2.4 hours; seconds that span less are no swing."""
+_DAYS = (
+    (3e4, 5.3e4, "days since 1900 as spreadsheets store them"),
+    (5.3e4, 6e4, "a modified Julian date, or days since 1900 as spreadsheets store them"),
+    (6e4, 7.5e4, "a modified Julian date (days since 1858-11-17)"),
+    (723_960.0, 753_960.0, "days since the year 0, MATLAB's datenum"),
+    (2_445_000.5, 2_475_000.5, "a Julian date (days since 4713 BC)"),
+)
+"""Lowest and highest count of days, and what it may be, of the years 1982 to 2064.
 
+Modified Julian dates count 15 018 more than spreadsheets do. Below 53 000 they are before 2004, and a spreadsheet's
+days are likelier; from there to 60 000 (2004 to 2023, a spreadsheet's 2045 to 2064) they may be either.
+"""
+_DAYS_SPAN = 0.1
+"""A recording of days as numbers spans less, 2.4 hours; seconds that span less are no swing."""
+_CLOCK_STEP_S = 10.0
+"""A swing is sampled more often; times that are further apart may be anything."""
 
 STAMP_ADVICE = (
-    "Write the times in s from the first, as dates (2024-05-01T12:00:00.250) "
+    "Write the times in s from the first, as dates (2024-05-01T12:00:00.250), as times of day (12:00:00.250) "
     "or as s since 1970 in a column time_s"
 )
 """Advice about stamps that are written as numbers."""
@@ -67,15 +78,38 @@ def stamp_in(t_s: Floats) -> tuple[int, str] | None:
     late = np.flatnonzero(t > _LONGEST_S)
     if late.size:
         return int(late[0]), "s, ms, us or ns since 1970 or a date as 20240501120000"
-    low, high = _SERIAL_DAYS
-    if (
-        t.size > 1
-        and np.nanmin(t) > low
-        and np.nanmax(t) < high
-        and np.ptp(t[np.isfinite(t)]) < _SERIAL_SPAN_DAYS
-    ):
-        return 0, "days since 1900 as spreadsheets store them"
-    return None
+    there = t[np.isfinite(t)]
+    if there.size > 1 and np.ptp(there) < _DAYS_SPAN:
+        for low, high, what in _DAYS:
+            if low < there.min() <= high:
+                return 0, what
+    minute = _first_minute(t_s)
+    if minute is None:
+        return None
+    return minute, "hours, minutes and seconds in one number, as 100559.9 for 10:05:59.9"
+
+
+def _first_minute(t_s: Floats) -> int | None:
+    """The row at which the first new minute of times (T,) as hhmmss begins; ``None`` for times in s.
+
+    Such times never have 60 to 99 in their last two places, of the minutes or the seconds, and go on by their usual
+    step where a minute begins, if they are read as a clock; in s they jump by 40 there.
+    """
+    rows = np.flatnonzero(np.isfinite(t_s))
+    hundreds, seconds = np.divmod(t_s[rows], 100.0)
+    hours, minutes = np.divmod(hundreds, 100.0)
+    if np.any(hundreds < 0.0) or np.any(seconds >= 60.0) or np.any(minutes >= 60.0):
+        return None
+    is_new = np.diff(hundreds) > 0
+    if not is_new.any() or is_new.all():
+        return None
+    steps = np.diff((hours * 60.0 + minutes) * 60.0 + seconds)
+    usual = float(np.median(steps[~is_new]))
+    # Half a step: a gap in times that are in s would have to be 40 s to within that.
+    goes_on = np.abs(steps[is_new] - usual) <= usual / 2
+    if not 0.0 < usual < _CLOCK_STEP_S or 2 * np.count_nonzero(goes_on) < goes_on.size:
+        return None
+    return int(rows[1:][is_new][0])
 
 
 def refuse_stamps(name: str, t_s: Floats, error: type[PydpendError], place: Callable[[int], str]) -> None:

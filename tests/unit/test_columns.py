@@ -151,6 +151,61 @@ def test_what_can_be_read_two_ways_is_refused_by_its_line(tmp_path: Path, kind: 
     assert "\n" not in str(caught.value)
 
 
+THOUSANDS_BY_POINTS = {
+    "semicolons": (";", "0;1.000\n1;1.031\n2;969\n", 2, "'1.000' may be 1.000 or 1000: .* '969' in line 4"),
+    "tabs": ("\t", "0\t969\n1\t1.031\n", 3, "'1.031' may be 1.031 or 1031: .* '969' in line 2"),
+    "commas": (",", "0,1.000\n1,969\n", 2, "'1.000' may be 1.000 or 1000"),
+    "spaces": (" ", "0 1.000\n1 969\n", 2, "'1.000' may be 1.000 or 1000"),
+    "both signs": (";", "0;0\n1;+31\n2;-1.031\n3;12.344\n", 4, "'-1.031' may be -1.031 or -1031: .* '0' in"),
+    "a field without a value": (
+        ";",
+        "0;1.031\n1;\n2;nan\n3;inf\n4;9\n",
+        2,
+        "'1.031' may be .* '9' in line 6",
+    ),
+    "times with decimal points": (";", "0.5;1.031\n1.0;1.250\n1.5;969\n", 2, "'1.031' may be 1.031 or 1031"),
+    "millions": (";", "0;2.500.000\n1;-2.578.448\n", 2, r"'2\.500\.000' has marks between thousands"),
+    "millions below": (";", "0;999.000\n1;-1.000.000\n", 3, r"'-1\.000\.000' has marks between thousands"),
+}
+
+
+@pytest.mark.parametrize("kind", THOUSANDS_BY_POINTS)
+def test_points_that_may_part_thousands_are_refused(tmp_path: Path, kind: str) -> None:
+    delimiter, rows, line, message = THOUSANDS_BY_POINTS[kind]
+    path = tmp_path / "t.csv"
+    path.write_text(f"time_s{delimiter}voltage_mv\n{rows}")
+    with pytest.raises(EncoderError, match=rf"line {line}, column voltage_mv: {message}.*\. Write "):
+        read_encoder(path, column="voltage_mv")
+    path.write_text(f"time_s{delimiter}phi1_deg\n{rows}")
+    with pytest.raises(AnglesError, match=f"line {line}, column phi1_deg: {message}") as caught:
+        read_angles(path)
+    assert "unwrap" not in str(caught.value)
+
+
+def test_times_whose_points_may_part_thousands_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(EncoderError, match=r"line 3, column time_s: '1\.000' may be 1\.000 or 1000"):
+        read(tmp_path, "time_s;voltage_v\n998;1\n1.000;2\n1.002;3\n")
+
+
+POINTS: dict[str, tuple[str, list[float]]] = {
+    "three decimals everywhere": ("1;1.031\n2;1.250\n3;2.000\n", [1.031, 1.25, 2.0]),
+    "three decimals below one": ("1;0.123\n2;1.250\n3;2\n", [0.123, 1.25, 2.0]),
+    "zero with its decimals": ("1;0.000\n2;1.250\n3;2\n", [0.0, 1.25, 2.0]),
+    "decimals without last zeros": ("1;1.031\n2;1.25\n3;2\n", [1.031, 1.25, 2.0]),
+    "as many before the point as no thousands have": ("1;1031.250\n2;1.250\n3;2\n", [1031.25, 1.25, 2.0]),
+    "whole numbers above a thousand": ("1;1.031\n2;1.125\n3;1969\n", [1.031, 1.125, 1969.0]),
+    "an exponent": ("1;1.031e0\n2;1.125\n3;2\n", [1.031, 1.125, 2.0]),
+    "a time that tells": ("0.5;1.031\n1;1.125\n1.5;2\n", [1.031, 1.125, 2.0]),
+    "whole numbers": ("1;1\n2;10\n3;100\n", [1.0, 10.0, 100.0]),
+}
+
+
+@pytest.mark.parametrize("kind", POINTS)
+def test_points_that_are_decimal_are_read(tmp_path: Path, kind: str) -> None:
+    rows, values = POINTS[kind]
+    assert read(tmp_path, "time_s;voltage_v\n" + rows).values["voltage_v"].tolist() == values
+
+
 CUT = {
     "an empty note": "time_s,voltage_v,note\n2,5,64567\n3,5,65432\n",
     "a short decimal as a note": "time_s,voltage_v,note\n0,5,65\n1,4,35\n",

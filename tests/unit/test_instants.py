@@ -14,6 +14,7 @@ import pytest
 from nptdms import ChannelObject, TdmsWriter
 from pydpend.encoder import EncoderSignal, read_encoder
 from pydpend.errors import AnglesError, EncoderError
+from pydpend.instants import stamp_in
 from pydpend.kinematics import LinkAngles, read_angles
 
 from tests.unit.test_columns import HEAD, read
@@ -28,6 +29,13 @@ from tests.unit.test_columns import HEAD, read
         (1714564800000000.0, 2000.0, "since 1970"),
         (20240501120000.0, 1.0, "a date as 20240501120000"),
         (45413.5, 0.002 / 86400, "days since 1900 as spreadsheets store them"),
+        (54000.25, 0.01 / 86400, "a modified Julian date, or days since 1900 as spreadsheets store them"),
+        (60310.5, 0.01 / 86400, "a modified Julian date"),
+        (60310.0, 1 / 86400, "a modified Julian date"),
+        (739373.5, 0.01 / 86400, "MATLAB's datenum"),
+        (739373.0, 1 / 86400, "MATLAB's datenum"),
+        (2460310.5, 0.01 / 86400, "a Julian date"),
+        (2460310.0, 1 / 86400, "a Julian date"),
     ],
 )
 def test_stamps_written_as_numbers_are_not_taken_for_seconds(
@@ -45,6 +53,68 @@ def test_stamps_written_as_numbers_are_not_taken_for_seconds(
     pq.write_table(pa.table({"time_s": times, "voltage_v": np.zeros(50)}), tmp_path / "t.parquet")
     with pytest.raises(EncoderError, match=f"row 0, column time_s: the time .* may be .*{what}"):
         read_encoder(tmp_path / "t.parquet")
+
+
+CLOCKS = {
+    "one minute": (36355.0, 0.1, 100, 50, "100600"),
+    "whole seconds": (36355.0, 1.0, 200, 5, "100600"),
+    "many minutes": (36300.5, 0.5, 2000, 119, "100600"),
+    "a new hour": (39595.0, 0.01, 1000, 500, "110000"),
+    "the first hour": (55.0, 0.1, 100, 50, "100"),
+    "not in step with the minute": (36355.07, 0.1, 100, 50, "100600.07"),
+}
+"""First time of day and step, s, rows, the row of the first new minute, and its time as hhmmss."""
+
+
+def _hhmmss(t_s: float) -> str:
+    minutes, seconds = divmod(round(t_s, 3), 60.0)
+    return f"{int(minutes // 60):02d}{int(minutes % 60):02d}{seconds:06.3f}"
+
+
+@pytest.mark.parametrize("kind", CLOCKS)
+def test_hours_minutes_and_seconds_in_one_number_are_not_taken_for_seconds(tmp_path: Path, kind: str) -> None:
+    first, step, count, row, shown = CLOCKS[kind]
+    rows = "".join(f"{_hhmmss(first + k * step)},0.65\n" for k in range(count))
+    message = (
+        f"line {row + 2}, column time_s: the time {shown} s may be hours, minutes and seconds in one number, as "
+        r"100559\.9 for 10:05:59\.9\. Write the times .* as times of day"
+    )
+    path = tmp_path / "t.csv"
+    path.write_text("time_s,voltage_v\n" + rows)
+    with pytest.raises(EncoderError, match=message):
+        read_encoder(path)
+    path.write_text("time_s,phi1_rad\n" + rows)
+    with pytest.raises(AnglesError, match=message):
+        read_angles(path)
+
+
+SECONDS = {
+    "within a minute's numbers": 100500.0 + 0.1 * np.arange(500),
+    "over hundreds": 100555.0 + 0.1 * np.arange(2000),
+    "from zero": 0.01 * np.arange(20000),
+    "far apart": np.array([0.0, 50.0, 100.0, 150.0, 200.0]),
+    "a gap of another length than 40 s": np.concatenate(
+        [np.arange(0.0, 60.0, 0.5), np.arange(101.0, 150.0, 0.5)]
+    ),
+    "two": np.array([59.5, 100.0]),
+    "one": np.array([59.5]),
+    "above spreadsheets' days for hours": 45413.5 + 0.5 * np.arange(100),
+    "as large as MATLAB's datenum": 739373.5 + 0.01 * np.arange(100),
+    "as large as a Julian date": 2460310.5 + 0.01 * np.arange(100),
+    "without some": np.array([0.0, np.nan, 1.0, 2.0, np.nan]),
+}
+
+
+@pytest.mark.parametrize("kind", SECONDS)
+def test_seconds_are_no_stamps(kind: str) -> None:
+    assert stamp_in(SECONDS[kind]) is None
+
+
+def test_rows_without_a_time_do_not_hide_a_clock() -> None:
+    times = np.array([np.nan, 58.0, 59.0, np.nan, 100.0, 101.0])
+    found = stamp_in(times)
+    assert found is not None
+    assert found[0] == 4
 
 
 @pytest.mark.parametrize(
