@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pydpend as dp
@@ -13,7 +14,7 @@ from pydpend.cli import main
 from pydpend.errors import AnglesError
 from pydpend.nodes import Nodes
 
-from tests.support import linkages
+from tests.support import linkages, two_links
 
 Floats = NDArray[np.float64]
 
@@ -98,8 +99,64 @@ def test_no_joint_is_refused_and_a_pivot_pointed_at_is_taken_with_the_motion() -
     assert linkages.rms(off(found, made) / found.sigma_rad)[0] == pytest.approx(1, abs=0.06)
     assert np.abs((found.phi_rad - made.phi_rad).mean()) < 2e-3
     assert not [n for n in found.meta["notes"] if "the given pivot" in n]
-    wrong = dp.angles(nodes, zero="vertical", pivot={"thigh": (340.0, 199.4, 0.5)})
-    assert any("the given pivot is" in n for n in wrong.meta["notes"])
+    near = dp.angles(nodes, zero="vertical", pivot={"thigh": (322.5, 200.0, 0.5)})
+    assert any("the given pivot is" in n for n in near.meta["notes"])
+    with pytest.raises(
+        AnglesError, match=r"given at \(340\.0, 199\.4\) \+- 0\.5 px, and by the motion it is at \(320"
+    ):
+        dp.angles(nodes, zero="vertical", pivot={"thigh": (340.0, 199.4, 0.5)})
+    # Said to be known to 20 px only, it is no contradiction.
+    rough = dp.angles(nodes, zero="vertical", pivot={"thigh": (340.0, 199.4, 20.0)})
+    assert linkages.rms(off(rough, made) / rough.sigma_rad)[0] == pytest.approx(1, abs=0.06)
+
+
+def two(hung: bool) -> Nodes:
+    """Two links of three and six markers that swing, one from the other or beside each other; the rig has no joint."""
+    t = np.arange(1000) / 250
+    phi = np.stack([0.7 * np.cos(7 * t), 0.6 * np.cos(9 * t + 1)], axis=1)
+    nodes = without_joints(two_links.film(t, phi, 7))
+    if not hung:
+        xy = nodes.xy_px.copy()
+        (x, y), c, s = two_links.ELBOW_PX, np.cos(phi[:, 0]), np.sin(phi[:, 0])
+        elbow = two_links.PIVOT_PX + np.stack([c * x + s * y, -s * x + c * y], axis=1)
+        xy[:, 3:] += (two_links.PIVOT_PX + np.array([300, 40]) - elbow)[:, None]
+        nodes = replace(nodes, xy_px=xy)
+    return nodes
+
+
+@pytest.mark.parametrize("estimator", ["rigid", "linkage"])
+@pytest.mark.parametrize("pivot", [(1, 1), {"upper": (1, 1)}, {"upper": (640.3, 386.7)}])
+def test_a_given_pivot_away_from_the_one_found_is_refused(estimator: Any, pivot: Any) -> None:
+    with pytest.raises(AnglesError, match=r"by the motion it is at \(640\.3, 380\.7\)") as refused:
+        dp.angles(two(True), estimator, zero="vertical", pivot=pivot)
+    assert "the angle of upper is by its 3 markers and needs no pivot" in str(refused.value)
+
+
+def test_a_link_that_hangs_from_another_has_no_fixed_pivot() -> None:
+    # The places in the reference picture have a noise of 0.3 px.
+    for place in ((1, 1), (643.3, 570.7)):
+        with pytest.raises(AnglesError, match=r"lower hangs from upper, at \(64\d\.\d, 57\d\.\d\) in the"):
+            dp.angles(two(True), zero="vertical", pivot={"lower": place})
+
+
+def test_a_given_pivot_where_it_is_changes_nothing_but_a_note() -> None:
+    bare = dp.angles(two(True), zero="vertical")
+    for place in (two_links.PIVOT_PX, two_links.PIVOT_PX + np.array([1.5, -2])):
+        found = dp.angles(two(True), zero="vertical", pivot=tuple(place))
+        # The prior of 1 px moves a pivot known to 0.003 px by a part of 1e-5 of 2.5 px, seen from 80 px and more.
+        np.testing.assert_allclose(found.phi_rad, bare.phi_rad, rtol=0, atol=1e-5 * 2.5 / 80)
+        assert any("upper is by its 3 markers and needs no pivot" in n for n in found.meta["notes"])
+
+
+def test_a_pivot_of_one_of_two_links_beside_each_other_leaves_the_other_its_own() -> None:
+    nodes = two(False)
+    place = tuple(two_links.PIVOT_PX + np.array([300, 40]))
+    found = dp.angles(nodes, zero="vertical", pivot={"lower": place})
+    assert found.meta["zero"]["lines"] == ["pivot_upper-markers", "pivot-markers"]
+    with pytest.raises(
+        AnglesError, match=r"the pivot of lower was given at \(1\.0, 1\.0\).*it is at \(940\.3, 420\.7\)"
+    ):
+        dp.angles(nodes, zero="vertical", pivot={"lower": (1, 1)})
 
 
 def test_a_short_swing_is_as_uncertain_as_the_pivot_that_was_pointed_at() -> None:

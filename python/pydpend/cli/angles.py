@@ -55,7 +55,8 @@ def add_arguments(p: argparse.ArgumentParser) -> None:
         "--pivot",
         action="append",
         metavar="[LINK=]X,Y[,SIGMA]",
-        help="where a link of one marker hangs, px in the picture, and how well that is known (1 px); again for others",
+        help="where a link of one marker hangs, px in the picture, and how well that is known (1 px); again for "
+        "others. A link of more markers needs none, and a place that the motion contradicts is refused",
     )
     p.add_argument("--mirrored", action="store_true", help="the film is mirror-inverted or taken from behind")
     p.add_argument("--link-length-m", type=float, metavar="M", help="pivot to elbow in metres, for the scale")

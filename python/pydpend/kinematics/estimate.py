@@ -17,7 +17,7 @@ from pydpend.kinematics.hanging import HORIZONTAL, VERTICAL, Raw, is_direction, 
 from pydpend.kinematics.linkage import Linkage
 from pydpend.kinematics.linkage_frames import LinkageAngles, fit_joints
 from pydpend.kinematics.markers import BodyMarkers, body_markers, to_world
-from pydpend.kinematics.pivots import with_pivots
+from pydpend.kinematics.pivots import check_pivots, with_pivots
 from pydpend.kinematics.structure import Structure
 from pydpend.kinematics.table import Floats, LinkAngles
 from pydpend.kinematics.unwrap import unwrap
@@ -74,7 +74,8 @@ def angles(
     pivot : sequence of float or dict of str to sequence of float, optional
         Where a link of one marker hangs, if that was not found: place (x, y) in the picture, px (x right, y down), and
         as a third number its standard uncertainty, 1 px if not given (a place pointed at); of several links by their
-        names. It is taken together with what the motion says.
+        names. It is taken together with what the motion says, and refused where that puts it elsewhere. A link of more
+        markers needs none for its angle.
     gaps : {"error", "stop"}
         What to do where a link was hidden for so long that a turn may be lost (more than ``pi / |w|``): refuse, or
         leave the link's angles out from there on and say so in ``meta["notes"]``.
@@ -97,7 +98,7 @@ def angles(
     AnglesError
         For a body never seen, or in one marker only; links in the wrong order, where the rig has no pivot; no rest
         found, or one in which the links are held and do not hang; a turn that may be lost; links that turn too little
-        for a linkage.
+        for a linkage; a given pivot that the motion contradicts.
     """
     if method is not None:
         raise AnglesError(
@@ -106,11 +107,14 @@ def angles(
     markers = body_markers(nodes, bodies, mirrored)
     _check_length(estimator, len(markers), link_length_m, link_length_sigma_m)
     label = name if name is not None else _label(nodes)
+    before = nodes.rig
     nodes, given = with_pivots(nodes, markers, pivot, mirrored)
+    pivot_notes = check_pivots(before, nodes, poses_of(markers) if given else [], given, mirrored)
     structure = Structure.of(nodes.rig, [m.name for m in markers])
+    structure = structure.beside() if given else structure
     wishes = Wishes(estimator, mirrored, link_length_m, link_length_sigma_m, given)
     raw, seen = estimate(nodes, markers, structure, wishes)
-    notes: list[str] = list(raw.meta.pop("notes", ()))
+    notes: list[str] = [*pivot_notes, *raw.meta.pop("notes", ())]
     ending = nodes.meta.get("ending")
     if isinstance(ending, dict) and ending.get("kind") != "complete":
         why = nodes.damage or ending.get("reason") or ending.get("kind")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from pydpend.kinematics.names import LinkJoint
 from pydpend.nodes import Joint, Rig
@@ -79,6 +79,20 @@ class Structure:
         joints = tuple(known or made for known, made in zip(self.inner, unknown, strict=False))
         on = (None, *self.links[:-1])
         return Structure(self.links, joints, joints, on, (), tuple(range(len(self.links))))
+
+    def beside(self) -> Structure:
+        """The first link with a pivot of its own, of which no place is known, where another link has the only one.
+
+        Chains as they are.
+        """
+        if self.is_chain or self.inner[0] is not None:
+            return self
+        first = self.links[0]
+        name = next(
+            n for n in (f"pivot_{first}", f"pivot of {first}") if n not in {j.name for j in self.joints}
+        )
+        pivot = Joint(name, (first,), math.nan, math.nan)
+        return replace(self, joints=(pivot, *self.joints), inner=(pivot, *self.inner[1:]))
 
     def part(self, links: Sequence[str]) -> Structure:
         """Some of the links, with the joints between them and the ground."""
