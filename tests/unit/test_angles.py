@@ -399,7 +399,7 @@ def test_one_link_and_bad_tables() -> None:
     still = rig.film(t, np.zeros((500, 2)), 17)
     with pytest.raises(AnglesError, match="turn too little"):
         angles(still, "linkage")
-    np.testing.assert_allclose(angles(still).phi_rad, 0.0, atol=0.005)
+    np.testing.assert_allclose(angles(still, zero=still).phi_rad, 0.0, atol=0.005)
     with pytest.raises(AnglesError, match="no body 'middle'"):
         angles(nodes, bodies=("upper", "middle"))
     with pytest.raises(AnglesError, match="not known"):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from pydpend.kinematics import LinkAngles, Rest, Swing, angles, parse_zero, roll
 from pydpend.kinematics.rests import lone_sigma
 from pydpend.kinematics.vertical import Down
 from pydpend.model import Damping, Model, derived
+from pydpend.nodes import Joint, Nodes
 from pydpend.simulation import simulate
 
 from tests.support import two_links as rig
@@ -178,10 +180,84 @@ def test_a_film_rolled_by_a_quarter_turn_has_its_zero_from_the_swing() -> None:
 def test_a_recording_that_only_hangs_is_believed_and_one_that_is_only_held_is_not(links: int) -> None:
     t = np.arange(500) / FPS
     still = np.zeros((t.size, links))
-    found = filmed(t, still, 5.0)
+    found = angles(jointed(t, still, 5.0))
     np.testing.assert_array_less(off_deg(found, still), 0.2)
-    with pytest.raises(AnglesError, match=r"held still at about (39|40) deg"):
-        filmed(t, still + np.radians(40.0))
+    # No surer than the camera's roll of 5 deg.
+    assert (np.degrees(found.meta["zero"]["sigma_rad"]) > 4.0).all()
+    with pytest.raises(AnglesError, match=r"held still at about (39|41 and 40) deg"):
+        angles(jointed(t, still + np.radians(40.0)))
+
+
+def jointed(t: Floats, phi: Floats, roll_deg: float = 0.0) -> Nodes:
+    """The nodes of a film whose rig has the elbow too, the links pointing down in its reference picture."""
+    roll = np.radians(roll_deg)
+    nodes = rig.film(t, phi + roll, 41, reference_rad=(roll, roll))
+    if phi.shape[1] == 1:
+        return nodes
+    (x, y), c, s = rig.ELBOW_PX, np.cos(roll), np.sin(roll)
+    place = rig.PIVOT_PX + np.array([c * x + s * y, -s * x + c * y])
+    elbow = Joint("elbow", ("upper", "lower"), float(place[0]), float(place[1]))
+    return replace(nodes, rig=replace(nodes.rig, joints=(*nodes.rig.joints, elbow)))
+
+
+@pytest.mark.parametrize(
+    ("deg", "joints", "unknown"),
+    [
+        ((58.0, 58.0), 0, "upper and lower"),
+        ((170.0, 170.0), 0, "upper and lower"),
+        ((58.0,), 0, "upper"),
+        ((55.0, 0.0), 0, "upper and lower"),
+        ((0.0, 0.0), 0, "upper and lower"),
+        ((0.0,), 0, "upper"),
+        ((0.0, 58.0), 1, "lower"),
+        ((0.0, 0.0), 1, "lower"),
+    ],
+)
+def test_links_that_never_move_have_no_zero_without_their_joints(
+    deg: tuple[float, ...], joints: int, unknown: str
+) -> None:
+    t = np.arange(500) / FPS
+    phi = np.tile(np.radians(deg), (t.size, 1))
+    nodes = jointed(t, phi)
+    nodes = replace(nodes, rig=replace(nodes.rig, joints=nodes.rig.joints[:joints]))
+    with pytest.raises(
+        AnglesError, match=f"nothing says that they hang .* without the joint of {unknown}: it is no"
+    ) as e:
+        angles(nodes)
+    assert "pivot=" in str(e.value)
+    assert "zero='vertical'" in str(e.value)
+    # What the advice names does it.
+    lines = {"upper": "n0-n2", "lower": "n3-n8"}
+    links = nodes.rig.bodies
+    found = angles(nodes, zero="vertical", axis={name: lines[name] for name in links})
+    # The line of two markers is up to atan(15 / 125) = 6.9 deg off the link's.
+    np.testing.assert_array_less(off_deg(found, phi), 7.5)
+    still = angles(nodes, zero=jointed(t, 0 * phi))
+    np.testing.assert_array_less(off_deg(still, phi), 0.2)
+
+
+@pytest.mark.parametrize(
+    "deg", [(58.0, 58.0), (170.0, 170.0), (58.0,), (55.0, 0.0), (0.0, -20.0), (6.5, 7.5)]
+)
+def test_links_that_never_move_are_held_where_they_do_not_point_down(deg: tuple[float, ...]) -> None:
+    t = np.arange(500) / FPS
+    with pytest.raises(
+        AnglesError, match=r"held still at about [\d.]+( and [\d.]+)? deg from the picture's vertical in"
+    ):
+        angles(jointed(t, np.tile(np.radians(deg), (t.size, 1))))
+
+
+def test_a_pivot_pointed_at_says_whether_a_still_link_hangs() -> None:
+    t = np.arange(500) / FPS
+    for deg in (0.0, 58.0):
+        nodes = jointed(t, np.full((t.size, 1), np.radians(deg)))
+        nodes = replace(nodes, rig=replace(nodes.rig, joints=()))
+        if deg:
+            with pytest.raises(AnglesError, match=r"held still at about 5\d deg from the picture's vertical"):
+                angles(nodes, pivot=tuple(rig.PIVOT_PX))
+        else:
+            found = angles(nodes, pivot=tuple(rig.PIVOT_PX))
+            assert 0.9 < np.degrees(found.meta["zero"]["sigma_rad"][0]) < 3
 
 
 @pytest.mark.parametrize(

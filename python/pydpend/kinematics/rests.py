@@ -9,11 +9,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pydpend.errors import AnglesError, fault
+from pydpend.errors import AnglesError, Setting, fault
 from pydpend.kinematics.swing import Swing, within_half_turn
 from pydpend.kinematics.table import Floats
 from pydpend.kinematics.vertical import ROLL_SIGMA_DEG, Down
 from pydpend.kinematics.zero import GIVE_ZERO, Rest
+
+GIVE_PIVOT = (
+    "Point at the joint from which each link hangs with "
+    + Setting("pivot")
+    + " (px in the picture, by the links' names), name two points of each link with "
+    + Setting("axis")
+    + " and give "
+    + Setting("zero", "vertical")
+    + ", or give "
+    + Setting("zero")
+    + " with the links' angles in the rig's reference picture or a recording in which they hang at rest"
+)
+"""Advice where a joint is not known, so that the picture's vertical says nothing."""
 
 HANGS_WITHIN_RAD = np.radians(60.0)
 """A link that hangs points down in the picture to within this, or the film is rolled."""
@@ -22,10 +35,6 @@ UPRIGHT_SIGMA_RAD = np.radians(2.0)
 """Where no swing says where the links hang, the picture must: a camera set up by eye is rolled by 1 deg, and the line
 of a link's joints or markers misses its centre of mass by some 1.7 deg. A rest farther than three times this (6 deg)
 from the picture's vertical is no zero."""
-
-UNSEEN_SIGMA_RAD = np.radians(15.0)
-"""Standard uncertainty of a rest of which neither swing nor picture says whether the links hang: one that is held more
-than three times as far off is seen to be held by whoever films it."""
 
 APART_SIGMAS = 2.0
 """A rest farther than so many standard uncertainties from the swing's zero is not known to hang: if it does, one in
@@ -66,18 +75,21 @@ class Verdict(Enum):
     """The motion goes to one side of it only."""
     TILTED = auto()
     """The links do not point down in the picture."""
+    UNKNOWN = auto()
+    """Neither a swing nor the picture tells where the links hang: a joint is not known."""
 
 
 @dataclass(frozen=True, eq=False)
 class Judged:
     """A rest with what is said of it.
 
-    ``tilt_rad`` (L,): from the picture's vertical, NaN where that is not known.
+    ``tilt_rad`` (L,): from the picture's vertical, NaN where that is not known. ``links``: their names.
     """
 
     rest: Rest
     verdict: Verdict
     tilt_rad: Floats
+    links: tuple[str, ...]
 
     @property
     def hangs(self) -> bool:
@@ -101,7 +113,8 @@ def judge(
     """The verdict of turns ``phi`` (T, L) and the picture on each rest.
 
     The swing decides where it is known. Else the motion must not look like one that was let go there, and the links
-    must point down within ``upright_rad``, or else within three standard deviations (`UPRIGHT_SIGMA_RAD`).
+    must point down within three standard deviations (`UPRIGHT_SIGMA_RAD`), which takes their joints. Where the caller
+    says that they hang, they must point down within ``upright_rad``, as far as the joints are known.
     """
     sigma = np.hypot(UPRIGHT_SIGMA_RAD, down.sigma_rad)
     most = np.minimum(3 * sigma if upright_rad is None else upright_rad, HANGS_WITHIN_RAD)
@@ -114,9 +127,11 @@ def judge(
             verdict = Verdict.ONE_SIDED
         elif (np.abs(tilt) > most).any():
             verdict = Verdict.TILTED
+        elif upright_rad is None and np.isnan(tilt).any():
+            verdict = Verdict.UNKNOWN
         else:
             verdict = Verdict.UNREFUTED
-        out.append(Judged(rest, verdict, tilt))
+        out.append(Judged(rest, verdict, tilt, down.links))
     return out
 
 
@@ -156,7 +171,7 @@ def hanging_rests(judged: list[Judged], swing: Swing | None, label: str) -> tupl
             fault(
                 label,
                 f"{_held(nearest, swing)}{_reason(nearest, swing)}: it is no zero",
-                GIVE_ZERO,
+                GIVE_PIVOT if nearest.verdict is Verdict.UNKNOWN else GIVE_ZERO,
             )
         )
     return [j.rest for j in kept], _notes(kept, others, swing) if kept else []
@@ -191,20 +206,15 @@ def unconfirmed(judged: list[Judged]) -> list[str]:
     kept = [j for j in judged if j.hangs]
     if any(j.verdict is Verdict.CONFIRMED for j in kept):
         return []
-    tilt = np.abs(kept[0].tilt_rad)
-    at = f", {_each(tilt)} deg from the picture's vertical" if np.isfinite(tilt).all() else ""
     return [
-        f"nothing contradicts that the links hang in {_when(kept[0].rest)}{at}, but too little of a free swing is seen "
-        "to confirm it: the zero's uncertainty says so"
+        f"nothing contradicts that the links hang in {_when(kept[0].rest)}, {_each(np.abs(kept[0].tilt_rad))} deg from "
+        "the picture's vertical, but too little of a free swing is seen to confirm it: the zero's uncertainty says so"
     ]
 
 
 def unconfirmed_sigma(zero_rad: Floats, sigma_rad: Floats, down: Down) -> Floats:
     """Standard uncertainty (L,) of a zero that no swing confirms: the links may hang as the picture's vertical says."""
-    tilt = down.off(zero_rad)
-    doubt = np.where(
-        np.isnan(tilt), UNSEEN_SIGMA_RAD, np.hypot(np.nan_to_num(tilt), np.radians(ROLL_SIGMA_DEG))
-    )
+    doubt = np.hypot(down.off(zero_rad), np.radians(ROLL_SIGMA_DEG))
     return np.asarray(np.hypot(sigma_rad, doubt))
 
 
@@ -280,6 +290,8 @@ def off_the_swing(kept: list[Rest], zero_rad: Floats, sigma_rad: Floats, swing: 
 
 def _held(j: Judged, swing: Swing | None) -> str:
     known = np.isfinite(j.tilt_rad)
+    if j.verdict is Verdict.UNKNOWN:
+        return f"the links are held still in {_when(j.rest)}"
     if known.all() or (known.any() and swing is None):
         off, what = np.abs(j.tilt_rad[known]), "from the picture's vertical"
     elif swing is not None:
@@ -297,6 +309,12 @@ def _reason(j: Judged, swing: Swing | None) -> str:
         return ", and the motion goes to one side of it only"
     if j.verdict is Verdict.TILTED:
         return ", and too little of a free swing is seen to say that the links hang there"
+    if j.verdict is Verdict.UNKNOWN:
+        unknown = " and ".join(n for n, v in zip(j.links, j.tilt_rad, strict=True) if np.isnan(v))
+        return (
+            ", and nothing says that they hang there: too little of a free swing is seen, and the picture does not "
+            f"tell without the joint of {unknown}"
+        )
     return ""
 
 
