@@ -153,7 +153,7 @@ def _parquet(
     naming: Setting | None,
 ) -> Columns:
     try:
-        file = pq.ParquetFile(pa.BufferReader(data))
+        file = pq.ParquetFile(pa.BufferReader(data), page_checksum_verification=True)
         header = tuple(file.schema_arrow.names)
     except PARQUET_FAULTS as problem:
         raise error(damaged_parquet(name, problem)) from problem

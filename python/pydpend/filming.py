@@ -348,7 +348,11 @@ def read_truth(path: StrPath) -> Truth:
     try:
         # A file, because pyarrow looks for addresses in names.
         with open(name, "rb") as file:
-            table = csv.read_csv(file) if name.endswith(".csv") else parquet.read_table(file)
+            table = (
+                csv.read_csv(file)
+                if name.endswith(".csv")
+                else parquet.read_table(file, page_checksum_verification=True)
+            )
     except PARQUET_FAULTS as problem:
         said = " ".join(str(problem).split())
         raise FilmError(fault(name, f"the truth cannot be read ({said})")) from None

@@ -70,7 +70,7 @@ def read_long(path: Path, required: Sequence[str], optional: Sequence[str] = ())
     data = read_bytes(path, TableError)
     if data[:4] == b"PAR1":
         try:
-            table = pq.ParquetFile(pa.BufferReader(data)).read()
+            table = pq.ParquetFile(pa.BufferReader(data), page_checksum_verification=True).read()
         except PARQUET_FAULTS as problem:
             raise TableError(damaged_parquet(str(path), problem)) from problem
         return of_arrow(table, str(path), required)

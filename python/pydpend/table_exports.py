@@ -133,7 +133,7 @@ def _parquet(result: TableResult, path: Path, name: str) -> None:
     import pyarrow.parquet as pq
 
     with path.open("wb") as file:
-        pq.write_table(result.to_arrow(), file)
+        pq.write_table(result.to_arrow(), file, write_page_checksum=True)
 
 
 TABLE_WRITERS: dict[str, Callable[[TableResult, Path, str], None]] = {

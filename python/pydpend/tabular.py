@@ -126,4 +126,4 @@ def write_parquet(path: Path, columns: Mapping[str, NDArray[Any]]) -> None:
 
     # A file, because pyarrow looks for addresses in names.
     with whole(path) as new, new.open("wb") as file:
-        pq.write_table(pa.table(dict(columns)), file, use_dictionary=False)
+        pq.write_table(pa.table(dict(columns)), file, use_dictionary=False, write_page_checksum=True)

@@ -90,6 +90,21 @@ def keys(path: Path) -> dict[bytes, bytes]:
     return {k: v for k, v in pq.read_metadata(path).metadata.items() if k.startswith(b"pydpend.")}
 
 
+def test_a_flipped_bit_of_the_rows_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "t.parquet"
+    nodes = some_nodes()
+    nodes.write(path)
+    whole = path.read_bytes()
+    length = int(pq.read_metadata(path).metadata[b"pydpend.row_bytes_crc32"].split()[0])
+    assert length > len(whole) / 4
+    for at in range(4, length, max(1, length // 60)):
+        path.write_bytes(whole[:at] + bytes([whole[at] ^ 1 << at % 8]) + whole[at + 1 :])
+        with pytest.raises(dp.PydpendError, match="damaged"):
+            dp.read_nodes(path)
+    path.write_bytes(whole)
+    same(nodes, dp.read_nodes(path))
+
+
 def test_a_table_that_pyarrow_wrote_again_is_read(tmp_path: Path) -> None:
     nodes = some_nodes()
     nodes.write(tmp_path / "t.parquet")

@@ -86,7 +86,7 @@ def run(args: argparse.Namespace) -> int:
     try:
         write_text(folder / "compare.json", found.to_json())
         with whole(folder / "residuals.parquet") as new, new.open("wb") as file:
-            pq.write_table(pa.table(found.to_columns()), file)
+            pq.write_table(pa.table(found.to_columns()), file, write_page_checksum=True)
         save(comparison_figure(found, label=args.label), folder / f"compare.{args.format}")
         save(angles_figure(video), folder / f"angles.{args.format}")
         if line is not None:

@@ -459,7 +459,10 @@ def write_angles(angles: LinkAngles, path: AnyPath) -> None:
                 # A file, because pyarrow looks for addresses in names.
                 with new.open("wb") as file:
                     pq.write_table(
-                        table.replace_schema_metadata({META_KEY: meta}), file, use_dictionary=False
+                        table.replace_schema_metadata({META_KEY: meta}),
+                        file,
+                        use_dictionary=False,
+                        write_page_checksum=True,
                     )
             else:
                 with new.open("w", encoding="utf-8", newline="") as text:

@@ -166,9 +166,12 @@ pub(super) const KEYS: [&str; 8] =
     ["schema_version", "tool", "rig", "source", "time", "settings", "ending", "damage"];
 
 impl TableMeta {
+    /// Name of the program in tables that are written.
+    pub(super) const PROGRAM: &str = "tracker";
+
     /// The program and version that this is.
     pub fn this_tool() -> String {
-        format!("tracker {}", env!("CARGO_PKG_VERSION"))
+        format!("{} {}", Self::PROGRAM, env!("CARGO_PKG_VERSION"))
     }
 
     /// As one JSON text, of one form for one content.

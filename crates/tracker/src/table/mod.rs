@@ -23,6 +23,7 @@ mod parquet;
 mod parquet_read;
 mod rows;
 mod shared;
+mod sum;
 mod tally;
 #[cfg(test)]
 pub(crate) mod tests;

@@ -3,7 +3,6 @@
 //! Owns: the Arrow form of rows ([`batch`]), the file's properties. Snappy and version 1 pages, because every
 //! reader that people use has them, MATLAB's among them.
 
-use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -22,6 +21,7 @@ use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
 use arrow::record_batch::RecordBatch;
 
 use super::shared::{GROUP_ROWS, write_fault};
+use super::sum::{SUM_KEY, Summed};
 use super::{COLUMNS, Rows, STATUS_WORDS, TableMeta};
 use crate::error::{Error, Fault, Result};
 use crate::output::NewFile;
@@ -94,7 +94,7 @@ pub fn batch(rows: &Rows, range: std::ops::Range<usize>, rig: &Rig) -> Result<Re
 pub(super) struct Writer {
     path: PathBuf,
     rig: Rig,
-    writer: ArrowWriter<File>,
+    writer: ArrowWriter<Summed>,
     new: NewFile,
 }
 
@@ -128,8 +128,8 @@ impl Writer {
         // The Arrow schema is written at the end, when its metadata are known.
         let options =
             ArrowWriterOptions::new().with_properties(properties.build()).with_skip_arrow_metadata(true);
-        let writer =
-            ArrowWriter::try_new_with_options(handle, schema(), options).map_err(|e| fault(path, e))?;
+        let writer = ArrowWriter::try_new_with_options(Summed::new(handle), schema(), options)
+            .map_err(|e| fault(path, e))?;
         Ok(Self { path: path.to_owned(), rig: rig.clone(), writer, new })
     }
 
@@ -140,10 +140,16 @@ impl Writer {
     }
 
     pub(super) fn finish(mut self, meta: &TableMeta) -> Result<()> {
+        // Every row group is written: what follows is the file's footer.
+        self.writer.sync().map_err(|e| write_fault(&self.path, &e))?;
+        let sum = self.writer.inner().sum().to_text();
         let entries = meta.entries()?.into_iter().map(|(key, text)| (format!("{KEY_PREFIX}{key}"), text));
         // In Arrow's schema too: pyarrow takes them from there, and so keeps them when it writes the table again.
         let arrow = schema().as_ref().clone().with_metadata(entries.clone().collect());
-        let entries = entries.chain([(ARROW_SCHEMA_META_KEY.to_owned(), encode_arrow_schema(&arrow))]);
+        let entries = entries.chain([
+            (ARROW_SCHEMA_META_KEY.to_owned(), encode_arrow_schema(&arrow)),
+            (SUM_KEY.to_owned(), sum),
+        ]);
         for (key, text) in entries {
             self.writer.append_key_value_metadata(KeyValue::new(key, text));
         }

@@ -23,6 +23,7 @@ use rayon::prelude::*;
 
 use super::parquet::KEY_PREFIX;
 use super::shared::read_fault;
+use super::sum::{RowSum, SUM_KEY};
 use super::{COLUMNS, NodeTable, Rows, STATUS_WORDS, TableMeta, row_fault};
 use crate::error::{Error, Fault, FaultKind, Place, Result};
 use crate::message::TRACK;
@@ -130,8 +131,31 @@ fn open(path: &Path) -> Result<(Shared, ArrowReaderMetadata, TableMeta)> {
     Ok((file, metadata, meta))
 }
 
+/// Refuses a file whose rows are not the bytes that were written. A program that writes a table of ours again keeps the sum, but
+/// not the name of the writer.
+fn check_sum(path: &Path, file: &Shared, metadata: &ArrowReaderMetadata) -> Result<()> {
+    let about = metadata.metadata().file_metadata();
+    if !about.created_by().is_some_and(|writer| writer.starts_with(TableMeta::PROGRAM)) {
+        return Ok(());
+    }
+    let entry = about.key_value_metadata().and_then(|all| all.iter().find(|kv| kv.key == SUM_KEY));
+    // Tables of earlier versions have no sum.
+    let Some(text) = entry.and_then(|kv| kv.value.as_deref()) else { return Ok(()) };
+    let bytes = From { file: Arc::clone(&file.file), at: 0 };
+    let holds = RowSum::from_text(text).map(|sum| sum.holds(bytes)).transpose();
+    if holds.map_err(|e| read_fault(path, &e))? == Some(true) {
+        return Ok(());
+    }
+    Err(Error::Table(
+        Fault::new(path.display(), "its rows are not those that were written (their checksum differs)")
+            .of_kind(FaultKind::Damaged)
+            .advice("It is damaged: copy it again, or run " + TRACK + " again"),
+    ))
+}
+
 pub(super) fn read(path: &Path) -> Result<NodeTable> {
     let (file, metadata, meta) = open(path)?;
+    check_sum(path, &file, &metadata)?;
     let name = path.display().to_string();
     let groups = metadata.metadata().row_groups();
     let mut first_rows = Vec::with_capacity(groups.len());
