@@ -56,6 +56,9 @@ def carried(
         return Carried(None, none)
     psi = solution.parameters["psi"]
     ratios = {n: solution.parameters[n] / psi for n in ratios_of(2)}
+    # No pendulum has ratios below zero, which the fit's notes say: there is nothing to be held against the parts.
+    if min(ratios.values()) <= 0:
+        return Carried(None, none)
     consistency, found = parts.check(model, ratios, ratio_covariance)
     likely = [c for c in found if c.probability >= NAMED][:MOST]
     if not consistency.contradicts:

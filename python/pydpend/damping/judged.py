@@ -18,6 +18,7 @@ from pydpend.damping.result_parts import Estimate, estimates
 from pydpend.damping.shares import energy_curve, shares, unit_works, with_measured
 from pydpend.damping.shooting import Progress, Solution, Track
 from pydpend.damping.uncertainty import covariance, identifiability
+from pydpend.errors import listed
 from pydpend.information import check_errors
 from pydpend.model import UNITS, Model
 
@@ -96,7 +97,7 @@ def judge(found: Found, progress: Progress | None = None, *, checked: bool = Tru
     cov[np.ix_(c_rows, c_rows)] += held_against.covariance
     sigma = dict(zip(kept, np.sqrt(np.diag(cov)), strict=True))
     path = shooting.trace(tracks, solution.segments, solution.parameters, solution.clock_scale)
-    fitted = fitted_model(found.model, solution.parameters)
+    fitted = fitted_model(found.model, solution)
     known = found.model.scale_known
     held = [n for n in names if values[n] <= 0.0]
     duration = float(np.sum(np.diff(solution.segments.times_s, axis=1)))
@@ -152,6 +153,8 @@ def _distance(model: Model, ratios: dict[str, float], covariance: Floats | None)
     """The distance of the joints that follows from the ratios, where no constants were given."""
     if model.scale_known or model.links == 1 or covariance is None:
         return ()
+    if min(ratios["a3"], ratios["kappa"]) <= 0:
+        return ()
     length = length_check(
         replace(model, l1_m=model.g_m_s2 * ratios["a3"] / ratios["kappa"]), ratios, covariance
     )
@@ -199,8 +202,11 @@ def _zero(recording: Recording, index: int, solution: Solution, cov: Floats) -> 
     return recording.zero_of(solution.zeros_rad[index], sigma)
 
 
-def fitted_model(model: Model, values: dict[str, float]) -> Model:
-    """The model with the fitted constants."""
+def fitted_model(model: Model, solution: Solution) -> Model:
+    """The model with the fitted constants; the given one where no pendulum has them."""
+    values = solution.parameters
+    if not_positive(solution):
+        return model
     return replace(
         model,
         lambda_kg_m2=values["lambda"],
@@ -210,6 +216,11 @@ def fitted_model(model: Model, values: dict[str, float]) -> Model:
         covariance=None,
         name=f"{model.name}, fitted",
     )
+
+
+def not_positive(solution: Solution) -> list[str]:
+    """Names of the fitted inertias and moments of gravity that are zero or below."""
+    return [n for n in RATIOS if n in solution.names and solution.parameters[n] <= 0]
 
 
 def _within_noise(solution: Solution, strict: Solution, relative: Floats) -> bool:
@@ -236,5 +247,10 @@ def _notes(recordings: Sequence[Recording], solution: Solution) -> tuple[str, ..
     if solution.stuck:
         out.append(
             f"a joint stuck in {solution.stuck} of {len(solution.segments)} segments; followed by events"
+        )
+    if wrong := not_positive(solution):
+        out.append(
+            f"{listed(wrong)} came out at zero or below, which no pendulum has: these coefficients mean nothing. Check "
+            "the model, the zeros and which part of the recording is a free decay"
         )
     return tuple(out)
