@@ -222,7 +222,7 @@ class WrongTypeError(PydpendError, TypeError):
 
 
 class RecordingWarning(UserWarning):
-    """A recording that is damaged or ended early: what was made of it lacks what is lost."""
+    """A recording that is damaged or ended early, so that something is missing, or that contradicts its given zero."""
 
 
 class AnglesError(PydpendError):

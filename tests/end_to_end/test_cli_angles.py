@@ -353,3 +353,17 @@ def test_figure_12_in_every_format(tmp_path: Path, ending: str) -> None:
     xy = two_links.places(np.stack([theta, theta], axis=1))[:, 3:] * [1, -1]
     save(methods_figure(xy, 0.05), tmp_path / f"methods.{ending}")
     assert (tmp_path / f"methods.{ending}").stat().st_size > 5000
+
+
+def test_a_zero_recording_that_was_a_hold_is_noted_once(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    still = np.arange(300) / 250, np.full((300, 2), np.radians(25.0))
+    for name, motion in (("swing", held((50.0, 50.0), 3.0)), ("hold", still)):
+        nodes = dataclasses.replace(two_links.film(motion[0], motion[1], 41), meta=META)
+        nodes.write(tmp_path / f"{name}.parquet")
+    command = ["angles", str(tmp_path / "swing.parquet"), "--zero", str(tmp_path / "hold.parquet")]
+    assert main([*command, "-o", str(tmp_path / "a.csv")]) == 0
+    said = capsys.readouterr()
+    assert said.err.count("the swing goes about a direction about 2") == 1
+    assert "zero from reference recording (+- 2" in said.out

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import pydpend as dp
 import pytest
 from numpy.typing import NDArray
 from pydpend.errors import AnglesError
@@ -417,17 +418,30 @@ def test_the_pictures_vertical_with_the_cameras_roll() -> None:
         assert found.meta["zero"]["from"] == "the picture's vertical"
 
 
-def test_a_zero_far_from_the_swings_is_told_whoever_gives_it() -> None:
+@pytest.mark.parametrize("deg", [20.0, 25.0, 40.0])
+@pytest.mark.parametrize("kind", ["given", "recording"])
+def test_a_zero_far_from_the_swings_is_told_whoever_gives_it(deg: float, kind: str) -> None:
     t, phi = held((50.0, 50.0), 3.0)
-    hung = rig.film(np.arange(300) / FPS, np.full((300, 2), np.radians(20.0)), 42)
-    for zero in (np.radians([20.0, 20.0]), hung):
-        given = -zero if isinstance(zero, np.ndarray) else zero
-        found = filmed(t, phi, zero=given)
-        (note,) = found.meta["notes"]
-        assert re.search(
-            r"the swing goes about a direction about (19|20)\.\d and (19|20)\.\d deg from the zero", note
-        )
+    hung = rig.film(np.arange(300) / FPS, np.full((300, 2), np.radians(deg)), 42)
+    with pytest.warns(dp.RecordingWarning) as warned:
+        found = filmed(t, phi, zero=hung if kind == "recording" else -np.radians([deg, deg]))
+    (note,) = found.meta["notes"]
+    assert re.search(r"the swing goes about a direction about [\d.]+ and [\d.]+ deg from the zero", note)
+    (warning,) = warned
+    assert str(warning.message) == f"nodes: {note}"
+    assert warning.filename == __file__
+    # The swing knows its zero to 0.5 deg or so, and the given angles are of a picture with a noise of 0.3 px.
+    assert np.degrees(found.meta["zero"]["sigma_rad"]) == pytest.approx(deg, abs=1.5)
+    np.testing.assert_array_less(off_deg(found, phi), 1.1 * np.degrees(found.meta["zero"]["sigma_rad"]))
+
+
+def test_a_zero_where_the_links_hang_is_taken_without_a_word() -> None:
+    t, phi = held((50.0, 50.0), 3.0)
+    hung = rig.film(np.arange(300) / FPS, np.zeros((300, 2)), 42)
     assert filmed(t, phi, zero=(0.0, 0.0)).meta["notes"] == []
+    found = filmed(t, phi, zero=hung)
+    assert found.meta["notes"] == []
+    assert (np.degrees(found.meta["zero"]["sigma_rad"]) < 0.1).all()
 
 
 def test_zero_in_words() -> None:

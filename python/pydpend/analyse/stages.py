@@ -146,16 +146,20 @@ def angles(r: Recording, options: Options, here: Path, into: Path) -> str:
         single = all(nodes.rig.indices(body).size < 2 for body in nodes.rig.bodies)
         if single and not nodes.rig.joints:
             raise DoesNotApply("no body has two markers or a joint, so there is no link and no angle")
-        found = estimate(
-            nodes,
-            estimator,
-            zero=_hanging(r, options, here, into),
-            bodies=options.bodies.split(",") if options.bodies else None,
-            mirrored=options.mirrored,
-            link_length_m=options.link_length_m,
-            gaps="stop",
-            name=r.name,
-        )
+        zero = _hanging(r, options, here, into)
+        with warnings.catch_warnings():
+            # It is among the notes of the angles, which the report shows.
+            warnings.simplefilter("ignore", RecordingWarning)
+            found = estimate(
+                nodes,
+                estimator,
+                zero=zero,
+                bodies=options.bodies.split(",") if options.bodies else None,
+                mirrored=options.mirrored,
+                link_length_m=options.link_length_m,
+                gaps="stop",
+                name=r.name,
+            )
     RecordingFolder(into).write_angles(found)
     return f"{found.links} link{'s' if found.links > 1 else ''}, {found.t_s.size} instants"
 

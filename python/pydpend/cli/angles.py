@@ -13,6 +13,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -80,23 +81,27 @@ def run(args: argparse.Namespace) -> int:
     """Runs the command; 1 if something was left out and said."""
     import numpy as np
 
+    from pydpend.errors import RecordingWarning
     from pydpend.kinematics import angles, write_angles, written_files
     from pydpend.kinematics.camera import rms_of
     from pydpend.nodes import read_nodes
 
     check_files(args, *written_files(args.output), args.figure, args.methods_figure)
     nodes = read_nodes(args.nodes)
-    found = angles(
-        nodes,
-        args.estimator,
-        zero=_zero(args.zero),
-        bodies=args.bodies.split(",") if args.bodies else None,
-        mirrored=args.mirrored,
-        link_length_m=args.link_length_m,
-        axis=_axes(args.axis),
-        pivot=_pivots(args.pivot),
-        gaps=args.gaps,
-    )
+    with warnings.catch_warnings():
+        # It is among the notes, which are printed below.
+        warnings.simplefilter("ignore", RecordingWarning)
+        found = angles(
+            nodes,
+            args.estimator,
+            zero=_zero(args.zero),
+            bodies=args.bodies.split(",") if args.bodies else None,
+            mirrored=args.mirrored,
+            link_length_m=args.link_length_m,
+            axis=_axes(args.axis),
+            pivot=_pivots(args.pivot),
+            gaps=args.gaps,
+        )
     write_angles(found, args.output)
     if args.figure:
         from pydpend.plots.angles import angles_figure

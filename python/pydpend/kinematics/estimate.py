@@ -99,6 +99,12 @@ def angles(
         For a body never seen, or in one marker only; links in the wrong order, where the rig has no pivot; no rest
         found, or one in which the links are held and do not hang; a turn that may be lost; links that turn too little
         for a linkage; a given pivot that the motion contradicts.
+
+    Warns
+    -----
+    RecordingWarning
+        For a zero by a recording or by angles that is not where the links hang, by their swing;
+        ``meta["zero"]["sigma_rad"]`` holds the distance.
     """
     if method is not None:
         raise AnglesError(

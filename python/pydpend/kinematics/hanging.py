@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from pydpend.errors import AnglesError, Setting, fault
+from pydpend.errors import AnglesError, RecordingWarning, Setting, fault
 from pydpend.kinematics.linkage_frames import LinkageAngles, turns_by
 from pydpend.kinematics.markers import BodyMarkers, body_markers
 from pydpend.kinematics.pose import solve
@@ -112,7 +113,10 @@ def zero_for(
     mirrored: bool,
     label: str,
 ) -> tuple[Floats, dict[str, Any], list[str]]:
-    """The zero to take off the turns ``phi`` (T, L) to have angles, (L,), its origin, and what is doubtful."""
+    """The zero to take off the turns ``phi`` (T, L) to have angles, (L,), its origin, and what is doubtful.
+
+    Warns with RecordingWarning of a zero that the swing contradicts.
+    """
     links = phi.shape[1]
     given = _given(zero, links)
     if isinstance(zero, str) and zero not in ("rest", "reference_frame") and not is_direction(zero):
@@ -159,12 +163,20 @@ def zero_for(
     else:
         assert isinstance(zero, Nodes)
         value, meta, notes = _zero_from_reference(zero, raw, markers, bodies, mirrored)
-    if swing is not None and swing.refutes(value, np.array(meta.get("sigma_rad", 0.0))):
-        off = " and ".join(f"{v:.1f}" for v in np.degrees(np.abs(swing.off(value))))
+    stated = np.array(meta.get("sigma_rad", 0.0))
+    if swing is not None and swing.refutes(value, stated):
+        apart = np.abs(swing.off(value))
+        off = " and ".join(f"{v:.1f}" for v in np.degrees(apart))
         notes.append(
             f"the swing goes about a direction about {off} deg from the zero ({meta['from']}): the angles may be "
             "off by that"
         )
+        if not isinstance(zero, str):
+            # Who takes a picture or its directions for the zero does not say that the links hang there.
+            notes[-1] += ", and the zero's uncertainty says so"
+            meta["sigma_rad"] = np.hypot(stated, apart).tolist()
+            # Past `angles` and the check of its arguments, to its caller's line.
+            warnings.warn(f"{label}: {notes[-1]}", RecordingWarning, stacklevel=4)
     return value, meta | _told(swing, value), notes
 
 
