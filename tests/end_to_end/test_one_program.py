@@ -63,6 +63,7 @@ def test_the_help_is_the_same(command: str) -> None:
         (["info", "none.mp4"], 2),
         (["info", DEMO / "motion.parquet"], 2),
         (["check", DEMO / "drop.mp4"], 2),
+        (["info", DEMO / "drop.mp4", "--decoder", "opencv"], 2),
         (["track", DEMO / "drop.mp4"], 2),
         (["track", "x", "-o", "y.csv", "--treshold", "4"], 2),
         (["track", "x", "-o", "y.csv", "--nothing-near"], 2),

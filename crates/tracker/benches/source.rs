@@ -77,6 +77,7 @@ fn run(kind: &str, film: &Path) {
 
 /// Reads every plane: one byte of each row is looked at.
 fn read(kind: &str, film: &str) {
+    tracker::source::use_opencv_decoder();
     let decoder = if kind == "opencv" { Decoder::Opencv } else { Decoder::Ffmpeg };
     let mut source = open(film, &OpenOptions { decoder, ..OpenOptions::default() }).unwrap();
     let mut sum = 0u64;

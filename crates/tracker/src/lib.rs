@@ -29,11 +29,12 @@
 //! # Ok::<(), tracker::error::Error>(())
 //! ```
 //!
-//! Features: `ffmpeg` reads and writes compressed film, `opencv` decodes pictures, corrects lenses and draws, `cli` is the
+//! Features: `ffmpeg` reads and writes compressed film, `opencv` corrects lenses and draws, `opencv-decoder` checks the first
+//! decoder of film with OpenCV's, `cli` is the
 //! command line; all are on by default. Without the first two, cameras' own files (Photron, NorPix) and TIFF stacks are read.
 
 #![cfg_attr(
-    not(all(feature = "ffmpeg", feature = "opencv")),
+    not(feature = "opencv-decoder"),
     allow(dead_code, unused_imports, reason = "what only the left-out parts use")
 )]
 

@@ -2,17 +2,23 @@
 //!
 //! Owns: [`Picture`], [`colour`]. Must not: draw.
 
+use std::io::Cursor;
 use std::path::Path;
 
-use opencv::core::{Mat, Size, Vector};
+use image::codecs::jpeg::JpegEncoder;
+use image::{ExtendedColorType, ImageFormat};
+use opencv::core::{Mat, Size};
+use opencv::imgproc;
 use opencv::prelude::*;
-use opencv::{imgcodecs, imgproc};
 
 use crate::error::{Error, Fault, FaultKind, Result};
 use crate::frame::Frame;
 use crate::gray::gray8;
 use crate::name::text;
 use crate::output;
+
+/// Quality of JPEG pictures, of 100: lines and letters stay sharp.
+const JPEG_QUALITY: u8 = 95;
 
 /// The frame as an 8-bit picture of three channels, `size` px: in its colours where it has them, else by its brightness; black
 /// where it could not be decoded. Deep recordings are shown by their upper 8 bits.
@@ -86,17 +92,23 @@ impl Picture {
     /// [`Error::Film`] if the ending is not known or the file cannot be written.
     pub fn save(&self, path: &Path) -> Result<()> {
         let name = text(path);
-        let ending = path.extension().map_or_else(String::new, |e| format!(".{}", text(e)));
-        let mut bytes: Vector<u8> = Vector::new();
-        let done = imgcodecs::imencode_def(&ending, &self.0, &mut bytes).unwrap_or(false);
-        if !done {
+        let (rgb, [width, height]) = (self.rgb()?, self.size_px().map(|n| n as u32));
+        let (mut bytes, kind) = (Cursor::new(Vec::new()), ExtendedColorType::Rgb8);
+        let done = ImageFormat::from_path(path).and_then(|format| match format {
+            ImageFormat::Jpeg => {
+                JpegEncoder::new_with_quality(&mut bytes, JPEG_QUALITY).encode(&rgb, width, height, kind)
+            }
+            _ => image::write_buffer_with_format(&mut bytes, &rgb, width, height, kind, format),
+        });
+        if done.is_err() {
+            let ending = path.extension().map_or_else(String::new, |e| format!(".{}", text(e)));
             return Err(Error::Film(
                 Fault::new(&name, format!("pictures cannot be written as {ending:?}"))
                     .of_kind(FaultKind::Unsupported)
                     .advice("Name it .png"),
             ));
         }
-        output::write(path, bytes.as_slice()).map_err(|e| {
+        output::write(path, bytes.get_ref()).map_err(|e| {
             Error::Film(Fault::new(&name, format!("the picture cannot be written ({e})")).caused_by(&e))
         })
     }

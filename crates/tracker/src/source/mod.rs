@@ -14,17 +14,17 @@ mod input;
 mod mraw;
 mod norpix;
 mod open;
-#[cfg(all(feature = "ffmpeg", feature = "opencv"))]
-mod opencv;
-#[cfg(not(all(feature = "ffmpeg", feature = "opencv")))]
-#[path = "without_opencv.rs"]
+#[cfg(feature = "opencv-decoder")]
 mod opencv;
 mod options;
 mod orientation;
 mod raw;
+mod second;
 
 pub use crate::frame::{Ending, FrameSource, SourceInfo};
 pub(crate) use input::{Input, is_read_once};
 pub use open::{files, open};
 pub use options::{Decoder, Interlaced, OpenOptions};
 pub(crate) use options::{cores, threads_note};
+#[cfg(feature = "opencv-decoder")]
+pub use second::use_opencv_decoder;

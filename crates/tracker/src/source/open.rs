@@ -7,7 +7,7 @@ use std::io::Read;
 use std::path::PathBuf;
 
 use super::input::Input;
-use super::{Decoder, OpenOptions, cine, ffmpeg, images, mraw, norpix, opencv};
+use super::{Decoder, OpenOptions, cine, ffmpeg, images, mraw, norpix, second};
 use crate::error::{Error, Fault, FaultKind, Result};
 use crate::frame::FrameSource;
 use crate::kind::{self, Kind};
@@ -110,7 +110,7 @@ pub fn open(name: &str, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
         return Ok(Box::new(source));
     }
     match input {
-        Input::File(_) => Ok(Box::new(opencv::OpencvSource::open(name, &input, &source, options)?)),
+        Input::File(_) => second::open(name, &input, &source, options),
         _ => Err(Error::Source(
             Fault::new(name, "OpenCV's decoder reads files only")
                 .of_kind(FaultKind::Unsupported)

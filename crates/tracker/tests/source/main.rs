@@ -24,6 +24,7 @@ mod norpix;
 mod noticed;
 mod opencv;
 mod orientation;
+mod pictures;
 mod pixels;
 mod program;
 mod tiffs;

@@ -4,10 +4,17 @@ use std::path::Path;
 use std::sync::Arc;
 
 use tracker::detect::{DetectSettings, Detection, Detector, Levels};
-use tracker::frame::Ending;
-use tracker::source::{Decoder, OpenOptions, open};
+use tracker::error::Result;
+use tracker::frame::{Ending, FrameSource};
+use tracker::source::{self, Decoder, OpenOptions, use_opencv_decoder};
 
 use crate::film::{WIDTH, encode, have_ffmpeg, index_of, read_all, real, samples};
+
+/// Opens a film in a program that has the second decoder.
+fn open(name: &str, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
+    use_opencv_decoder();
+    source::open(name, options)
+}
 
 /// Centre of what is brighter than the middle of the picture's range, weighted by how much brighter.
 fn centre(values: &[u32]) -> (f64, f64) {

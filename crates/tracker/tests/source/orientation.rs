@@ -149,7 +149,9 @@ fn pictures_are_turned_as_viewers_turn_them() {
                 imgcodecs::imdecode(&Vector::<u8>::from_slice(&bytes), imgcodecs::IMREAD_GRAYSCALE).unwrap();
             let by_opencv: Vec<u32> = shown.data_bytes().unwrap().iter().map(|v| u32::from(*v)).collect();
             assert_eq!(size, (shown.cols() as u32, shown.rows() as u32), "JPEG {number}");
-            assert!(pixels == by_opencv, "JPEG {number}");
+            // Each reader rounds the inverse transform to a level.
+            let off = pixels.iter().zip(&by_opencv).map(|(a, b)| a.abs_diff(*b)).max();
+            assert!(off <= Some(1), "JPEG {number}: {off:?} levels");
             assert_eq!(size, expected.0);
         }
     }

@@ -1,55 +1,106 @@
-//! Decodes a PNG, BMP, JPEG or PGM picture in memory through OpenCV.
+//! Decodes a PNG, BMP, JPEG or PGM picture in memory.
 
-use opencv::core::{CV_8U, CV_16U, Mat, Vector};
-use opencv::imgcodecs;
-use opencv::prelude::{MatTraitConst, MatTraitConstManual};
+use std::io::Cursor;
+
+use image::codecs::bmp::BmpDecoder;
+use image::{DynamicImage, ImageFormat};
+use zune_jpeg::JpegDecoder;
+use zune_jpeg::zune_core::bytestream::ZCursor;
+use zune_jpeg::zune_core::colorspace::ColorSpace;
+use zune_jpeg::zune_core::options::DecoderOptions;
 
 use super::picture::Picture;
 use crate::source::orientation::Orientation;
 
+/// Most pixels of a JPEG picture in each direction, which is what its header can say.
+const MOST_PX: usize = u16::MAX as usize;
+/// Bits of a weight's fraction, and weights of red, green and blue in brightness: ITU-R BT.601 as OpenCV rounds it for 8 and 16 bits,
+/// so that pictures keep the brightness that they had when OpenCV read them.
+const WEIGHTS_8: (u32, [u32; 3]) = (15, [9798, 19235, 3735]);
+const WEIGHTS_16: (u32, [u32; 3]) = (14, [4899, 9617, 1868]);
+
 /// Decodes a picture, not turned as its tag says; an error is a clause without a full stop.
 pub(super) fn decode(bytes: &[u8]) -> Result<Picture, String> {
-    let bytes = Vector::<u8>::from_slice(bytes);
-    gray(imgcodecs::imdecode(&bytes, imgcodecs::IMREAD_UNCHANGED).map_err(|e| short(&e.message))?)
+    if bytes.starts_with(b"\xff\xd8") { jpeg(bytes) } else { plain(bytes) }
 }
 
-/// The brightness of a picture as OpenCV reads it.
-fn gray(color: Mat) -> Result<Picture, String> {
-    if color.empty() {
-        return Err("it is not a picture that can be read, or it is cut".to_owned());
-    }
-    let channels = color.channels();
-    let (gray, converted_from) = if channels == 1 {
-        (color, None)
-    } else {
-        let code = match channels {
-            3 => opencv::imgproc::COLOR_BGR2GRAY,
-            4 => opencv::imgproc::COLOR_BGRA2GRAY,
-            n => return Err(format!("it has {n} channels")),
-        };
-        let mut gray = Mat::default();
-        opencv::imgproc::cvt_color_def(&color, &mut gray, code).map_err(|e| short(&e.message))?;
-        (gray, Some(format!("{channels} channels")))
+/// A picture that is stored without loss.
+fn plain(bytes: &[u8]) -> Result<Picture, String> {
+    let unknown = "it is not a picture that can be read, or it is cut";
+    let format = image::guess_format(bytes).map_err(|_| unknown.to_owned())?;
+    let decoded = image::load_from_memory_with_format(bytes, format).map_err(|e| short(&e))?;
+    let is_gray_bmp = || {
+        let decoder = BmpDecoder::new(Cursor::new(bytes)).ok();
+        let gray = |palette: &[[u8; 3]]| palette.iter().all(|[r, g, b]| r == g && g == b);
+        decoder.is_some_and(|d| d.get_palette().is_some_and(gray))
     };
-    let depth_bits = match gray.depth() {
-        CV_8U => 8,
-        CV_16U => 16,
-        other => return Err(format!("its samples are of OpenCV's kind {other}, not 8 or 16 bit")),
+    let is_gray = format == ImageFormat::Bmp && is_gray_bmp();
+    let (width, height) = (decoded.width(), decoded.height());
+    let channels = decoded.color().channel_count();
+    let (depth_bits, samples) = match decoded {
+        DynamicImage::ImageLuma8(p) => (8, p.into_raw()),
+        DynamicImage::ImageLumaA8(p) => (8, p.pixels().map(|p| p.0[0]).collect()),
+        DynamicImage::ImageRgb8(p) => (8, brightness_8(p.as_raw(), 3)),
+        DynamicImage::ImageRgba8(p) => (8, brightness_8(p.as_raw(), 4)),
+        DynamicImage::ImageLuma16(p) => (16, little_endian(p.into_raw())),
+        DynamicImage::ImageLumaA16(p) => (16, little_endian(p.pixels().map(|p| p.0[0]))),
+        DynamicImage::ImageRgb16(p) => (16, little_endian(brightness_16(p.as_raw(), 3))),
+        DynamicImage::ImageRgba16(p) => (16, little_endian(brightness_16(p.as_raw(), 4))),
+        _ => return Err("its samples are not of 8 or 16 bit".to_owned()),
     };
-    let size = |n: i32| u32::try_from(n).map_err(|e| e.to_string());
-    // OpenCV's 16-bit samples are in this machine's order; all machines that we are built for are little-endian.
-    let samples = gray.data_bytes().map_err(|e| short(&e.message))?.to_vec();
-    Ok(Picture {
-        width: size(gray.cols())?,
-        height: size(gray.rows())?,
-        depth_bits,
-        samples,
-        converted_from,
-        orientation: Orientation::default(),
-        pixel_size: None,
-    })
+    let converted_from = (channels > 1 && !is_gray).then(|| format!("{channels} channels"));
+    Ok(picture(width, height, depth_bits, samples, converted_from))
 }
 
-fn short(message: &str) -> String {
-    message.lines().next().unwrap_or("it cannot be decoded").trim().to_owned()
+/// A JPEG picture: its own brightness where it is stored as brightness and colour differences, as nearly all are.
+fn jpeg(bytes: &[u8]) -> Result<Picture, String> {
+    let options = DecoderOptions::default().set_max_width(MOST_PX).set_max_height(MOST_PX);
+    let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), options);
+    decoder.decode_headers().map_err(|e| short(&e))?;
+    let is_gray = matches!(decoder.input_colorspace(), Some(ColorSpace::Luma | ColorSpace::YCbCr));
+    let wanted = if is_gray { ColorSpace::Luma } else { ColorSpace::RGB };
+    // Of pictures that are coded block by block `jpeg_scan` has told damage by now; of others the decoder must.
+    let is_strict = decoder.info().is_some_and(|info| info.sof.is_progressive());
+    decoder.set_options(options.jpeg_set_out_colorspace(wanted).set_strict_mode(is_strict));
+    let samples = decoder.decode().map_err(|e| short(&e))?;
+    let (width, height) = decoder.dimensions().ok_or("it has no size")?;
+    let (samples, converted_from) =
+        if is_gray { (samples, None) } else { (brightness_8(&samples, 3), Some("3 channels".to_owned())) };
+    Ok(picture(width as u32, height as u32, 8, samples, converted_from))
+}
+
+fn picture(
+    width: u32,
+    height: u32,
+    depth_bits: u32,
+    samples: Vec<u8>,
+    converted_from: Option<String>,
+) -> Picture {
+    let orientation = Orientation::default();
+    Picture { width, height, depth_bits, samples, converted_from, orientation, pixel_size: None }
+}
+
+/// Brightness of pixels of some channels, the first three red, green and blue.
+fn brightness_8(samples: &[u8], channels: usize) -> Vec<u8> {
+    let pixels = samples.chunks_exact(channels);
+    pixels.map(|p| weighted([p[0], p[1], p[2]].map(u32::from), WEIGHTS_8) as u8).collect()
+}
+
+/// The same of 16 bits.
+fn brightness_16(samples: &[u16], channels: usize) -> impl Iterator<Item = u16> {
+    let pixels = samples.chunks_exact(channels);
+    pixels.map(|p| weighted([p[0], p[1], p[2]].map(u32::from), WEIGHTS_16) as u16)
+}
+
+fn weighted(pixel: [u32; 3], (bits, weights): (u32, [u32; 3])) -> u32 {
+    let sum: u32 = pixel.iter().zip(weights).map(|(v, w)| v * w).sum();
+    (sum + (1 << (bits - 1))) >> bits
+}
+
+fn little_endian(samples: impl IntoIterator<Item = u16>) -> Vec<u8> {
+    samples.into_iter().flat_map(u16::to_le_bytes).collect()
+}
+
+fn short(error: &impl ToString) -> String {
+    error.to_string().lines().next().unwrap_or("it cannot be decoded").trim().to_owned()
 }

@@ -2,10 +2,6 @@
 //!
 //! Owns: [`SequenceSource`], [`StackSource`].
 
-#[cfg(feature = "opencv")]
-mod coded_picture;
-#[cfg(not(feature = "opencv"))]
-#[path = "without_coded_picture.rs"]
 mod coded_picture;
 mod jpeg_bits;
 mod jpeg_scan;

@@ -42,9 +42,8 @@ pub fn read(path: &Path) -> Result<Picture, String> {
         return Ok(picture);
     }
     believable(head, &mut file)?;
-    // From memory: a name for OpenCV would have to be UTF-8.
     let bytes = std::fs::read(path).map_err(|e| format!("it cannot be read ({e})"))?;
-    // OpenCV would fill up what is damaged, or complain on standard error.
+    // Decoders fill up what is damaged.
     match bytes.starts_with(b"\xff\xd8") {
         true => jpeg_scan::check(&bytes)?,
         false => png_sums::check(&bytes)?,
@@ -84,7 +83,6 @@ fn believable(head: &[u8], file: &mut File) -> Result<(), String> {
     let length = file.metadata().map_err(|e| e.to_string())?.len();
     match size {
         Some((w, h)) if u128::from(w) * u128::from(h) <= u128::from(length) * pixels_per_byte => {
-            // libpng would complain on standard error.
             match head.starts_with(b"\x89PNG") && !tail(file, 64)?.windows(4).any(|w| w == b"IEND") {
                 true => Err("it is cut".to_owned()),
                 false => Ok(()),
