@@ -86,7 +86,7 @@ fn brightness_8(samples: &[u8], channels: usize) -> Vec<u8> {
     pixels.map(|p| weighted([p[0], p[1], p[2]].map(u32::from), WEIGHTS_8) as u8).collect()
 }
 
-/// The same of 16 bits.
+/// Brightness of pixels of some channels of 16 bits.
 fn brightness_16(samples: &[u16], channels: usize) -> impl Iterator<Item = u16> {
     let pixels = samples.chunks_exact(channels);
     pixels.map(|p| weighted([p[0], p[1], p[2]].map(u32::from), WEIGHTS_16) as u16)
