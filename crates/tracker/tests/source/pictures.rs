@@ -89,6 +89,25 @@ fn pictures_without_loss_have_the_same_bits() {
 }
 
 #[test]
+fn samples_that_do_not_fill_their_bits_stay_as_they_are() {
+    let folder = tempfile::tempdir().unwrap();
+    for most in [100u32, 255, 1023, 4095, 65535] {
+        let values: Vec<u32> = (0..=49).map(|k| k * most / 49).collect();
+        let wide = |v: &u32| if most > 255 { (*v as u16).to_be_bytes().to_vec() } else { vec![*v as u8] };
+        let words: Vec<String> = values.iter().map(ToString::to_string).collect();
+        for (head, data) in [
+            (format!("P5\n# of a camera\n10 5\n{most}\n"), values.iter().flat_map(wide).collect()),
+            (format!("P2 10 5\n#12\n{most}\n"), [words.join(" "), "\n".into()].concat().into_bytes()),
+        ] {
+            let bytes: Vec<u8> = [head.as_bytes(), &data[..]].concat();
+            let (ours, from) = read(folder.path(), ".pgm", &bytes);
+            assert!((ours, from) == (values.clone(), None), "{head}");
+            assert_eq!(by_opencv(&bytes), values, "{head}");
+        }
+    }
+}
+
+#[test]
 fn jpeg_pictures_differ_by_what_rounding_does() {
     let folder = tempfile::tempdir().unwrap();
     for channels in [1, 3] {

@@ -28,7 +28,9 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Picture, String> {
 fn plain(bytes: &[u8]) -> Result<Picture, String> {
     let unknown = "it is not a picture that can be read, or it is cut";
     let format = image::guess_format(bytes).map_err(|_| unknown.to_owned())?;
-    let decoded = image::load_from_memory_with_format(bytes, format).map_err(|e| short(&e))?;
+    let unstretched = if format == ImageFormat::Pnm { unstretched(bytes) } else { None };
+    let decoded = image::load_from_memory_with_format(unstretched.as_deref().unwrap_or(bytes), format)
+        .map_err(|e| short(&e))?;
     let is_gray_bmp = || {
         let decoder = BmpDecoder::new(Cursor::new(bytes)).ok();
         let gray = |palette: &[[u8; 3]]| palette.iter().all(|[r, g, b]| r == g && g == b);
@@ -67,6 +69,31 @@ fn jpeg(bytes: &[u8]) -> Result<Picture, String> {
     let (samples, converted_from) =
         if is_gray { (samples, None) } else { (brightness_8(&samples, 3), Some("3 channels".to_owned())) };
     Ok(picture(width as u32, height as u32, 8, samples, converted_from))
+}
+
+/// A PGM or PPM picture that says that its samples go up to all that their bytes can hold; `None` where it says so itself or is of
+/// another kind. Samples that go up to less are stretched by `image`, and 12 bits would become others.
+fn unstretched(bytes: &[u8]) -> Option<Vec<u8>> {
+    if !matches!(bytes, [b'P', b'2' | b'3' | b'5' | b'6', ..]) {
+        return None;
+    }
+    // Width, height and the greatest sample, parted by white space and comments.
+    let (mut from, mut to) = (0, 2);
+    for _ in 0..3 {
+        from = to;
+        while let Some(byte) = bytes.get(from) {
+            match byte {
+                b'#' => from += bytes[from..].iter().position(|b| *b == b'\n')?,
+                b if b.is_ascii_whitespace() => from += 1,
+                _ => break,
+            }
+        }
+        to = from + bytes[from..].iter().position(|b| !b.is_ascii_digit())?;
+    }
+    let greatest: u32 = std::str::from_utf8(&bytes[from..to]).ok()?.parse().ok()?;
+    let held = if greatest > 255 { 65535 } else { 255 };
+    let changed = [&bytes[..from], held.to_string().as_bytes(), &bytes[to..]].concat();
+    (1..held).contains(&greatest).then_some(changed)
 }
 
 fn picture(
