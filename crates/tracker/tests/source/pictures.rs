@@ -27,18 +27,20 @@ fn drawn(channels: usize, most: u32) -> Vec<u32> {
 /// A picture of 8 or 16 bits as a file of the kind that an ending names.
 fn coded(ending: &str, channels: usize, depth_bits: u32) -> Vec<u8> {
     let values = drawn(channels, (1 << depth_bits) - 1);
-    let mut bytes = Vector::<u8>::new();
-    let mut write = |flat: &Mat| {
-        let picture = flat.reshape(channels as i32, ROWS as i32).unwrap();
-        assert!(imgcodecs::imencode_def(ending, &picture, &mut bytes).unwrap());
-    };
     if depth_bits == 8 {
         let samples: Vec<u8> = values.iter().map(|v| *v as u8).collect();
-        write(&Mat::from_slice(&samples).unwrap());
+        file(ending, channels, &Mat::from_slice(&samples).unwrap())
     } else {
         let samples: Vec<u16> = values.iter().map(|v| *v as u16).collect();
-        write(&Mat::from_slice(&samples).unwrap());
+        file(ending, channels, &Mat::from_slice(&samples).unwrap())
     }
+}
+
+/// Samples in one row as a picture in a file.
+fn file(ending: &str, channels: usize, row: &impl MatTraitConst) -> Vec<u8> {
+    let picture = row.reshape(channels as i32, ROWS as i32).unwrap();
+    let mut bytes = Vector::<u8>::new();
+    assert!(imgcodecs::imencode_def(ending, &picture, &mut bytes).unwrap());
     bytes.iter().collect()
 }
 
