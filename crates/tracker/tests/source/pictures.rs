@@ -104,7 +104,8 @@ fn samples_that_do_not_fill_their_bits_stay_as_they_are() {
             let bytes: Vec<u8> = [head.as_bytes(), &data[..]].concat();
             let (ours, from) = read(folder.path(), ".pgm", &bytes);
             assert!((ours, from) == (values.clone(), None), "{head}");
-            assert_eq!(by_opencv(&bytes), values, "{head}");
+            // OpenCV stretches those that are written as words.
+            assert!(head.starts_with("P2") || by_opencv(&bytes) == values, "{head}");
         }
     }
 }

@@ -14,10 +14,11 @@ use crate::source::orientation::Orientation;
 
 /// Most pixels of a JPEG picture in each direction, which is what its header can say.
 const MOST_PX: usize = u16::MAX as usize;
-/// Bits of a weight's fraction, and weights of red, green and blue in brightness: ITU-R BT.601 as OpenCV rounds it for 8 and 16 bits,
-/// so that pictures keep the brightness that they had when OpenCV read them.
-const WEIGHTS_8: (u32, [u32; 3]) = (15, [9798, 19235, 3735]);
-const WEIGHTS_16: (u32, [u32; 3]) = (14, [4899, 9617, 1868]);
+/// Weights of red, green and blue in brightness, of [`WEIGHTS_SUM`]: ITU-R BT.601 as OpenCV rounds it, so that pictures keep the
+/// brightness that they had when OpenCV read them.
+const WEIGHTS: [u32; 3] = [9798, 19235, 3735];
+/// Sum of the weights.
+const WEIGHTS_SUM: u32 = 1 << 15;
 
 /// Decodes a picture, not turned as its tag says; an error is a clause without a full stop.
 pub(super) fn decode(bytes: &[u8]) -> Result<Picture, String> {
@@ -110,18 +111,18 @@ fn picture(
 /// Brightness of pixels of some channels, the first three red, green and blue.
 fn brightness_8(samples: &[u8], channels: usize) -> Vec<u8> {
     let pixels = samples.chunks_exact(channels);
-    pixels.map(|p| weighted([p[0], p[1], p[2]].map(u32::from), WEIGHTS_8) as u8).collect()
+    pixels.map(|p| weighted([p[0], p[1], p[2]].map(u32::from)) as u8).collect()
 }
 
 /// Brightness of pixels of some channels of 16 bits.
 fn brightness_16(samples: &[u16], channels: usize) -> impl Iterator<Item = u16> {
     let pixels = samples.chunks_exact(channels);
-    pixels.map(|p| weighted([p[0], p[1], p[2]].map(u32::from), WEIGHTS_16) as u16)
+    pixels.map(|p| weighted([p[0], p[1], p[2]].map(u32::from)) as u16)
 }
 
-fn weighted(pixel: [u32; 3], (bits, weights): (u32, [u32; 3])) -> u32 {
-    let sum: u32 = pixel.iter().zip(weights).map(|(v, w)| v * w).sum();
-    (sum + (1 << (bits - 1))) >> bits
+fn weighted(pixel: [u32; 3]) -> u32 {
+    let sum: u32 = pixel.iter().zip(WEIGHTS).map(|(v, w)| v * w).sum();
+    (sum + WEIGHTS_SUM / 2) / WEIGHTS_SUM
 }
 
 fn little_endian(samples: impl IntoIterator<Item = u16>) -> Vec<u8> {
