@@ -25,7 +25,7 @@ CALLS: dict[str, tuple[str, str, Callable[[Any], object]]] = {
     "compare": ("video", "LinkAngles", lambda x: dp.compare(x, ANGLES)),
     "compare with": ("encoder", "LinkAngles", lambda x: dp.compare(ANGLES, x)),
     "encoder_angles": ("signal", "EncoderSignal", lambda x: dp.encoder_angles(x)),
-    "export": ("nodes", "Nodes", lambda x: dp.export(x, "out.mat")),
+    "export": ("result", "Nodes or TableResult", lambda x: dp.export(x, "out.mat")),
     "find_linkage": ("nodes", "Nodes", lambda x: dp.find_linkage(x)),
     "find_rest": ("angles", "LinkAngles", lambda x: dp.find_rest(x)),
     "fit_damping": ("angles", "LinkAngles", lambda x: dp.fit_damping(x, MODEL)),
