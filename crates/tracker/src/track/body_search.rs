@@ -185,8 +185,8 @@ impl Bodies {
         self.mechanism.links[b].template.iter().map(far).fold(0.0, f64::max)
     }
 
-    /// A body of which one node is left, held by a joint, where its motion so far predicts it within 1.5 px: a half hidden marker
-    /// is off by less.
+    /// A body of which one node is left, held by a joint, where its motion so far predicts it within 1.5 px, which a half hidden
+    /// marker may be off, or within 3 px where its area shows that it is whole.
     fn find_last_node(
         &self,
         b: usize,

@@ -32,7 +32,7 @@ const PARTS: usize = 2;
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct EdgeLookup {
     pub(super) spot: Spot,
-    /// The edge's normal, inwards from the disc's edge to larger coverage.
+    /// Direction from the disc's centre to the pixel: a disc that moves that way covers more of the pixel.
     pub(super) normal: [[f32; LANES]; 2],
     /// Coverage and its slopes by x, y, radius and path, of a disc that moves.
     pub(super) sums: [[f32; LANES]; 6],
