@@ -39,7 +39,7 @@ help:
 
 # Always the whole workspace: one choice of features, so that nothing is built twice.
 build: .make/system .make/venv
-	@[ -e $(EXTENSION) ] || echo "Building, about 5 minutes on two cores the first time"
+	@[ -e $(EXTENSION) ] || echo "Building, up to 7 minutes on two cores the first time"
 	@cargo build $(CARGO_FLAGS)
 	@cmp -s target/release/lib_native.so $(EXTENSION) || \
 	    { cp target/release/lib_native.so $(EXTENSION).new && mv $(EXTENSION).new $(EXTENSION); }

@@ -303,9 +303,9 @@ def causes(model: Model, ratios: dict[str, float], covariance: Floats) -> tuple[
 
 
 def of_length(model: Model, length: LengthCheck) -> tuple[Cause, ...]:
-    """Changes of g, clock and l1, by as much as the motion measures, as if there were two of them.
+    """Changes of g, clock and l1, each by as much as the motion measures, with a probability of 1/2 each.
 
-    A wrong clock and a wrong g change the coefficients alike.
+    A wrong clock and a wrong g change the coefficients alike, so that the three are two cases.
     """
     out = []
     for name, words, change in CAUSES[:3]:
