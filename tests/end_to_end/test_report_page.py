@@ -16,6 +16,9 @@ from tests.support.browsing import open_report, until
 
 FRAMES, RATE, STEP = 60, 30.0, 0.05
 HOSTILE = "<script>alert(1)</script>"
+SENTENCE = (
+    "0.024 deg noise, 0.0011 deg camera (one error of all frames, which no number of them averages out)" * 2
+)
 
 
 @pytest.fixture(scope="module")
@@ -57,6 +60,17 @@ def html(mp4: bytes, tmp_path_factory: pytest.TempPathFactory) -> Path:
         warnings=(f"a node called {HOSTILE}",),
         sections=(
             p.Section("answer", "Results", (p.Table(("quantity", "value"), ((HOSTILE, "1.0 ± 0.1"),)),)),
+            p.Section(
+                "recording",
+                "Recording",
+                (
+                    p.Table(
+                        ("property", "film"),
+                        (("phi1", SENTENCE), ("rate", "1000 per s")),
+                        numbers=frozenset({1}),
+                    ),
+                ),
+            ),
             p.Section(
                 "angles",
                 "Angles",
@@ -265,4 +279,7 @@ def test_it_fits_the_width(browser: Browser, html: Path, width: int, scheme: str
     page.goto(html.as_uri())
     until(page, "window.pydpendReport?.ready === true")
     assert page.evaluate("document.documentElement.scrollWidth") <= width
+    if width > 1000:
+        wide = page.locator("#recording .scroll").evaluate("e => e.scrollWidth - e.clientWidth")
+        assert wide <= 0, "a table with a sentence in it is wider than the page"
     context.close()

@@ -53,6 +53,10 @@ class Code(_Block):
     text: str
 
 
+LONGEST_NUMBER = 32
+"""Characters: a value, its uncertainty and its unit fit in; what is longer is a sentence."""
+
+
 @dataclass(frozen=True)
 class Table(_Block):
     """Cells as text; ``numbers`` are the columns set to the right."""
@@ -65,6 +69,12 @@ class Table(_Block):
     def is_number(self, column: int) -> bool:
         """Whether the column holds numbers."""
         return column in self.numbers
+
+    def cell_class(self, column: int, cell: str) -> str:
+        """The cell's class of style: ``number`` is not broken over lines, ``number words`` is."""
+        if not self.is_number(column):
+            return ""
+        return "number words" if len(cell) > LONGEST_NUMBER else "number"
 
 
 @dataclass(frozen=True)
