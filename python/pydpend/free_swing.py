@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
+from pydpend.documents import Table
 from pydpend.errors import SELECT, AnglesError, Setting, fault
 from pydpend.json_text import plain
 from pydpend.kinematics import LinkAngles
@@ -129,6 +130,47 @@ class RingDown(TableResult):
         """
         table = ("t_s", "amplitude_rad", "amplitude_sigma_rad")
         return {f.name: plain(getattr(self, f.name)) for f in fields(self) if f.name not in table}
+
+    @classmethod
+    def of_table(cls, table: Table) -> RingDown:
+        """The swing from the plain values of `to_dict`, of a document that is read already.
+
+        Parameters
+        ----------
+        table : pydpend.documents.Table
+            What `to_dict` gave.
+
+        Returns
+        -------
+        RingDown
+            The swing, without its turning points.
+
+        Raises
+        ------
+        PydpendError
+            Naming the key that is missing or not what it must be; of the kind of the document's errors.
+        """
+        none = np.zeros(0)
+        chi2 = table.table("chi2_by_laws")
+        numbers = {
+            f.name: table.number_or_nan(f.name) for f in fields(cls) if f.type == "float" and f.name != "q"
+        }
+        q = table.number_or_nan("q")
+        return cls(
+            name=table.text("name"),
+            link=table.text("link"),
+            swings=table.whole("swings"),
+            laws=table.texts("laws"),
+            rates=table.numbers_or_nan("rates"),
+            rates_sigma=table.numbers_or_nan("rates_sigma"),
+            # Without losses it is infinite, which JSON cannot hold.
+            q=float("inf") if np.isnan(q) else q,
+            chi2_by_laws={laws: chi2.number_or_nan(laws) for laws in chi2},
+            t_s=none,
+            amplitude_rad=none,
+            amplitude_sigma_rad=none,
+            **numbers,
+        )
 
 
 @typed()

@@ -118,7 +118,7 @@ class LinkStates(TableResult):
         """
         names = ("phi#_rad", "w#_rad_s", "a#_rad_s2")
         values = (self.phi_rad, self.w_rad_s, self.a_rad_s2)
-        sigmas = np.sqrt(np.diagonal(self.covariance, axis1=2, axis2=3))
+        sigmas = np.sqrt(np.maximum(np.diagonal(self.covariance, axis1=2, axis2=3), 0.0))
         columns = {"time_s": self.t_s} | dict(zip(names, values, strict=True))
         columns |= {f"sigma_{name}": sigmas[:, :, k] for k, name in enumerate(names)}
         return by_link(columns, self.link_names if len(self.link_names) > NUMBERED else ())

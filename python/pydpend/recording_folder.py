@@ -19,8 +19,10 @@ from pydpend.damping import Prediction
 from pydpend.documents import Table, read_json
 from pydpend.encoder import Calibration, Comparison, read_calibration
 from pydpend.errors import ANALYSE, PydpendError, fault
+from pydpend.free_swing import RingDown
 from pydpend.json_text import write_json
 from pydpend.kinematics import LinkAngles, read_angles, write_angles
+from pydpend.link_states import LinkStates, PointStates
 from pydpend.nodes import Nodes, read_nodes
 from pydpend.output import write_text
 from pydpend.tabular import write_csv, write_parquet
@@ -53,6 +55,15 @@ class RunFile(Words):
     COMPARISON_FIGURE = "comparison.png", "film against encoder (Fig. 15)"
     OVERLAY = "overlay.mp4", "the film with nodes, names and bodies drawn in"
     OVERLAY_ABOUT = "overlay.json", "times of its frames in the recording"
+    STATES = (
+        "states.parquet",
+        "angles, rates and accelerations of the links with their standard uncertainties, SI",
+    )
+    STATES_ABOUT = "states.json", "names of these links, and why no period is told"
+    SWING = "swing.json", "a single pendulum's period, law of damping, logarithmic decrement and Q"
+    SWING_TABLE = "swing.csv", "its turning points: time and amplitude"
+    POINTS = "points.parquet", "places, velocities and accelerations of joints and markers"
+    POINTS_ABOUT = "points.json", "their unit, scale and origin"
     WINDOWS = "windows.csv", "error of each predicted window, degrees"
 
 
@@ -77,6 +88,30 @@ class StoredOverlay:
     size_px: tuple[int, int]
     every: int
     """One frame in so many of the recording."""
+
+
+@dataclass(frozen=True, eq=False)
+class StoredStates:
+    """Angles, rates and accelerations of L links at T times, each (T, L), SI; NaN where not known."""
+
+    t_s: Floats
+    link_names: tuple[str, ...]
+    phi_rad: Floats
+    w_rad_s: Floats
+    a_rad_s2: Floats
+    no_swing: str
+    """Why a single pendulum has no period; empty where it has or there are several links."""
+
+
+@dataclass(frozen=True, eq=False)
+class StoredPoints:
+    """Speeds of P points at T times, (T, P), in ``unit``/s, and how their places were had."""
+
+    t_s: Floats
+    names: tuple[str, ...]
+    unit: str
+    speed: Floats
+    about: dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -115,6 +150,23 @@ class RecordingFolder:
         """Writes the angles and how they were had."""
         write_angles(angles, self.file(RunFile.ANGLES))
         write_json(self.file(RunFile.ANGLES_ABOUT), angles.meta)
+
+    def write_states(self, found: LinkStates, no_swing: str) -> None:
+        """Writes rates and accelerations, and why no period is told."""
+        write_parquet(self.file(RunFile.STATES), found.to_columns())
+        names = list(found.link_names) or [str(k + 1) for k in range(found.phi_rad.shape[1])]
+        about = {"links": names, "columns": list(found.to_columns()), "no_swing": no_swing}
+        write_json(self.file(RunFile.STATES_ABOUT), about | {"sigma_factor": found.sigma_factor})
+
+    def write_swing(self, found: RingDown) -> None:
+        """Writes a single pendulum's free swing."""
+        write_json(self.file(RunFile.SWING), found.to_dict())
+        write_csv(self.file(RunFile.SWING_TABLE), found.to_columns())
+
+    def write_points(self, found: PointStates, about: dict[str, Any]) -> None:
+        """Writes places, velocities and accelerations of points, and how their places were had."""
+        write_parquet(self.file(RunFile.POINTS), found.to_columns())
+        write_json(self.file(RunFile.POINTS_ABOUT), about | {"points": found.names, "unit": found.unit})
 
     def write_comparison(self, found: Comparison) -> None:
         """Writes the film against the encoder."""
@@ -157,6 +209,44 @@ class RecordingFolder:
     def angles_about(self) -> dict[str, Any]:
         """The origin of the angles: `LinkAngles.meta`."""
         return read_document(self.file(RunFile.ANGLES_ABOUT)).values
+
+    def states(self) -> StoredStates:
+        """Rates and accelerations of the links."""
+        about = read_document(self.file(RunFile.STATES_ABOUT))
+        links, columns = about.texts("links"), about.texts("columns")
+        # Of each link angle, rate, acceleration, in the order of `LinkStates.to_columns`; uncertainties come after.
+        count = len(links)
+        table = read_table(self.file(RunFile.STATES), *columns)
+        if len(columns) != 1 + 6 * count:
+            raise RunFileError(fault(str(self.folder), f"{len(columns)} columns of {count} links", AGAIN))
+        phi, w, a = (
+            np.column_stack([table[name] for name in columns[1 + k * count : 1 + (k + 1) * count]])
+            for k in range(3)
+        )
+        return StoredStates(table["time_s"], links, phi, w, a, about.text("no_swing"))
+
+    def swing(self) -> RingDown | None:
+        """A single pendulum's free swing, if there is one."""
+        path = self.file(RunFile.SWING)
+        if not path.exists():
+            return None
+        turns = read_table(self.file(RunFile.SWING_TABLE), "time_s", "amplitude_rad", "sigma_amplitude_rad")
+        return replace(
+            RingDown.of_table(read_document(path)),
+            t_s=turns["time_s"],
+            amplitude_rad=turns["amplitude_rad"],
+            amplitude_sigma_rad=turns["sigma_amplitude_rad"],
+        )
+
+    def points(self) -> StoredPoints:
+        """Speeds of points."""
+        about = read_document(self.file(RunFile.POINTS_ABOUT))
+        names, unit = about.texts("points"), about.text("unit")
+        speeds = [f"speed_{name}_{unit}_s" for name in names]
+        table = read_table(self.file(RunFile.POINTS), "time_s", *speeds)
+        return StoredPoints(
+            table["time_s"], names, unit, np.column_stack([table[s] for s in speeds]), about.values
+        )
 
     def calibration(self) -> Calibration | None:
         """The encoder's calibration, if there is one."""

@@ -240,7 +240,9 @@ def test_a_config_says_whatever_a_flag_can(tmp_path: Path, capsys: pytest.Captur
         "columns": "time_s=t", "hanging_deg": -180.0, "overlay": False, "threads": 3, "pixel_aspect": "4:3",
         "marker": ("3,4@5", "6.5,7"), "markers": 2, "also": "2,3", "same": ("n1=n2",), "decoder": "opencv",
         "interlaced": "as-frames", "allow_protocol": True, "frames": "0..9", "threshold": 120.0, "polarity": "dark",
-        "centroid": "contour", "region": "0,1,20,30", "min_area_px": 5.0, "max_area_px": 500.0,
+        "axis": ("upper=pivot-elbow", "lower=n3-n4"), "pivot": ("upper=1,2", "lower=3,4"), "scale": ("n0-n1=0.1",),
+        "origin": "pivot", "points": "n0,n1", "centroid": "contour", "region": "0,1,20,30",
+        "min_area_px": 5.0, "max_area_px": 500.0,
     }  # fmt: skip
     energy: dict[str, object] = {"method": "energy", "laws": "paper", "ten_coefficients": True}
     single: dict[str, object] = {"pinned": True}
@@ -323,8 +325,8 @@ def test_a_single_pendulum(tmp_path: Path) -> None:
     assert "lower" not in html.split("<script")[0]
     # Without its masses there is a page all the same, and it says what is missing.
     alone = analyse(Options(inputs=inputs[:1]), tmp_path / "alone")
-    assert alone.status == "partly"
-    assert any("Give a one-link model" in w for w in report_page(tmp_path / "alone").warnings)
+    assert (alone.status, alone.message) == ("done", "every stage that applies is done (not: Damping fit)")
+    assert "need the model of one link" in alone.reasons["fit"]
 
 
 def test_a_zero_by_the_vertical_and_how_far_it_was_off_are_in_the_report(tmp_path: Path) -> None:
@@ -356,14 +358,23 @@ def test_angles_of_anyone_are_enough_and_json_and_dry_run_tell_what_is_done(
 ) -> None:
     words = ["analyse", str(DEMO / "motion.parquet"), "-o", str(tmp_path / "run"), "--json"]
     assert main([*words, "--dry-run"]) == 0
-    assert json.loads(capsys.readouterr().out) == {"motion/angles": "to do", "fit": "to do"}
+    assert json.loads(capsys.readouterr().out) == {
+        "motion/angles": "to do",
+        "motion/states": "to do",
+        "fit": "to do",
+    }
     assert not (tmp_path / "run").exists()
     assert main([*words, "--quiet"]) == 0
     told = json.loads(capsys.readouterr().out)
-    assert (told["status"], told["stages"]) == ("done", {"motion/angles": "done", "fit": "done"})
+    assert told["status"] == "done"
+    assert told["stages"] == {"motion/angles": "done", "motion/states": "done", "fit": "done"}
     assert (tmp_path / "run" / "README.txt").read_text("utf-8").startswith("A run of pydpend")
     assert main([*words, "--dry-run", "--laws", "paper"]) == 0
-    assert json.loads(capsys.readouterr().out) == {"motion/angles": "kept", "fit": "to do"}
+    assert json.loads(capsys.readouterr().out) == {
+        "motion/angles": "kept",
+        "motion/states": "kept",
+        "fit": "to do",
+    }
 
 
 def test_a_folder_with_other_things_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -65,7 +65,7 @@ def test_the_states_of_points_in_metres(tmp_path: Path, capsys: pytest.CaptureFi
     assert np.sqrt(np.mean(pull[30:-30] ** 2)) < 2.5
     assert main([*command, "--force", "--scale", "n0-n1=0.05", "--scale", "A-D=0.2100,1e-6"]) == 0
     for line, message in (
-        (["--scale", "n0n1"], "'n0n1' names no distance"),
+        (["--scale", "n0n1"], "'n0n1' does not name two points and their distance"),
         (["--link", "crank"], "is a node table, which has no angles"),
         (["--origin", "n1"], "n1 moves by"),
     ):

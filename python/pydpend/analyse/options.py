@@ -12,6 +12,7 @@ from pydpend.errors import OptionError, Setting, Step, fault, one_of
 from pydpend.fit_options import FitOptions
 from pydpend.kinds import Kind, expect
 from pydpend.kinematics import parse_zero, roll_sigma
+from pydpend.kinematics.setting_words import axes_in_words, pivots_in_words, scales_in_words
 from pydpend.model import check_model_called
 from pydpend.option_fields import choices_of, kind_of_value, meanings, option
 from pydpend.reading_options import ReadingOptions
@@ -67,6 +68,21 @@ class Options(FitOptions, ReadingOptions):
         Pivot to elbow in m, for the scale.
     estimator : str
         How angles come from nodes: ``rigid``, ``linkage`` or ``pairwise``.
+    axis : tuple of str
+        The line of a link that is vertical or horizontal at 0, from marker or joint A to B, ``upper=pivot-elbow``;
+        once for each link.
+    pivot : tuple of str
+        Where a link of one marker hangs, ``X,Y`` or ``X,Y,SIGMA`` in px in the picture, ``bob=X,Y`` where there are
+        several; once for each link.
+    scale : tuple of str
+        A distance that is known, in m, ``n0-n3=0.1719`` or ``n0-n3=0.1719,0.0002`` with its uncertainty, between
+        markers or joints of one link or of the ground, or places in the picture (``10,20-410,22=0.5``); several are
+        averaged and compared.
+    origin : str, optional
+        Where places are counted from: a joint of the ground, or a place ``X,Y`` in px; the pivot if not given.
+    points : str, optional
+        Markers and joints whose speeds are told, with commas; the joints that move and each link's last marker if
+        not given.
     columns : str, optional
         Which columns of angles tables are which, e.g. ``time_s=t_s,phi1_rad=theta1_rad,phi2_rad=theta2_rad``.
     hanging_deg : float
@@ -103,6 +119,11 @@ class Options(FitOptions, ReadingOptions):
     mirrored: bool = False
     link_length_m: float | None = None
     estimator: str = option("rigid", choices=ESTIMATORS)
+    axis: tuple[str, ...] = ()
+    pivot: tuple[str, ...] = ()
+    scale: tuple[str, ...] = ()
+    origin: str | None = None
+    points: str | None = None
     columns: str | None = None
     hanging_deg: float = 0.0
     clockwise: bool = False
@@ -130,6 +151,9 @@ class Options(FitOptions, ReadingOptions):
             value = getattr(self, name)
             if value is not None and not value > 0:
                 raise OptionError(fault(Setting(name), f"{value:g} is not above 0", "Give a number above 0"))
+        axes_in_words(self.axis)
+        pivots_in_words(self.pivot)
+        scales_in_words(self.scale)
         for reads in (self.opened, self.detected, self.span):
             reads()
         for name in ("calibration", "column", "time_column", "rate_hz", "unit"):

@@ -52,10 +52,9 @@ def command(options: Options, folder: Path) -> str:
         flag = flag_of(f.name)
         if isinstance(value, bool):
             words.append(flag if value else flag.replace("--", "--no-", 1))
-        elif str(value).startswith("-"):
-            words.append(f"{flag}={value}")
-        else:
-            words += [flag, str(value)]
+            continue
+        for one in value if isinstance(value, tuple) else (value,):
+            words += [f"{flag}={one}"] if str(one).startswith("-") else [flag, str(one)]
     return " ".join(map(shell_word, words))
 
 

@@ -89,6 +89,7 @@ APPLIES: Mapping[str, tuple[str, ...]] = {
     "bodies": ("film", "nodes"),
     "mirrored": ("film", "nodes"),
     "link_length_m": ("film", "nodes"),
+    **dict.fromkeys(("axis", "pivot", "scale", "origin", "points"), ("film", "nodes")),
     "columns": ("angles",),
     "hanging_deg": ("angles",),
     "clockwise": ("angles",),

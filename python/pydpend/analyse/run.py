@@ -14,11 +14,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 
-from pydpend.analyse import provenance, stages
+from pydpend.analyse import motion, provenance, stages
 from pydpend.analyse.folder import UNFINISHED, Digests, RunFolder, RunFolderError, digest
 from pydpend.analyse.options import Options, check_files
 from pydpend.analyse.recordings import Recording, check_options, recordings
-from pydpend.analyse.state import Progress, RunState, StageResult, StageState, Started, Tell
+from pydpend.analyse.state import DoesNotApply, Progress, RunState, StageResult, StageState, Started, Tell
 from pydpend.documents import Table
 from pydpend.errors import OptionError, PydpendError, Setting, fault
 from pydpend.json_text import JsonResult
@@ -178,6 +178,30 @@ def _plan_page(r: Recording, options: Options, here: Path, add: Callable[..., No
         )
 
 
+def _plan_motion(
+    r: Recording, options: Options, here: Path, needs: tuple[str, ...], add: Callable[..., None]
+) -> None:
+    """Rates and accelerations, of links by their angles and of points by their places."""
+    add(
+        f"{r.name}/states",
+        f"Rates of {r.label}",
+        (f"{r.name}/angles",),
+        r.name,
+        [options.pinned, options.start_s, options.stop_s],
+        lambda into, tell, resume: motion.states(r.name, options, here, into, tell),
+    )
+    if r.kind != "angles":
+        parts = [r.digest, options.points, options.scale, options.origin, options.pivot, options.mirrored]
+        add(
+            f"{r.name}/points",
+            f"Speeds of points of {r.label}",
+            needs,
+            r.name,
+            [*parts, options.link_length_m],
+            lambda into, tell, resume: motion.points(stages.nodes_of(here, r), options, into, tell),
+        )
+
+
 def _plan_recording(
     r: Recording, options: Options, here: Path, known: Digests, add: Callable[..., None]
 ) -> None:
@@ -217,9 +241,12 @@ def _plan_recording(
             known.option(options.zero),
             options.reading_key(),
             options.link_length_m,
+            options.axis,
+            options.pivot,
         ],
         lambda into, tell, resume: stages.angles(r, options, here, into),
     )
+    _plan_motion(r, options, here, needs, add)
     if r.encoder is not None:
         add(
             f"{r.name}/encoder",
@@ -302,11 +329,17 @@ def _analyse(run: RunFolder, todo: list[Stage], options: Options, progress: Prog
     return Outcome(
         path,
         RunState.PARTLY if problems else RunState.DONE,
-        "; ".join(problems) or "every stage is done",
+        "; ".join(problems) or _all_done(found, run.facts["titles"]),
         {name: r.state for name, r in found.items()},
         {name: r.why for name, r in found.items() if r.why},
         seconds,
     )
+
+
+def _all_done(found: dict[str, StageResult], titles: dict[str, str]) -> str:
+    """The words for a run without a failure, with the stages that do not apply."""
+    apart = [titles[name] for name, r in found.items() if r.state is StageState.DOES_NOT_APPLY]
+    return f"every stage that applies is done (not: {', '.join(apart)})" if apart else "every stage is done"
 
 
 def _do(run: RunFolder, stage: Stage, tell: Tell) -> StageResult:
@@ -319,7 +352,7 @@ def _do(run: RunFolder, stage: Stage, tell: Tell) -> StageResult:
     begun = time.monotonic()
     try:
         message = stage.action(work, tell, resume)
-    except stages.DoesNotApply as reason:
+    except DoesNotApply as reason:
         run.stages.pop(stage.name, None)
         return StageResult(StageState.DOES_NOT_APPLY, str(reason))
     except PydpendError as error:

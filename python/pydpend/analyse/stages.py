@@ -14,9 +14,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pydpend.analyse.motion import no_pendulum
 from pydpend.analyse.options import Options
-from pydpend.analyse.state import Going, Note, Tell
-from pydpend.errors import PydpendError, RecordingWarning
+from pydpend.analyse.state import DoesNotApply, Going, Note, Tell
+from pydpend.errors import RecordingWarning
 from pydpend.fit_folder import FitFolder
 from pydpend.fit_status import FitStatus
 from pydpend.recording_folder import RecordingFolder, RunFile, StoredOverlay
@@ -26,10 +27,6 @@ if TYPE_CHECKING:
     from pydpend.analyse.recordings import Recording
     from pydpend.kinematics import LinkAngles
     from pydpend.nodes import Nodes
-
-
-class DoesNotApply(PydpendError):
-    """A stage that has no meaning for these recordings; nothing is wrong with them."""
 
 
 def version() -> str:
@@ -83,7 +80,7 @@ def markers(r: Recording, here: Path, into: Path) -> str:
 
     from pydpend.kinematics import misfits
 
-    nodes = _nodes(here, r)
+    nodes = nodes_of(here, r)
     off = misfits(nodes)
     folder = RecordingFolder(into)
     folder.write_residuals(nodes.t_s, off)
@@ -93,7 +90,8 @@ def markers(r: Recording, here: Path, into: Path) -> str:
     return f"RMS distance of a marker from its body's shape {math.sqrt(np.nanmean(off**2)):.4f} px"
 
 
-def _nodes(here: Path, r: Recording) -> Nodes:
+def nodes_of(here: Path, r: Recording) -> Nodes:
+    """The nodes of a recording, tracked here or given."""
     from pydpend.nodes import read_nodes
 
     return RecordingFolder(here).nodes() if r.kind == "film" else read_nodes(r.path)
@@ -116,7 +114,7 @@ def _hanging(r: Recording, options: Options, here: Path, into: Path) -> Any:
     # The same rig, so that the markers have the same names.
     folder = RecordingFolder(into)
     rig = folder.file(RunFile.ZERO_RIG)
-    _nodes(here, r).rig.write(rig)
+    nodes_of(here, r).rig.write(rig)
     # The frames are those of the recording that moves.
     reading = options.reading() | {"frames": None}
     return track_film(path, rig, **reading, output=folder.file(RunFile.ZERO), progress=False)
@@ -126,6 +124,7 @@ def angles(r: Recording, options: Options, here: Path, into: Path) -> str:
     """Nodes, or anyone's angles, to ``angles.parquet``."""
     from pydpend.kinematics import angles as estimate
     from pydpend.kinematics import read_angles
+    from pydpend.kinematics.setting_words import axes_in_words, pivots_in_words
 
     if r.kind == "angles":
         columns = None
@@ -142,9 +141,9 @@ def angles(r: Recording, options: Options, here: Path, into: Path) -> str:
         )
     else:
         estimator: Any = options.estimator
-        nodes = _nodes(here, r)
+        nodes = nodes_of(here, r)
         single = all(nodes.rig.indices(body).size < 2 for body in nodes.rig.bodies)
-        if single and not nodes.rig.joints:
+        if single and not nodes.rig.joints and not options.pivot:
             raise DoesNotApply("no body has two markers or a joint, so there is no link and no angle")
         zero = _hanging(r, options, here, into)
         with warnings.catch_warnings():
@@ -157,6 +156,8 @@ def angles(r: Recording, options: Options, here: Path, into: Path) -> str:
                 bodies=options.bodies.split(",") if options.bodies else None,
                 mirrored=options.mirrored,
                 link_length_m=options.link_length_m,
+                axis=axes_in_words(options.axis),
+                pivot=pivots_in_words(options.pivot),
                 gaps="stop",
                 name=r.name,
             )
@@ -167,6 +168,18 @@ def angles(r: Recording, options: Options, here: Path, into: Path) -> str:
 def _angles(folder: Path, found: tuple[Recording, ...]) -> list[LinkAngles]:
     folders = [(r.name, RecordingFolder(folder / r.name)) for r in found]
     return [here.angles(name) for name, here in folders if here.file(RunFile.ANGLES).exists()]
+
+
+def _check_pendulum(
+    angles: list[LinkAngles], found: tuple[Recording, ...], options: Options, folder: Path
+) -> None:
+    """Raises DoesNotApply where the recordings are of another mechanism than a fit has equations for."""
+    by_name = {r.name: r for r in found}
+    made_of = [by_name[a.name] for a in angles]
+    rigs = [None if r.kind == "angles" else nodes_of(folder / r.name, r).rig for r in made_of]
+    why = no_pendulum(angles, rigs, options)
+    if why is not None:
+        raise DoesNotApply(why)
 
 
 def encoder(r: Recording, options: Options, here: Path, into: Path) -> str:
@@ -204,6 +217,7 @@ def fit(found: tuple[Recording, ...], options: Options, folder: Path, into: Path
     from pydpend.trials import fit_trials
 
     recordings, model = _angles(folder, found), model_called(options.model)
+    _check_pendulum(recordings, found, options, folder)
     chosen = options.joint_fit(len(found) > 1)
     trials = None
     if len(recordings) > 1:
@@ -242,6 +256,7 @@ def prediction(found: tuple[Recording, ...], options: Options, folder: Path, int
     from pydpend.model import model_called
 
     recordings, model = _angles(folder, found), model_called(options.model)
+    _check_pendulum(recordings, found, options, folder)
     if options.pinned:
         recordings, model = reduced(recordings, model, True)
     out: dict[str, Prediction] = {}
@@ -270,7 +285,7 @@ def overlay(r: Recording, here: Path, into: Path, tell: Tell) -> str:
     from pydpend.tracking import info
     from pydpend.tracking import overlay as draw
 
-    nodes, folder = _nodes(here, r), RecordingFolder(into)
+    nodes, folder = nodes_of(here, r), RecordingFolder(into)
     every = max(1, -(-nodes.frame.size // MOST_PICTURES))
     width = min(PAGE_WIDTH_PX, nodes.rig.image_px[0])
     drawn = draw(

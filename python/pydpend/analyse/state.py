@@ -6,7 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TypeAlias
 
+from pydpend.errors import PydpendError
 from pydpend.worded import Words
+
+
+class DoesNotApply(PydpendError):
+    """A stage that has no meaning for these recordings; nothing is wrong with them."""
 
 
 class StageState(Words):

@@ -84,6 +84,7 @@ def run(args: argparse.Namespace) -> int:
     from pydpend.errors import RecordingWarning
     from pydpend.kinematics import angles, write_angles, written_files
     from pydpend.kinematics.camera import rms_of
+    from pydpend.kinematics.setting_words import axes_in_words, pivots_in_words
     from pydpend.nodes import read_nodes
 
     check_files(args, *written_files(args.output), args.figure, args.methods_figure)
@@ -98,8 +99,8 @@ def run(args: argparse.Namespace) -> int:
             bodies=args.bodies.split(",") if args.bodies else None,
             mirrored=args.mirrored,
             link_length_m=args.link_length_m,
-            axis=_axes(args.axis),
-            pivot=_pivots(args.pivot),
+            axis=axes_in_words(args.axis or ()),
+            pivot=pivots_in_words(args.pivot or ()),
             gaps=args.gaps,
         )
     write_angles(found, args.output)
@@ -143,29 +144,6 @@ def run(args: argparse.Namespace) -> int:
     for note in (*nodes.notes, *found.meta["notes"]):
         print(f"note: {note}", file=sys.stderr)
     return 1 if found.left_out else 0
-
-
-def _axes(words: list[str] | None) -> dict[str, str]:
-    from pydpend.errors import OptionError, Setting, fault
-
-    out = {}
-    for word in words or ():
-        link, equals, points = word.rpartition("=")
-        if not (link and equals and points):
-            problem = f"{word!r} names no link and two points"
-            raise OptionError(fault(Setting("axis"), problem, "Write upper=pivot-elbow"))
-        out[link] = points
-    return out
-
-
-def _pivots(words: list[str] | None) -> Any:
-    from pydpend.number_words import numbers
-
-    if not words:
-        return None
-    named = [word.rpartition("=") for word in words]
-    places = {link: numbers(place, "pivot") for link, _, place in named}
-    return places[""] if list(places) == [""] else places
 
 
 def _zero(text: str) -> Any:

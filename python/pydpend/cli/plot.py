@@ -27,6 +27,8 @@ def add_arguments(p: argparse.ArgumentParser) -> None:
 FIGURES = (
     "nodes",
     "angles",
+    "phase",
+    "amplitudes",
     "calibration",
     "comparison",
     "residuals",

@@ -44,6 +44,12 @@ def add_arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument(
         "--origin", metavar="WHERE", help="a joint of the ground or a place X,Y in px (default: the pivot)"
     )
+    p.add_argument(
+        "--pivot",
+        action="append",
+        metavar="[LINK=]X,Y[,SIGMA]",
+        help="where a link of one marker hangs, px in the picture, as of `pydpend angles`; again for others",
+    )
     p.add_argument("--mirrored", action="store_true", help="the film is mirror-inverted or taken from behind")
     add_force(p)
     p.add_argument("--json", action="store_true", help="what was found, as JSON on stdout")
@@ -80,7 +86,7 @@ def _of_angles(args: argparse.Namespace) -> tuple[Any, dict[str, Any], list[str]
     from pydpend.kinematics import read_angles
     from pydpend.link_states import states
 
-    for flag in ("points", "scale", "origin"):
+    for flag in ("points", "scale", "origin", "pivot"):
         if getattr(args, flag) is not None:
             problem = f"{args.table} is an angles table, which has no places"
             raise AnglesError(fault(Setting(flag), problem, "Give the node table"))
@@ -115,6 +121,7 @@ def _of_angles(args: argparse.Namespace) -> tuple[Any, dict[str, Any], list[str]
 
 def _of_points(args: argparse.Namespace) -> tuple[Any, dict[str, Any], list[str]]:
     from pydpend.kinematics import places
+    from pydpend.kinematics.setting_words import pivots_in_words, scales_in_words
     from pydpend.link_states import point_states
     from pydpend.nodes import read_nodes
 
@@ -124,8 +131,9 @@ def _of_points(args: argparse.Namespace) -> tuple[Any, dict[str, Any], list[str]
     found = places(
         read_nodes(args.table),
         args.points.split(",") if args.points else None,
-        scale=_scales(args.scale),
+        scale=scales_in_words(args.scale or ()),
         origin=args.origin,
+        pivot=pivots_in_words(args.pivot or ()),
         mirrored=args.mirrored,
     )
     moving = point_states(found)
@@ -136,22 +144,3 @@ def _of_points(args: argparse.Namespace) -> tuple[Any, dict[str, Any], list[str]
         value, sigma = 1e3 * scale["m_per_px"], 1e3 * scale["sigma_m_per_px"]
         about["said"] = [f"scale {value:.6g} +- {sigma:.2g} mm a px, one error of all places"]
     return moving.to_columns(), about, notes
-
-
-def _scales(words: list[str] | None) -> dict[str, Any] | None:
-    from pydpend.errors import OptionError
-    from pydpend.kinematics.metres import last_digit
-    from pydpend.number_words import numbers
-
-    if not words:
-        return None
-    out: dict[str, Any] = {}
-    for word in words:
-        points, equals, text = word.rpartition("=")
-        if not (points and equals):
-            problem = f"{word!r} names no distance"
-            raise OptionError(fault(Setting("scale"), problem, "Write n0-n3=0.1719, or n0-n3=0.1719,0.0002"))
-        values = numbers(text, "scale")
-        # As it is written: 0.170 is known to a millimetre.
-        out[points] = values if len(values) > 1 else (values[0], last_digit(text) / 12**0.5)
-    return out

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -14,10 +14,11 @@ from pydpend.errors import AnglesError, Setting, fault
 from pydpend.kinematics.body_view import BodyView
 from pydpend.kinematics.camera import known
 from pydpend.kinematics.estimators import poses_of
+from pydpend.kinematics.linkage import Given
 from pydpend.kinematics.linkage_frames import fit_linkage, joint_places
 from pydpend.kinematics.markers import BodyMarkers, body_markers, to_world
 from pydpend.kinematics.metres import Known, Measured, scale_of
-from pydpend.kinematics.pivots import POINTED_AT_PX
+from pydpend.kinematics.pivots import POINTED_AT_PX, with_pivots
 from pydpend.kinematics.structure import Structure
 from pydpend.kinematics.table import Floats
 from pydpend.nodes import Nodes
@@ -26,6 +27,9 @@ from pydpend.typed import typed
 
 PLACE = re.compile(r"\s*(-?[\d.]+)\s*,\s*(-?[\d.]+)\s*")
 """A point of the picture in words: ``320.5,80``."""
+
+PICTURE_M = (2e-3, 50.0)
+"""Widths in m of what a picture shows, from a microscope's to a crane's: others are told, as of a distance in mm."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -71,6 +75,32 @@ class Places(TableResult):
         few = dict(list(self.to_columns().items())[:8])
         return html_rows(repr(self)[1:-1], few)
 
+    @typed()
+    def select(self, points: Sequence[str]) -> Places:
+        """Some of the points, in the order named.
+
+        Parameters
+        ----------
+        points : sequence of str
+            Their names.
+
+        Returns
+        -------
+        Places
+            These alone.
+
+        Raises
+        ------
+        AnglesError
+            For a name that is none of theirs.
+        """
+        for name in points:
+            if name not in self.names:
+                advice = f"There are {', '.join(self.names)}"
+                raise AnglesError(fault(Setting("points"), f"there is no point {name!r}", advice))
+        k = [self.names.index(name) for name in points]
+        return replace(self, names=tuple(points), xy=self.xy[:, k], sigma=self.sigma[:, k])
+
     def to_columns(self) -> dict[str, NDArray[Any]]:
         """The places as columns of a table.
 
@@ -86,13 +116,14 @@ class Places(TableResult):
         return out
 
 
-@typed()
+@typed("pivot")
 def places(
     nodes: Nodes,
     points: Sequence[str] | None = None,
     *,
     scale: Mapping[str, float | Sequence[float]] | None = None,
     origin: str | Sequence[float] | None = None,
+    pivot: Sequence[float] | Mapping[str, Sequence[float]] | None = None,
     mirrored: bool = False,
 ) -> Places:
     """Places of markers and joints, in metres where a distance is known.
@@ -110,6 +141,8 @@ def places(
     origin : str or sequence of float, optional
         A joint of the ground or a marker that stands still, or a place (x, y) in the picture, px; the first joint of
         the ground if not given, or else the picture's first pixel.
+    pivot : sequence of float or dict of str to sequence of float, optional
+        Where a link of one marker hangs, if that was not found, as `angles` takes it.
     mirrored : bool
         Whether the film was taken from behind.
 
@@ -124,18 +157,17 @@ def places(
         For a point or a distance that is not there or not constant.
     """
     markers = body_markers(nodes, None, mirrored)
-    known_points, notes = _known_points(nodes, markers)
+    nodes, given = with_pivots(nodes, markers, pivot, mirrored)
+    known_points, notes = _known_points(nodes, markers, given)
     known_points |= {
         name: Measured(*_given(name, nodes, mirrored)) for name in _in_picture(scale or {}, origin)
     }
     names = tuple(points) if points is not None else tuple(n for n in known_points if not PLACE.fullmatch(n))
     for name in names:
         if name not in known_points:
-            raise AnglesError(
-                fault(
-                    Setting("points"), f"there is no point {name!r}", f"There are {', '.join(known_points)}"
-                )
-            )
+            problem = f"there is no point {name!r}" + (f" ({notes[0]})" if notes else "")
+            advice = f"There are {', '.join(known_points)}"
+            raise AnglesError(fault(Setting("points"), problem, advice))
     zero, said = _origin(origin, nodes, known_points, mirrored)
     xy = np.stack([np.broadcast_to(known_points[n].xy_px, (len(nodes), 2)) for n in names], axis=1) - zero
     sigma = np.stack([np.broadcast_to(known_points[n].sigma_px, (len(nodes),)) for n in names], axis=1)
@@ -145,13 +177,22 @@ def places(
     if scale:
         found, told = scale_of([Known.of(word, value, known_points) for word, value in scale.items()])
         meta["scale"], unit, factor = found, "m", found["m_per_px"]
-        notes += told
+        notes += [*told, *_odd_width(nodes.rig.image_px[0] * factor)]
     source = nodes.meta.get("source")
     label = str(source.get("name", "nodes")) if isinstance(source, dict) else "nodes"
     return Places(nodes.t_s, names, factor * xy, factor * sigma, unit, nodes.frame, meta, label)
 
 
-def _known_points(nodes: Nodes, markers: list[BodyMarkers]) -> tuple[dict[str, Measured], list[str]]:
+def _odd_width(width_m: float) -> list[str]:
+    """A note where the picture is as wide by the scale as no film of a mechanism is."""
+    if PICTURE_M[0] < width_m < PICTURE_M[1]:
+        return []
+    return [f"by the scale the picture is {width_m:.3g} m wide: are the distances in m?"]
+
+
+def _known_points(
+    nodes: Nodes, markers: list[BodyMarkers], given: Mapping[str, Given]
+) -> tuple[dict[str, Measured], list[str]]:
     """Markers, and the joints where the motion tells them, in world px; and what is doubtful."""
     out: dict[str, Measured] = {}
     poses = poses_of(markers)
@@ -165,7 +206,7 @@ def _known_points(nodes: Nodes, markers: list[BodyMarkers]) -> tuple[dict[str, M
     if not structure.joints:
         return out, []
     try:
-        linked = fit_linkage(poses, structure)
+        linked = fit_linkage(poses, structure, given)
     except AnglesError as problem:
         return out, [f"the joints are left out: {problem}"]
     xy, sigma = joint_places(linked, markers)

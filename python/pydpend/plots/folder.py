@@ -23,6 +23,7 @@ from pydpend.plots.damping import (
 )
 from pydpend.plots.encoder import calibration_figure, comparison_figure
 from pydpend.plots.nodes import nodes_figure
+from pydpend.plots.physics import amplitudes_figure, phase_portrait
 from pydpend.recording_folder import AGAIN, RunFile
 from pydpend.run_folder import StoredRecording, StoredRun, read_run
 from pydpend.trials import alone
@@ -39,6 +40,18 @@ def _nodes(run: StoredRun, r: StoredRecording) -> Figure:
 
 def _angles(run: StoredRun, r: StoredRecording) -> Figure:
     return angles_figure(r.angles())
+
+
+def _phase(run: StoredRun, r: StoredRecording) -> Figure:
+    found = r.states()
+    return phase_portrait(found, found.link_names)
+
+
+def _amplitudes(run: StoredRun, r: StoredRecording) -> Figure:
+    swing = r.swing()
+    if swing is None:
+        raise _no_table(r, "turning points")
+    return amplitudes_figure(swing)
 
 
 def _calibration(run: StoredRun, r: StoredRecording) -> Figure:
@@ -110,6 +123,10 @@ DRAWINGS = {
         RunFile.RESIDUALS,
     ),
     "angles": Drawing("angles and their standard uncertainties (Fig. 16)", _angles, RunFile.ANGLES),
+    "phase": Drawing("phase portrait: rate over angle of each link", _phase, RunFile.STATES),
+    "amplitudes": Drawing(
+        "amplitude of a single pendulum's free swing at its turning points", _amplitudes, RunFile.SWING
+    ),
     "calibration": Drawing(
         "calibration line of the encoder and its residuals (Fig. 10)", _calibration, RunFile.ENCODER
     ),

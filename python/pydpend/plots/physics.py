@@ -5,17 +5,19 @@ Functions return figures and write nothing, except `animate`, which writes a fil
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
 
+from pydpend.free_swing import RingDown
 from pydpend.linear import Section
 from pydpend.model import Model
 from pydpend.output import AnyPath, path_of
 from pydpend.plots.moving import check_film, pictures_of, write_film
-from pydpend.plots.style import COLORS, new_figure, style
+from pydpend.plots.style import COLORS, new_figure, plain, style
 from pydpend.simulation import LAWS, Simulation
 
 Array = npt.NDArray[np.float64]
@@ -69,8 +71,8 @@ def energies(run: Simulation, model: Model) -> Figure:
     return figure
 
 
-def phase_portrait(motion: Rates) -> Figure:
-    """Rate over angle of each link, the angle within one turn."""
+def phase_portrait(motion: Rates, names: Sequence[str] = ()) -> Figure:
+    """Rate over angle of each link, the angle within one turn; ``names`` of the angles for the axes."""
     with style():
         figure = new_figure(6.5, 3.2)
         axes = figure.subplots(1, motion.phi_rad.shape[1], squeeze=False)[0]
@@ -80,9 +82,33 @@ def phase_portrait(motion: Rates) -> Figure:
             # No line across the seam at half a turn.
             jump = np.abs(np.diff(phi, append=phi[-1:])) > 180
             w[jump] = np.nan
-            ax.plot(phi, w, color=COLORS[k], linewidth=0.6)
-            ax.set_xlabel(f"phi{k + 1} (deg)")
-            ax.set_ylabel(f"w{k + 1} (rad/s)")
+            ax.plot(phi, w, color=COLORS[k % len(COLORS)], linewidth=0.6)
+            one = plain(names[k]) if k < len(names) else f"phi{k + 1}"
+            ax.set_xlabel(f"{one} (deg)")
+            ax.set_ylabel("rate (rad/s)")
+    return figure
+
+
+def amplitudes_figure(swing: RingDown) -> Figure:
+    """Amplitude of a single pendulum's free swing at its turning points, deg, on a logarithmic scale.
+
+    Viscous friction alone is a straight line there; drag of the square of the speed falls faster at first, dry friction
+    faster at last.
+    """
+    with style():
+        figure = new_figure(6.5, 2.8)
+        ax = figure.subplots()
+        ax.errorbar(
+            swing.t_s,
+            np.degrees(swing.amplitude_rad),
+            np.degrees(swing.amplitude_sigma_rad),
+            fmt=".",
+            markersize=3,
+            color=COLORS[0],
+        )
+        ax.set_yscale("log")
+        ax.set_xlabel("time (s)")
+        ax.set_ylabel("amplitude (deg)")
     return figure
 
 

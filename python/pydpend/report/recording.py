@@ -16,6 +16,8 @@ from pydpend.nodes import Nodes
 from pydpend.plots.encoder import calibration_figure
 from pydpend.plots.style import inline_svg
 from pydpend.recording_folder import StoredOverlay
+from pydpend.report import motion
+from pydpend.report.motion import Motion
 from pydpend.report.page import (
     Block,
     Chart,
@@ -47,6 +49,7 @@ class Part:
     angles: LinkAngles | None = None
     meta: dict[str, Any] = field(default_factory=dict)
     film: StoredOverlay | None = None
+    motion: Motion = field(default_factory=Motion)
     comparison: Comparison | None = None
     calibration: str | None = None
     warnings: list[str] = field(default_factory=list)
@@ -62,6 +65,9 @@ class Part:
         elif self.nodes is not None:
             blocks = (*self._film_blocks(id_), *self._place_blocks(id_))
             out.append(Section(f"{id_}-places", f"Places{end}", blocks))
+        moving = self.motion.blocks(id_, self.angles, self.film is not None)
+        if moving:
+            out.append(Section(f"{id_}-motion", f"Motion{end}", tuple(moving)))
         if self.nodes is not None:
             out.append(Section(f"{id_}-nodes", f"Markers{end}", tuple(self._node_blocks(id_))))
         if self.comparison is not None:
@@ -329,6 +335,9 @@ def read(r: StoredRecording) -> Part:
             2 * np.pi
         )
         rows += [(f"range of {part.angles.columns.stem(k)}", f"{t:.2f} turns") for k, t in enumerate(turns)]
+    part.motion = motion.read(r)
+    rows += part.motion.answer()
+    part.warnings += [f"{part.label}: {note}" for note in part.motion.warnings()]
     if r.did("overlay"):
         part.film = r.overlay()
     if r.did("encoder"):
