@@ -5,11 +5,12 @@ PY := .venv/bin/python
 EXTENSION := python/pydpend/_native.abi3.so
 CARGO_FLAGS := --release --workspace --locked
 
-.PHONY: help demo screenshot test build check format bench validate wheel fixtures clean
+.PHONY: help demo screenshot test build check docs format bench validate wheel fixtures clean
 help:
 	@echo "make demo      set up, build, and go from the bundled film to out/demo/report.html"
 	@echo "make test      set up, build, and run every test, Rust and Python"
 	@echo "make check     format, lint and type checks"
+	@echo "make docs      the documentation as a site, out/site/index.html"
 	@echo "make validate  the long accuracy sweeps, into docs/validation/identity.md's tables (about an hour)"
 	@echo "make wheel     build the wheel, install it into a new environment and use it there"
 	@echo "make bench     the speed figures (criterion), and the ratios beside them"
@@ -64,6 +65,11 @@ check: build .make/dev
 	cargo check --release --locked -p tracker --lib --no-default-features
 	cargo check --release --locked -p tracker --lib --no-default-features --features ffmpeg
 	cargo check --release --locked -p tracker --lib --no-default-features --features opencv
+
+# Warnings are errors; `make test` makes it too and follows its links (tests/end_to_end/test_site.py).
+docs: build .make/dev
+	$(PY) -m sphinx -q -W --keep-going -d out/site-trees docs out/site
+	@echo "out/site/index.html"
 
 # Long: the eight scenes by twenty seeds, real motion filmed, then the estimators' sweeps.
 validate: build .make/dev

@@ -74,7 +74,7 @@ GROUPS: tuple[tuple[str, ...], ...] = (
     ("free_swing", "decay", "energy", "damping", "trials"),
     ("fit_folder", "recording_folder", "run_folder"),
     ("plots",),
-    ("report",),
+    ("citing", "report"),
     ("analyse",),
     ("cli",),
 )
