@@ -20,10 +20,14 @@ help:
 
 .make/system: tools/system-packages.txt tools/system-packages.sh
 	@[ -n "$(SKIP_SYSTEM)" ] || tools/system-packages.sh tools/system-packages.txt
-	@command -v cargo >/dev/null || { echo "cargo is missing. Install Rust with rustup (https://rustup.rs)." >&2; exit 1; }
 	@mkdir -p .make && touch $@
 
-.make/venv: pyproject.toml tools/venv.sh | .make/system
+# An environment that was deleted since is made again.
+ifeq ($(wildcard .venv/bin/pydpend),)
+$(shell rm -f .make/venv .make/dev)
+endif
+
+.make/venv: pyproject.toml tools/venv.sh tools/pip.sh | .make/system
 	@echo "Setting up .venv"
 	@PYTHON=$(PYTHON) tools/venv.sh
 	@mkdir -p .make && touch $@
@@ -35,11 +39,12 @@ help:
 
 .make/dev: .make/venv
 	@echo "Adding what tests and checks need to .venv"
-	@.venv/bin/python -m pip install -q --disable-pip-version-check --group dev
+	@tools/pip.sh --group dev
 	@touch $@
 
 # Always the whole workspace: one choice of features, so that nothing is built twice.
 build: .make/system .make/venv
+	@tools/ready.sh
 	@[ -e $(EXTENSION) ] || echo "Building, up to 7 minutes on two cores the first time"
 	@cargo build $(CARGO_FLAGS)
 	@cmp -s target/release/lib_native.so $(EXTENSION) || \

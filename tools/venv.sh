@@ -7,15 +7,21 @@ if ! "$python" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null
     echo "$python is not Python 3.11 or later. Install it, or name one: make PYTHON=python3.11 ..." >&2
     exit 1
 fi
-[ -x .venv/bin/python ] || "$python" -m venv .venv
-.venv/bin/python -m pip install -q --disable-pip-version-check "pip>=25.1"
+# Of an environment that was not made whole, nothing is kept.
+.venv/bin/python -m pip --version >/dev/null 2>&1 || rm -rf .venv
+if [ ! -e .venv ] && ! said=$("$python" -m venv .venv 2>&1); then
+    rm -rf .venv
+    echo "$python cannot make .venv ($(tail -n 1 <<<"$said")). Install python3-venv, or free some space." >&2
+    exit 1
+fi
+tools/pip.sh "pip>=25.1"
 # The package's own dependencies, read from where they are written down.
 .venv/bin/python - >.venv/requirements.txt <<'P'
 import tomllib
 with open("pyproject.toml", "rb") as f:
     print("\n".join(tomllib.load(f)["project"]["dependencies"]))
 P
-.venv/bin/python -m pip install -q --disable-pip-version-check -r .venv/requirements.txt
+tools/pip.sh -r .venv/requirements.txt
 # From the source tree: the compiled half is copied beside it by `make build`.
 site=$(.venv/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')
 echo "$PWD/python" >"$site/pydpend-tree.pth"
