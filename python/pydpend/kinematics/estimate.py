@@ -16,7 +16,7 @@ from pydpend.kinematics.ground import check_ground
 from pydpend.kinematics.hanging import HORIZONTAL, VERTICAL, Raw, is_direction, zero_for
 from pydpend.kinematics.linkage import Linkage
 from pydpend.kinematics.linkage_frames import LinkageAngles, fit_joints
-from pydpend.kinematics.markers import BodyMarkers, body_markers, to_world
+from pydpend.kinematics.markers import BodyMarkers, body_markers, never_seen, to_world
 from pydpend.kinematics.pivots import check_pivots, with_pivots
 from pydpend.kinematics.structure import Structure
 from pydpend.kinematics.table import Floats, LinkAngles
@@ -120,7 +120,7 @@ def angles(
     structure = structure.beside() if given else structure
     wishes = Wishes(estimator, mirrored, link_length_m, link_length_sigma_m, given)
     raw, seen = estimate(nodes, markers, structure, wishes)
-    notes: list[str] = [*pivot_notes, *raw.meta.pop("notes", ())]
+    notes: list[str] = [*never_seen(nodes, markers), *pivot_notes, *raw.meta.pop("notes", ())]
     ending = nodes.meta.get("ending")
     if isinstance(ending, dict) and ending.get("kind") != "complete":
         why = nodes.damage or ending.get("reason") or ending.get("kind")

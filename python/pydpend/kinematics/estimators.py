@@ -118,7 +118,11 @@ def _pairwise(
     }
     theta = np.stack([p.mean_rad for p in pairs], axis=1)
     sigma = np.stack([p.sigma_rad * s for p, s in zip(pairs, scales, strict=True)], axis=1)
-    seen = Seen(views, poses, pairwise_slopes(views))
+    slopes = pairwise_slopes(views)
+    # A pair one of whose markers its body contradicts has no angle: of two it cannot be told which is wrong.
+    told = np.isfinite(slopes).all(axis=2)
+    theta, sigma = np.where(told, theta, np.nan), np.where(told, sigma, np.nan)
+    seen = Seen(views, poses, slopes)
     return Raw(theta, sigma, [m.reference_px for m in markers], None, meta, structure), seen
 
 

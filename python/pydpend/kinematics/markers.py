@@ -54,6 +54,16 @@ class BodyMarkers:
         return BodyMarkers(self.name, self.nodes, self.xy_px[rows], self.weight[rows], self.reference_px)
 
 
+def never_seen(nodes: Nodes, markers: Sequence[BodyMarkers]) -> list[str]:
+    """A note on the nodes of the bodies that are no markers because they are never seen, if there are any."""
+    bodies = [m.name for m in markers]
+    known = {n for m in markers for n in m.nodes}
+    names = [n.name for n in nodes.rig.nodes if n.body in bodies and n.name not in known]
+    if not names:
+        return []
+    return [f"{', '.join(names)}: never seen, so the angles are those of the other markers of the link"]
+
+
 def to_world(xy_px: Floats, rig: Rig, mirrored: bool = False) -> Floats:
     """Image places (..., 2), y down, to square pixels of the bodies' plane in world directions, y up.
 
@@ -103,6 +113,8 @@ def body_markers(
 ) -> list[BodyMarkers]:
     """The markers of each body, from the pivot outwards (the rig's order unless ``bodies`` is given).
 
+    A node that is never seen is not among them: nothing tells where on its body it is.
+
     Raises :class:`AnglesError` for an unknown body, one that is never seen, or a seen centre without a standard
     uncertainty.
     """
@@ -135,9 +147,13 @@ def body_markers(
         )
     out = []
     for name in wanted:
-        index = [i for i, n in enumerate(rig.nodes) if n.body == name]
+        own = [i for i, n in enumerate(rig.nodes) if n.body == name]
+        index = [i for i in own if trusted[:, i].any()]
+        if len(index) == 1:
+            # Of several markers one alone is refused with the frames in which two are to be seen.
+            index = own
         seen = trusted[:, index]
-        if not seen.any():
+        if not index:
             raise AnglesError(
                 fault(
                     "nodes",
