@@ -11,6 +11,7 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from pydpend.batching import Batch, BatchError, BatchOptions, batch
     from pydpend.damping import DampingFit, Prediction, fit_damping
     from pydpend.encoder import (
         Calibration,
@@ -72,6 +73,9 @@ if TYPE_CHECKING:
 __all__ = [
     "AnglesError",
     "ArgumentError",
+    "Batch",
+    "BatchError",
+    "BatchOptions",
     "Calibration",
     "Comparison",
     "Damping",
@@ -111,6 +115,7 @@ __all__ = [
     "Truth",
     "WrongTypeError",
     "angles",
+    "batch",
     "calibrate",
     "compare",
     "derived",
@@ -149,6 +154,7 @@ __all__ = [
 ]
 
 _HOMES = {
+    "batching": ("Batch", "BatchError", "BatchOptions", "batch"),
     "damping": ("DampingFit", "Prediction", "fit_damping"),
     "encoder": (
         "Calibration",

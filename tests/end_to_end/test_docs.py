@@ -96,6 +96,23 @@ def test_other_programs(tmp_path: Path) -> None:
     assert done.stdout.splitlines()[-1] == "<Nodes arrays: 60 frames x 4 nodes, 98.8 % seen>"
 
 
+def test_many_recordings(tmp_path: Path) -> None:
+    page = "docs/how-to/batch.md"
+    done = followed(page, tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "0 of 2 recordings done, 2 partly" in done.stdout
+    both = "".join(f"print(duckdb.sql({sql!r}).fetchall())\n" for sql in indented(page, "SELECT"))
+    polars, python = (indented(page, f"import {name}")[0] for name in ("polars", "pydpend as dp"))
+    done = shell(f".venv/bin/python - <<'END'\nimport duckdb\n{both}{polars}{python}\nEND", tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "('drop1', 'partly', 60, 0.01" in done.stdout
+    assert "sheet_operator" in done.stdout
+    assert "Damping fit: drop" in done.stdout
+    # The sheet's rate of one film, of all else what the film says.
+    assert re.findall(r"drop(\d) +┆ (\d+)\.0", done.stdout) == [("1", "500"), ("3", "1000")]
+    assert done.stdout.splitlines()[-1] == "0 of 2 recordings done, 2 partly, 2 of them by earlier calls"
+
+
 def test_angles_and_encoder(tmp_path: Path) -> None:
     page = "docs/how-to/angles-and-encoder.md"
     done = followed(page, tmp_path)

@@ -316,13 +316,16 @@ def test_options_of_the_other_method_are_refused_by_all(
         ("analyze x", "Did you mean analyse?"),
         ("tarck x", "'tarck' is not a command. Did you mean track?"),
         ("--markr track x", "--markr: is not an option of `pydpend track`. Did you mean --marker"),
-        ("fit x -o y --marker 1,2", "but of `pydpend analyse`, `pydpend setup` or `pydpend track`"),
+        (
+            "fit x -o y --marker 1,2",
+            "but of `pydpend analyse`, `pydpend batch`, `pydpend setup` or `pydpend track`",
+        ),
         ("fitt x", "Did you mean fit?"),
         ("fit x -o y --hanging-rad 3.14", "--hanging-rad: the option is called --hanging now, in degrees"),
         ("fit x -o y --angle-map", "Did you mean --angle-maps?"),
         (
             "fit x -o y --zero rest",
-            "is not an option of `pydpend fit` but of `pydpend analyse` or `pydpend angles`",
+            "is not an option of `pydpend fit` but of `pydpend analyse`, `pydpend batch` or `pydpend angles`",
         ),
         ("fit x -o y --method guess", "--method: 'guess' is not known. Give trajectory or energy"),
         ("compare x y -o z --link 3", "--link: 3 is not known. Give 1 or 2"),

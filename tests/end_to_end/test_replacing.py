@@ -75,12 +75,12 @@ def test_a_figure_or_a_film_is_not_replaced(tmp_path: Path) -> None:
 
 
 def test_every_command_that_names_an_output_has_the_flag() -> None:
-    """``analyse`` goes on with its run folder, and takes none that is not one."""
+    """``analyse`` and ``batch`` go on with their folders, and take none that is not one."""
     (subparsers,) = [a for a in parser()._actions if a.dest == "command"]
     assert isinstance(subparsers.choices, dict)
     writing = {name for name in COMMANDS if "-o" in options_of(subparsers.choices[name])}
     forced = {name for name in COMMANDS if "--force" in options_of(subparsers.choices[name])}
-    assert writing - forced == {"analyse"}
+    assert writing - forced == {"analyse", "batch"}
 
 
 def test_a_folder_that_is_no_run_is_left_alone(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 import pydpend as dp
 from pydpend.analyse.run import Outcome
 from pydpend.analyse.state import RunState, StageState
+from pydpend.batching.status import Status
 from pydpend.damping import predict
 from pydpend.damping.recording import prepare
 from pydpend.encoder import EncoderSignal, compare, encoder_angles, hold_of
@@ -93,6 +94,18 @@ def trials() -> Trials:
 def outcome() -> Outcome:
     states = {"drop/track": StageState.DONE, "fit": StageState.NOT_DONE}
     return Outcome(Path("run"), RunState.PARTLY, "1 of 2", states, {"fit": "no rest"}, {"drop/track": 1.5})
+
+
+def many() -> dp.Batch:
+    counts = {"done": 1, "partly": 0, "failed": 1}
+    return dp.Batch(
+        Path("results"), "1 of 2", counts, 0, {"b": "no film"}, {"b": "pydpend analyse b"}, "agree"
+    )
+
+
+def how_far() -> Status:
+    counts = {"done": 1, "partly": 0, "failed": 1}
+    return Status("1 of 3", 3, counts, "here, process 1", {"c": "here, process 2"}, {"b": "no film"}, 3.5)
 
 
 def ensemble() -> Ensemble:

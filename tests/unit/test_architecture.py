@@ -76,6 +76,7 @@ GROUPS: tuple[tuple[str, ...], ...] = (
     ("plots",),
     ("citing", "report"),
     ("analyse",),
+    ("batching",),
     ("cli",),
 )
 

@@ -29,6 +29,8 @@ from tests.support.made_results import (
     comparison,
     ensemble,
     fit,
+    how_far,
+    many,
     motion,
     outcome,
     prediction,
@@ -130,6 +132,8 @@ JSON: dict[str, Callable[[], JsonResult]] = {
     "Calibration": calibration,
     "Score": score,
     "Outcome": outcome,
+    "Batch": many,
+    "Status": how_far,
 }
 
 

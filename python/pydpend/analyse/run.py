@@ -63,6 +63,8 @@ class Outcome(JsonResult):
     """Why, of each stage that gave nothing."""
     seconds: dict[str, float]
     """How long each stage took when it was done, the report included."""
+    warnings: tuple[str, ...] = ()
+    """The warnings of the report, the most important first."""
 
     def to_dict(self) -> dict[str, Any]:
         """The outcome as plain values."""
@@ -73,6 +75,7 @@ class Outcome(JsonResult):
             "stages": {name: str(state) for name, state in self.stages.items()},
             "reasons": self.reasons,
             "seconds": self.seconds,
+            "warnings": list(self.warnings),
             "report": str(self.folder / PAGE),
         }
 
@@ -95,6 +98,7 @@ class Outcome(JsonResult):
             {name: StageState(stages.text(name)) for name in stages},
             {name: why.text(name) for name in why},
             {name: took.number(name) for name in took},
+            table.texts("warnings") if "warnings" in table else (),
         )
 
 
@@ -317,7 +321,7 @@ def _analyse(run: RunFolder, todo: list[Stage], options: Options, progress: Prog
     run.save()
     tell(of, of, "Report", Started())
     begun = time.monotonic()
-    stages.report(path)
+    warnings = stages.report(path)
     write_text(path / README, provenance.readme(run))
     seconds = {name: float(done["seconds"]) for name, done in run.stages.items()}
     seconds["report"] = round(time.monotonic() - begun, 2)
@@ -333,6 +337,7 @@ def _analyse(run: RunFolder, todo: list[Stage], options: Options, progress: Prog
         {name: r.state for name, r in found.items()},
         {name: r.why for name, r in found.items() if r.why},
         seconds,
+        warnings,
     )
 
 

@@ -303,8 +303,8 @@ def overlay(r: Recording, here: Path, into: Path, tell: Tell) -> str:
     return f"{drawn.t_s.size} pictures, {'every frame' if every == 1 else f'one frame in {every}'}"
 
 
-def report(folder: Path) -> None:
-    """``report.html``."""
+def report(folder: Path) -> tuple[str, ...]:
+    """``report.html``; its warnings."""
     from pydpend.report import write_report
 
-    write_report(folder)
+    return write_report(folder).warnings

@@ -27,6 +27,7 @@ from pydpend.terminal import Shown, shortened
 
 COMMANDS: tuple[str, ...] = (
     "analyse",
+    "batch",
     "angles",
     "states",
     "calibrate",
@@ -127,6 +128,11 @@ def _parsers(wanted: Iterable[str] = ALL) -> tuple[Parser, dict[str, argparse.Ar
 def _commands() -> dict[str, argparse.ArgumentParser]:
     """Every command with its arguments."""
     return _parsers()[1]
+
+
+def front_end() -> CommandLine:
+    """The front end of ``pydpend analyse``, for processes that another one of the program started."""
+    return CommandLine(_commands, COMMANDS[0])
 
 
 class _Refused(Exception):

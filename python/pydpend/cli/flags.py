@@ -10,7 +10,7 @@ from typing import Any
 from pydpend.option_fields import choices_of, flag_of, kind_of_value, meanings
 
 
-def add_fields(p: argparse.ArgumentParser, options: type, fields: Iterable[Field[Any]]) -> None:
+def add_fields(p: argparse._ActionsContainer, options: type, fields: Iterable[Field[Any]]) -> None:
     """A flag for each field of the class ``options``; one that is not given is None."""
     docs = meanings(options)
     for f in fields:

@@ -30,6 +30,9 @@ def flags_of(keyword: str) -> tuple[str, ...]:
 class CommandLine:
     """The program ``pydpend`` at a command. A setting that the command has not is named with one that has it."""
 
+    made_by = "pydpend.cli:front_end"
+    """Function that makes one in another process."""
+
     def __init__(self, commands: Callable[[], Mapping[str, argparse.ArgumentParser]], command: str) -> None:
         self._all = commands
         self._command = command
