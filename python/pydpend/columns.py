@@ -42,6 +42,7 @@ class Columns:
     ``first_stamp`` is the date and time from which the seconds of a column of dates are counted, "" without one.
     ``units[name]`` is a column's unit as the row under the header spells it, a known one that does not contradict the
     column's name. ``has_instants``: the times are seconds because they were dates, times of day or durations.
+    ``doubt``: what makes the end of a text doubtful, if anything does; it was warned of.
     """
 
     source: str
@@ -52,6 +53,7 @@ class Columns:
     first_stamp: str = ""
     units: dict[str, str] = field(default_factory=dict)
     has_instants: bool = False
+    doubt: str = ""
 
     def place(self, row: int, column: str = "") -> str:
         """The place of a row, for a message: ``line 12, column voltage_v`` or ``row 11, column voltage_v``."""
@@ -227,7 +229,7 @@ def _text(
     for column, spelled in units.items():
         _check_unit(cells, column, spelled, found.units_line)
     rows = np.asarray(lines, dtype=np.int64)
-    return Columns(name, cells.header, values, rows, {}, first_stamp, units, has_instants)
+    return Columns(name, cells.header, values, rows, {}, first_stamp, units, has_instants, cells.doubt)
 
 
 def _check_unit(cells: Cells, column: str, spelled: str, line: int) -> None:

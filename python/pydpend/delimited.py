@@ -9,11 +9,13 @@ from __future__ import annotations
 import csv
 import io
 import re
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NoReturn
 
-from pydpend.errors import Message, PydpendError, Setting, fault
+from pydpend.errors import Message, PydpendError, RecordingWarning, Setting, fault
+from pydpend.plain_text import CUT_OFF, decoded, doubt, is_unended
 from pydpend.units import unit_at_end
 
 if TYPE_CHECKING:
@@ -61,7 +63,10 @@ _FLAG_NAME = re.compile(r".*(flag|status|quality|valid|marker|event).*", re.IGNO
 
 @dataclass(frozen=True)
 class Cells:
-    """A text file with its header found. ``delimiter`` parts the fields; a space stands for any run of white space."""
+    """A text file with its header found. ``delimiter`` parts the fields; a space stands for any run of white space.
+
+    ``doubt``: what makes its end doubtful, if anything does.
+    """
 
     name: str
     text: str
@@ -69,6 +74,7 @@ class Cells:
     header_line: int
     delimiter: str
     error: type[PydpendError]
+    doubt: str = ""
 
     def refuse(self, problem: str, advice: str, place: str) -> NoReturn:
         """Raises the file's error."""
@@ -221,7 +227,7 @@ class Cells:
     def _wrong_width(self, line: int, row: list[str]) -> NoReturn:
         names, parted = len(self.header), _PARTERS[self.delimiter]
         problem = f"{len(row)} fields parted by {parted}, the header in line {self.header_line} has {names}"
-        advice = "Repair or remove the line"
+        advice = CUT_OFF if is_unended(self.text, line) else "Repair or remove the line"
         if self.delimiter == "," and len(row) > names:
             advice = (
                 "If the commas are decimal marks too, write the file with semicolons between the fields or with "
@@ -257,7 +263,7 @@ def take_apart(
     error: type[PydpendError],
     naming: Setting | None = None,
 ) -> Cells:
-    """The text of a file and its header, the first line that holds every required name."""
+    """The text of a file and its header, the first line that holds every required name. Warns of a doubtful end."""
     text = decoded(data).replace("\r\n", "\n").replace("\r", "\n")
     if "\0" in text[:4096]:
         raise error(
@@ -268,29 +274,16 @@ def take_apart(
     if not text.strip():
         raise error(fault(name, "the file is empty", "Give a CSV file with a header line and rows"))
     header, line, delimiter = _find_header(name, text, required, error, naming)
-    return Cells(name, text, header, line, delimiter, error)
+    said = doubt(text, line, delimiter)
+    if said:
+        warnings.warn(f"{name}, {said}", RecordingWarning, stacklevel=2)
+    return Cells(name, text, header, line, delimiter, error, said)
 
 
 def names_on_first_line(data: bytes) -> list[str]:
     """The fields of a text's first line, parted by commas."""
     line = decoded(data).lstrip().replace("\r", "\n").partition("\n")[0]
     return _names(line, ",")
-
-
-def decoded(data: bytes) -> str:
-    """The text of bytes in UTF-8, UTF-16 with or without its mark, or Latin-1."""
-    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        return data.decode("utf-16", "replace")
-    head = data[:512]
-    for start, encoding in ((1, "utf-16-le"), (0, "utf-16-be")):
-        half = head[start::2]
-        # Latin letters and digits in UTF-16 without its mark: every second byte is zero.
-        if half and not any(half) and any(head):
-            return data.decode(encoding, "replace")
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return data.decode("latin-1")
 
 
 def _find_header(

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Literal, TypeAlias, get_args
 
-from pydpend.delimited import decoded
+from pydpend.plain_text import decoded
 
 Form: TypeAlias = Literal[
     "nodes",

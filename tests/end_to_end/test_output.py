@@ -6,6 +6,7 @@ import contextlib
 import dataclasses
 import io
 import os
+import re
 import signal
 import threading
 import time
@@ -76,12 +77,17 @@ def test_a_name_is_a_file_whatever_it_looks_like(
     assert "\x1b" not in said.out + said.err
 
 
-def test_a_run_folder_may_have_any_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_run_folder_may_have_any_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     monkeypatch.chdir(tmp_path)
     for name in ("run-12:30", "s3:run", os.fsdecode(b"r\xf6n")):
         write_angles(angles(), f"{name}.parquet")
         # A straight line is no decay, so that the fit is not done; everything else is.
         assert main(["analyse", f"{name}.parquet", "-o", name, "--quiet"]) == 1
+        # No progress, but what is not done is said.
+        (said,) = capsys.readouterr().err.splitlines()
+        assert re.fullmatch("fit: not done: .{20,}", said)
         assert (tmp_path / name / "report.html").is_file()
         assert (tmp_path / name / "README.txt").is_file()
 

@@ -31,6 +31,7 @@ GROUPS: tuple[tuple[str, ...], ...] = (
         "crossing",
         "_typing",
         "_native",
+        "plain_text",
         "track_forms",
         "kinds",
         "argument_types",

@@ -20,7 +20,7 @@ from pydpend.encoder import (
     read_encoder,
     read_holds,
 )
-from pydpend.errors import EncoderError
+from pydpend.errors import EncoderError, PydpendError
 from pydpend.series import correlation_time, highpass_noise
 
 SLOPE = 0.65 / (2 * np.pi)
@@ -109,6 +109,12 @@ def test_calibration_there_and_back(tmp_path: Path) -> None:
 def write_csv(path: Path, signal: EncoderSignal, header: str = "time_s,voltage_v") -> None:
     rows = "".join(f"{t!r},{v!r}\n" for t, v in zip(signal.t_s.tolist(), signal.value.tolist(), strict=True))
     path.write_text(header + "\n" + rows)
+
+
+@pytest.mark.parametrize("paths", ["", [""]])
+def test_an_empty_name_is_no_folder_of_holds(paths: str | list[str]) -> None:
+    with pytest.raises(PydpendError, match="the name is empty"):
+        read_holds(paths)
 
 
 def test_holds_from_a_folder_by_name_by_given_angles_and_from_one_table(tmp_path: Path) -> None:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+import warnings
 
 import numpy as np
 import pydpend as dp
 import pytest
+from pydpend.nodes import Joint
 
 from tests.support import two_links as rig
 
@@ -70,3 +72,27 @@ def test_links_that_hardly_move_tell_no_order(moved: float, bodies: tuple[str, .
         f"the rig has no pivot, and {first} turns too little to show one: phi1 is {first} and phi2 is {second}, "
         "and phi1 need not be the upper link's"
     ]
+
+
+def test_the_rigs_pivot_tells_the_order() -> None:
+    t, phi = rig.drop(1.0, 500.0, 7)
+    nodes = rig.film(t, phi, 8)
+    elbow = Joint("elbow", ("upper", "lower"), 640.0, 300.0)
+    for joints in (nodes.rig.joints, (*nodes.rig.joints, elbow), (elbow, *nodes.rig.joints)):
+        of_joints = dataclasses.replace(nodes, rig=dataclasses.replace(nodes.rig, joints=joints))
+        with pytest.raises(
+            dp.AnglesError, match=r"pivot is of upper, and lower, which would be phi1.*: upper, lower"
+        ):
+            dp.angles(of_joints, zero=(0.0, 0.0), bodies=("lower", "upper"))
+        assert structure_of(of_joints, ("lower",)) == ("lower",)
+    # A rig that lists them so is refused as well.
+    turned = dataclasses.replace(nodes, rig=dataclasses.replace(nodes.rig, bodies=("lower", "upper")))
+    with pytest.raises(dp.AnglesError, match="turns about no place"):
+        dp.angles(turned, zero=(0.0, 0.0))
+
+
+def structure_of(nodes: dp.Nodes, bodies: tuple[str, ...]) -> tuple[str, ...]:
+    """The links of the angles of some bodies."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", dp.RecordingWarning)
+        return tuple(dp.angles(nodes, zero="reference_frame", bodies=bodies).link_names)

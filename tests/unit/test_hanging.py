@@ -435,6 +435,21 @@ def test_a_zero_far_from_the_swings_is_told_whoever_gives_it(deg: float, kind: s
     np.testing.assert_array_less(off_deg(found, phi), 1.1 * np.degrees(found.meta["zero"]["sigma_rad"]))
 
 
+def test_directions_of_the_picture_that_the_swing_contradicts_are_told() -> None:
+    t, phi = held((50.0, 50.0), 3.0)
+    with pytest.warns(dp.RecordingWarning, match=r"from the zero \(the picture's vertical\)"):
+        found = filmed(t, phi, 20.0, "vertical")
+    zero = found.meta["zero"]
+    assert zero["contradicted"] in found.meta["notes"]
+    # The film is rolled by 20 deg, and 1 deg is what a camera is taken to be.
+    assert np.degrees(zero["sigma_rad"]) == pytest.approx(20, abs=2.5)
+    # Turns from the reference picture are right wherever the links hang.
+    found = angles(rig.film(t, phi, 41, reference_rad=(np.pi / 6, np.pi / 6)), zero="reference_frame")
+    assert "the swing goes about a direction about" in found.meta["zero"]["contradicted"]
+    assert "sigma_rad" not in found.meta["zero"]
+    np.testing.assert_allclose(off_deg(found, phi), 30, atol=0.1)
+
+
 def test_a_zero_where_the_links_hang_is_taken_without_a_word() -> None:
     t, phi = held((50.0, 50.0), 3.0)
     hung = rig.film(np.arange(300) / FPS, np.zeros((300, 2)), 42)

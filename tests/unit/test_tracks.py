@@ -311,6 +311,7 @@ CUT = [*BUNDLED, *WRITERS]
 @pytest.mark.parametrize("name", CUT)
 @pytest.mark.parametrize("part", [0.3, 0.8])
 @pytest.mark.filterwarnings("ignore::tables.exceptions.UnclosedFileWarning")
+@pytest.mark.filterwarnings("ignore:.*it may be cut off there:pydpend.RecordingWarning")
 def test_a_file_that_is_cut_off_is_read_in_part_or_refused_in_one_line(
     name: str, part: float, tmp_path: Path
 ) -> None:
@@ -419,3 +420,23 @@ def test_the_command_makes_a_node_table(tmp_path: Path, capsys: pytest.CaptureFi
     ):
         assert main([*command, "--fps", "250", "--force", *wrong]) == 2
         assert re.search(rf"{wrong[0]}: {message}", capsys.readouterr().err)
+
+
+def test_a_unit_that_puts_places_far_outside_the_pictures_is_refused_by_its_name(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "t.csv"
+    rows = [f"{k},{k / 100},p{n},{100 + 50 * n + k % 7},{200 + 30 * n}" for k in range(20) for n in range(2)]
+    path.write_text("frame,time_s,node,x_px,y_px\n" + "\n".join(rows) + "\n")
+    size = ["--image-px", "640x480"]
+    assert main(["import", str(path), "--unit", "m", *size, "-o", str(tmp_path / "n.parquet")]) == 2
+    said = capsys.readouterr().err
+    assert "--image-px, frame 0: in m, at 1 px for 1 mm, p0 is at (100000, 200000) px" in said
+    assert said.rstrip().endswith(
+        "Give the right unit with --unit, the right size with --image-px, or no size"
+    )
+    with pytest.raises(dp.PydpendError, match="far outside pictures of 64 x 48 px"):
+        dp.read_tracks(path, image_px=(64, 48))
+    # One place that a tracker got wrong is no wrong unit.
+    path.write_text(path.read_text().replace("3,0.03,p1,153,230", "3,0.03,p1,99153,230"))
+    assert len(dp.read_tracks(path, image_px=(640, 480))) == 20

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import shutil
 import time
-from collections.abc import Callable
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
@@ -18,9 +20,18 @@ from pydpend.analyse import motion, provenance, stages
 from pydpend.analyse.folder import UNFINISHED, Digests, RunFolder, RunFolderError, digest
 from pydpend.analyse.options import Options, check_files
 from pydpend.analyse.recordings import Recording, check_options, recordings
-from pydpend.analyse.state import DoesNotApply, Progress, RunState, StageResult, StageState, Started, Tell
+from pydpend.analyse.state import (
+    DoesNotApply,
+    Note,
+    Progress,
+    RunState,
+    StageResult,
+    StageState,
+    Started,
+    Tell,
+)
 from pydpend.documents import Table
-from pydpend.errors import OptionError, PydpendError, Setting, fault
+from pydpend.errors import OptionError, PydpendError, RecordingWarning, Setting, fault
 from pydpend.json_text import JsonResult
 from pydpend.output import keeping, write_text
 from pydpend.recording_folder import RunFile
@@ -347,6 +358,23 @@ def _all_done(found: dict[str, StageResult], titles: dict[str, str]) -> str:
     return f"every stage that applies is done (not: {', '.join(apart)})" if apart else "every stage is done"
 
 
+@contextmanager
+def _warnings_told(tell: Tell) -> Iterator[None]:
+    """Warnings of recordings are told as a stage's notes meanwhile."""
+    others = warnings.showwarning
+
+    def show(message: Warning | str, category: type[Warning], *place: Any, **more: Any) -> None:
+        if issubclass(category, RecordingWarning):
+            tell(Note(str(message)))
+        else:
+            others(message, category, *place, **more)
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", RecordingWarning)
+        warnings.showwarning = show
+        yield
+
+
 def _do(run: RunFolder, stage: Stage, tell: Tell) -> StageResult:
     """Does one stage and records it. Raises what a stage raises without which there is nothing to do."""
     target = run.path / stage.into
@@ -356,7 +384,8 @@ def _do(run: RunFolder, stage: Stage, tell: Tell) -> StageResult:
     resume = run.begin(stage.name, stage.key) if stage.in_place else False
     begun = time.monotonic()
     try:
-        message = stage.action(work, tell, resume)
+        with _warnings_told(tell):
+            message = stage.action(work, tell, resume)
     except DoesNotApply as reason:
         run.stages.pop(stage.name, None)
         return StageResult(StageState.DOES_NOT_APPLY, str(reason))

@@ -13,14 +13,15 @@ import importlib
 import os
 import signal
 import sys
-from collections.abc import Iterable
-from contextlib import redirect_stderr, redirect_stdout
+import warnings
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from typing import Any
 
 from pydpend.cli import tracker
 from pydpend.cli.reads import read_by
 from pydpend.cli.words import RENAMED, CommandLine, unknown_command, unknown_option
-from pydpend.errors import PydpendError, listed, speaking
+from pydpend.errors import PydpendError, RecordingWarning, listed, speaking
 from pydpend.number_words import number
 from pydpend.output import keeping
 from pydpend.terminal import Shown, shortened
@@ -208,10 +209,27 @@ def main(argv: list[str] | None = None) -> int:
             return _run(args)
 
 
+@contextmanager
+def _saying() -> Iterator[None]:
+    """Warnings of recordings are lines for people meanwhile."""
+    others = warnings.showwarning
+
+    def say(message: Warning | str, category: type[Warning], *place: Any, **more: Any) -> None:
+        if issubclass(category, RecordingWarning):
+            print(f"warning: {message}", file=sys.stderr)
+        else:
+            others(message, category, *place, **more)
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", RecordingWarning)
+        warnings.showwarning = say
+        yield
+
+
 def _run(args: argparse.Namespace) -> int:
     try:
         _look_up_numpy()
-        with keeping(read_by(args)):
+        with keeping(read_by(args)), _saying():
             status: int = args.run(args)
         sys.stdout.flush()
         return status

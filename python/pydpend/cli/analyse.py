@@ -52,6 +52,7 @@ def run(args: argparse.Namespace) -> int:
     """Runs the stages."""
     from pydpend.analyse import Options, RunState, analyse, plan, read_config, write_config
     from pydpend.analyse.folder import RunFolder
+    from pydpend.analyse.state import StageState
     from pydpend.errors import PydpendError, fault
     from pydpend.run_folder import PAGE, RECORD
 
@@ -82,6 +83,11 @@ def run(args: argparse.Namespace) -> int:
         print(outcome.to_json(), end="")
     else:
         print(f"{outcome.message}; report: {outcome.folder / PAGE}")
+    if args.quiet and not args.json:
+        # With progress each stage said so as it ended.
+        for name, state in outcome.stages.items():
+            if state is StageState.NOT_DONE:
+                print(f"{name}: not done: {outcome.reasons[name]}", file=sys.stderr)
     return 0 if outcome.status is RunState.DONE else 1
 
 

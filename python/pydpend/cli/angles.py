@@ -78,7 +78,7 @@ def add_arguments(p: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Runs the command; 1 if something was left out and said."""
+    """Runs the command; 1 if something was left out, or the swing contradicts the zero, and that was said."""
     import numpy as np
 
     from pydpend.errors import RecordingWarning
@@ -141,9 +141,11 @@ def run(args: argparse.Namespace) -> int:
         sure = zero.get("sigma_rad")
         known = f" (+- {' and '.join(f'{v:.2g}' for v in np.degrees(sure))} deg)" if sure else ""
         print(f"zero from {zero['from']}{known}; written to {args.output}")
+    contradicted = found.meta["zero"].get("contradicted")
     for note in (*nodes.notes, *found.meta["notes"]):
-        print(f"note: {note}", file=sys.stderr)
-    return 1 if found.left_out else 0
+        print(f"{'warning' if note == contradicted else 'note'}: {note}", file=sys.stderr)
+    # Turns from the reference picture are right whatever the swing says.
+    return 1 if found.left_out or (contradicted and args.zero != "reference_frame") else 0
 
 
 def _zero(text: str) -> Any:

@@ -14,6 +14,7 @@ from pydpend.encoder.scales import Unit, in_base
 from pydpend.encoder.signal import EncoderSignal, read_encoder
 from pydpend.errors import EncoderError, Setting, fault, listed
 from pydpend.kinds import expect
+from pydpend.output import path_of
 from pydpend.series import correlation_time
 from pydpend.typed import typed
 
@@ -120,7 +121,7 @@ def read_holds(
     """
     files: list[Path] = []
     given = [paths] if isinstance(paths, (str, Path)) else paths
-    for path in map(Path, given):
+    for path in map(path_of, given):
         expect(path, ("encoder", "tables"), EncoderError)
         if path.is_dir():
             inside = [p for p in sorted(path.iterdir()) if p.suffix.lower() in ENDINGS]

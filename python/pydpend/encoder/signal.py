@@ -142,6 +142,11 @@ def read_encoder(
         Naming file, line and column: for text that is no number, times that are missing, repeated or falling, times
         that are stamps written as numbers, units that are not known or contradict each other, and columns that are
         not there.
+
+    Warns
+    -----
+    RecordingWarning
+        If text ends inside its last line, whose number may be cut off.
     """
     path = path_of(path)
     expect(path, ("encoder", "angles"), EncoderError)
@@ -182,6 +187,8 @@ def read_encoder(
         t, value, label = _read_numpy(path, rate_hz)
     else:
         t, value, label, table = _read_table(path, column, time_column, rate_hz)
+        if table.doubt:
+            notes.append(table.doubt)
         if table.first_stamp:
             notes.append(f"its times are dates; they are counted in s from the first, {table.first_stamp}")
         stated = table.units.get(label, "")

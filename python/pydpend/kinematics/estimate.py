@@ -12,7 +12,7 @@ from pydpend.errors import CHECK, AnglesError, Setting, fault
 from pydpend.kinematics.axes import Axes, directions
 from pydpend.kinematics.camera_slopes import zero_slopes
 from pydpend.kinematics.estimators import Method, Seen, Wishes, estimate, poses_of
-from pydpend.kinematics.ground import check_ground
+from pydpend.kinematics.ground import check_ground, check_order
 from pydpend.kinematics.hanging import HORIZONTAL, VERTICAL, Raw, is_direction, zero_for
 from pydpend.kinematics.linkage import Linkage
 from pydpend.kinematics.linkage_frames import LinkageAngles, fit_joints
@@ -96,15 +96,16 @@ def angles(
     Raises
     ------
     AnglesError
-        For a body never seen, or in one marker only; links in the wrong order, where the rig has no pivot; no rest
-        found, or one in which the links are held and do not hang; a turn that may be lost; links that turn too little
-        for a linkage; a given pivot that the motion contradicts.
+        For a body never seen, or in one marker only; links in the wrong order, by the rig's joints or by the motion; no
+        rest found, or one in which the links are held and do not hang; a turn that may be lost; links that turn too
+        little for a linkage; a given pivot that the motion contradicts.
 
     Warns
     -----
     RecordingWarning
-        For a zero by a recording or by angles that is not where the links hang, by their swing;
-        ``meta["zero"]["sigma_rad"]`` holds the distance.
+        For a zero by a recording, by angles or by the picture's vertical that is not where the links hang, by their
+        swing; ``meta["zero"]["sigma_rad"]`` holds the distance. ``meta["zero"]["contradicted"]`` says so of the
+        reference picture too, turns from which are exact.
     """
     if method is not None:
         raise AnglesError(
@@ -118,6 +119,7 @@ def angles(
     pivot_notes = check_pivots(before, nodes, poses_of(markers) if given else [], given, mirrored)
     structure = Structure.of(nodes.rig, [m.name for m in markers])
     structure = structure.beside() if given else structure
+    check_order(structure, label)
     wishes = Wishes(estimator, mirrored, link_length_m, link_length_sigma_m, given)
     raw, seen = estimate(nodes, markers, structure, wishes)
     notes: list[str] = [*never_seen(nodes, markers), *pivot_notes, *raw.meta.pop("notes", ())]

@@ -58,6 +58,18 @@ def check_ground(structure: Structure, poses: Sequence[Pose], label: str) -> lis
     return [f"the rig has no pivot, and {seen}: {order}, and phi1 need not be the upper link's"]
 
 
+def check_order(structure: Structure, label: str) -> None:
+    """Raises :class:`AnglesError` where the rig's pivot says that the second of two links is the upper one."""
+    if len(structure.links) != 2:
+        return
+    first, second = structure.links
+    pivots = {joint.bodies[0]: joint.name for joint in structure.joints if len(joint.bodies) == 1}
+    if second in pivots and first not in pivots:
+        problem = f"the rig's {pivots[second]} is of {second}, and {first}, which would be phi1, turns about no place"
+        advice = "Name the links from the pivot outwards, with " + Setting("bodies") + f": {second}, {first}"
+        raise AnglesError(fault(label, problem, advice))
+
+
 def _fixed(pose: Pose) -> bool | None:
     """Whether a link turns about a point that stays; None if it turns too little to say so."""
     seen = np.isfinite(pose.theta_rad) & np.isfinite(pose.centre_px).all(axis=1)

@@ -171,12 +171,13 @@ def zero_for(
             f"the swing goes about a direction about {off} deg from the zero ({meta['from']}): the angles may be "
             "off by that"
         )
-        if not isinstance(zero, str):
-            # Who takes a picture or its directions for the zero does not say that the links hang there.
+        if not (isinstance(zero, str) and zero == "reference_frame"):
+            # Turns from the reference picture are what they are, wherever the links hang.
             notes[-1] += ", and the zero's uncertainty says so"
             meta["sigma_rad"] = np.hypot(stated, apart).tolist()
             # Past `angles` and the check of its arguments, to its caller's line.
             warnings.warn(f"{label}: {notes[-1]}", RecordingWarning, stacklevel=4)
+        meta["contradicted"] = notes[-1]
     return value, meta | _told(swing, value), notes
 
 

@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from pydpend.delimited import EMPTY, decoded
+from pydpend.delimited import EMPTY
 from pydpend.documents import read_bytes
 from pydpend.errors import TableError, fault
+from pydpend.plain_text import decoded
 from pydpend.raw_tracks import Floats
 
 EXTRA = "tracks"

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from pydpend.errors import ArgumentError, OptionError, Setting, TableError, fault, listed, one_of
+from pydpend.errors import ArgumentError, Message, OptionError, Setting, TableError, fault, listed, one_of
 from pydpend.raw_tracks import Floats, RawTracks
 
 MM: dict[str, float] = {"m": 1000.0, "cm": 10.0, "mm": 1.0, "um": 1e-3, "in": 25.4}
@@ -110,6 +110,7 @@ def placed(raw: RawTracks, wishes: Wishes) -> RawTracks:
     image = wishes.image_px if wishes.image_px is not None else sure.image_px
     is_up = sure.is_y_up or raw.xyz.shape[2] == 3 if wishes.y_axis is None else wishes.y_axis == "up"
     xy, image = _turned(xy * factor, is_up, image, told)
+    _check_reach(raw, xy, wishes, image)
     return replace(sure, xyz=xy, t_s=t_s, sigma=sigma, unit="px", is_y_up=False, image_px=image, notes=told.notes,
                    facts=told.facts)  # fmt: skip
 
@@ -208,6 +209,36 @@ def _in_plane(raw: RawTracks, plane: str | None, told: _Told) -> Floats:
         )
     told.facts["plane"] = used
     return raw.xyz[..., ["xyz".index(a) for a in used]]
+
+
+def _check_reach(raw: RawTracks, xy: Floats, wishes: Wishes, image: tuple[int, int] | None) -> None:
+    """Refuses places (T, N, 2) in px so far outside the pictures that their size or the unit must be wrong."""
+    if image is None:
+        return
+    size = np.array(image, dtype=np.float64)
+    outside = np.maximum(np.maximum(-0.5 - xy, xy - (size - 0.5)), 0.0)
+    far = np.hypot(outside[..., 0], outside[..., 1]) > np.hypot(*size)
+    seen = np.isfinite(xy).all(axis=2)
+    # A single wild place is a tracker's error and no wrong unit.
+    wrong = np.flatnonzero(2 * far.sum(axis=0) > seen.sum(axis=0))
+    if not wrong.size:
+        return
+    n = int(wrong[0])
+    t = int(np.flatnonzero(far[:, n])[0])
+    x, y = xy[t, n]
+    unit = wishes.unit or SPELLINGS.get(raw.unit.strip().lower(), raw.unit)
+    scaled = "" if unit == "px" else f"in {unit}, at 1 px for 1 mm, "
+    setting = (
+        Setting("image_px") if wishes.image_px is not None else Message.of("the file's size of the pictures")
+    )
+    advice = (
+        Message.of("Give the right unit with ")
+        + Setting("unit")
+        + ", the right size with "
+        + Setting("image_px")
+    )
+    problem = f"{scaled}{raw.names[n]} is at ({x:.6g}, {y:.6g}) px, far outside pictures of {image[0]} x {image[1]} px"
+    raise OptionError(fault(setting, problem, advice + ", or no size", place=f"frame {raw.frame[t]}"))
 
 
 def _ranges(values: Floats) -> Floats:
