@@ -22,8 +22,12 @@ exclude_patterns = ["README.md"]
 
 # Anchors of headings are those that GitHub gives them, so that one link serves both.
 myst_heading_anchors = 4
-# No page is run while the site is made but the notebooks, and these only by `make notebooks`.
-nb_execution_mode = "off"
+# `make docs` runs the notebooks and keeps what came out for the next time; the tests run them beside the site.
+nb_execution_mode = "cache"
+nb_execution_cache_path = str(ROOT / "out" / "site-notebooks")
+nb_execution_timeout = 600
+nb_execution_raise_on_error = True
+
 
 # Types stand in the docstrings, with shapes and units.
 autodoc_typehints = "none"

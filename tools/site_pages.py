@@ -81,7 +81,13 @@ def python() -> str:
     sections = []
     for module, names in dp._HOMES.items():
         about = (importlib.import_module(f"pydpend.{module}").__doc__ or "").strip().splitlines()[0]
-        lines = [f"## {module.replace('_', ' ').capitalize()}", "", about, "", "```{eval-rst}"]
+        lines = [
+            f"## {module.partition('.')[0].replace('_', ' ').capitalize()}",
+            "",
+            about,
+            "",
+            "```{eval-rst}",
+        ]
         for name in names:
             found = getattr(dp, name)
             if isinstance(found, type):

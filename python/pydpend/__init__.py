@@ -63,6 +63,7 @@ if TYPE_CHECKING:
     from pydpend.live import NodeRow, Tracker, detect
     from pydpend.model import Damping, Model, derived, published, read_model
     from pydpend.nodes import Nodes, Rig, read_nodes
+    from pydpend.plots.of_results import plot
     from pydpend.scoring import Score, score
     from pydpend.simulation import Simulation, simulate, simulate_many
     from pydpend.tracking import OverlayFilm, Setup, info, overlay, setup, track
@@ -131,6 +132,7 @@ __all__ = [
     "modes",
     "overlay",
     "places",
+    "plot",
     "poincare",
     "point_states",
     "published",
@@ -206,6 +208,7 @@ _HOMES = {
     "model": ("Damping", "Model", "derived", "published", "read_model"),
     "nodes": ("Nodes", "Rig", "read_nodes"),
     "free_swing": ("RingDown", "ring_down"),
+    "plots.of_results": ("plot",),
     "scoring": ("Score", "score"),
     "simulation": ("Simulation", "simulate", "simulate_many"),
     "tracking": ("OverlayFilm", "Setup", "info", "overlay", "setup", "track"),

@@ -47,10 +47,11 @@ def write_predictions(run: Path, found: Mapping[str, Prediction]) -> None:
 
 @dataclass(frozen=True)
 class StageRecord:
-    """The record of a stage: its words and its duration."""
+    """The record of a stage: its words, its duration, and the files that it made, by their paths from the run."""
 
     message: str
     seconds: float
+    files: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -140,9 +141,9 @@ def read_run(run: str | Path) -> StoredRun:
     facts = given.table("facts")
     done = given.table("stages") if "stages" in given else None
     stages = {
-        name: StageRecord(done.table(name).text("message"), done.table(name).number("seconds"))
+        name: StageRecord(stage.text("message"), stage.number("seconds"), tuple(stage.table("files")))
         for name in (() if done is None else done)
-        if done is not None
+        if done is not None and (stage := done.table(name))
     }
     recordings = []
     for i, table in enumerate(facts.tables("recordings")):

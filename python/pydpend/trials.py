@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, ClassVar
 
@@ -11,6 +11,7 @@ import scipy
 from numpy.typing import NDArray
 
 from pydpend.damping import DampingFit, fit_damping
+from pydpend.damping.result_parts import Estimate
 from pydpend.damping.shooting import Progress
 from pydpend.documents import Table
 from pydpend.errors import FIT, FitError, fault
@@ -160,10 +161,15 @@ class Trials(JsonResult, TableResult):
 
 def alone(fit: DampingFit) -> dict[str, Spread]:
     """The coefficients of a fit of one recording as trials have them; there is no mean."""
+    return each_alone(fit.coefficients)
+
+
+def each_alone(estimates: Mapping[str, Estimate]) -> dict[str, Spread]:
+    """Estimates of one recording as trials have them; there is no mean."""
     none = float("nan")
     return {
         name: Spread(np.array([e.value]), np.array([e.sigma]), none, none, none, none, none, e.unit)
-        for name, e in fit.coefficients.items()
+        for name, e in estimates.items()
     }
 
 

@@ -163,7 +163,7 @@ def test_a_figure_that_is_not_there_says_which_are(
     demo_run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["plot", "prediction", str(demo_run), "-o", str(tmp_path / "p.png")]) == 2
-    assert "It has nodes, angles" in capsys.readouterr().err
+    assert "It has nodes, neighbours, web, angles" in capsys.readouterr().err
     assert main(["plot", "energy", str(tmp_path), "-o", str(tmp_path / "p.png")]) == 2
     assert "not a run folder" in capsys.readouterr().err
     assert main(["plot", "energy", str(demo_run), "-o", str(tmp_path / "p.bmp")]) == 2

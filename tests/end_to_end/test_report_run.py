@@ -132,7 +132,7 @@ def test_nobody_is_shut_out(browser: Browser, demo_run: Path, scheme: str, width
 
 def test_the_keyboard_reaches_everything(opened: Page) -> None:
     reached = []
-    for _ in range(60):
+    for _ in range(180):
         opened.keyboard.press("Tab")
         reached.append(
             opened.evaluate(

@@ -28,14 +28,15 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The whole site; warnings are errors, and no proxy or server is there to ask."""
     folder = tmp_path_factory.mktemp("site")
     nowhere = dict.fromkeys(("http_proxy", "https_proxy", "HTTP_PROXY", "HTTPS_PROXY"), "http://127.0.0.1:9")
+    strictly = ["-q", "-W", "--keep-going", "-D", "nb_execution_mode=off", "-d", f"{folder}/trees"]
     done = subprocess.run(
-        [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-d", f"{folder}/trees", "docs", f"{folder}/html"],
+        [sys.executable, "-m", "sphinx", *strictly, "docs", f"{folder}/html"],
         cwd=ROOT,
         env=os.environ | nowhere,
         capture_output=True,
         text=True,
         check=False,
-    )  # fmt: skip
+    )
     assert done.returncode == 0, done.stderr
     return folder / "html"
 

@@ -3,6 +3,7 @@
 It is drawn from the files of the folder; the report's page is not needed.
 
   pydpend plot energy run/ -o energy.pdf
+  pydpend plot neighbours run/ --frame 812 -o neighbours.svg
   pydpend plot angles both/ --recording trial1 -o angles.svg
 """
 
@@ -21,11 +22,19 @@ def add_arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument("run_folder", metavar="RUN", help="a folder made by pydpend analyse")
     p.add_argument("-o", "--output", required=True, metavar="FILE", help=".png, .svg or .pdf")
     p.add_argument("--recording", metavar="NAME", help="which recording, where there are several")
+    p.add_argument(
+        "--frame",
+        type=int,
+        metavar="N",
+        help="which frame, of neighbours and web; one with a gap if not given",
+    )
     add_force(p)
 
 
 FIGURES = (
     "nodes",
+    "neighbours",
+    "web",
     "angles",
     "phase",
     "amplitudes",
@@ -34,6 +43,7 @@ FIGURES = (
     "residuals",
     "energy",
     "coefficients",
+    "ten",
     "shares",
     "prediction",
     "maps",
@@ -59,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
     from pydpend.plots.style import save
 
     check_files(args, args.output)
-    figure = figure_of(args.figure, args.run_folder, args.recording)
+    figure = figure_of(args.figure, args.run_folder, args.recording, args.frame)
     try:
         save(figure, args.output)
     except OSError as error:

@@ -22,11 +22,12 @@ from pydpend.plots.damping import (
     windows_figure,
 )
 from pydpend.plots.encoder import calibration_figure, comparison_figure
+from pydpend.plots.neighbours import neighbours_figure, web_figure
 from pydpend.plots.nodes import nodes_figure
 from pydpend.plots.physics import amplitudes_figure, phase_portrait
 from pydpend.recording_folder import AGAIN, RunFile
 from pydpend.run_folder import StoredRecording, StoredRun, read_run
-from pydpend.trials import alone
+from pydpend.trials import alone, each_alone
 
 
 class FigureError(PydpendError):
@@ -36,6 +37,25 @@ class FigureError(PydpendError):
 def _nodes(run: StoredRun, r: StoredRecording) -> Figure:
     nodes = r.nodes()
     return nodes_figure(nodes, r.residual_px(nodes))
+
+
+def _neighbours(run: StoredRun, r: StoredRecording, frame: int | None) -> Figure:
+    return neighbours_figure(r.nodes(), frame)
+
+
+def _web(run: StoredRun, r: StoredRecording, frame: int | None) -> Figure:
+    return web_figure(r.nodes(), frame)
+
+
+def _ten(run: StoredRun, r: StoredRecording) -> Figure:
+    ten = run.fit_folder.fit().ten
+    if ten is None:
+        raise FigureError(fault("ten", f"the fit of {run.path} was made without the paper's ten", AGAIN))
+    return coefficients_figure(each_alone(ten.values))
+
+
+def _has_ten(run: StoredRun) -> bool:
+    return run.fit_folder.fit().ten is not None
 
 
 def _angles(run: StoredRun, r: StoredRecording) -> Figure:
@@ -107,13 +127,16 @@ def _maps(run: StoredRun, r: StoredRecording) -> Figure:
 class Drawing:
     """A figure: what it shows, how it is drawn, and the file without which there is none.
 
-    ``each``: one for each recording.
+    ``each``: one for each recording. ``of_frame``: one for each frame too, which `draw` then takes.
+    ``has``: whether the file holds what is drawn.
     """
 
     about: str
-    draw: Callable[[StoredRun, StoredRecording], Figure]
+    draw: Callable[..., Figure]
     needs: RunFile | FitFile
     each: bool = True
+    of_frame: bool = False
+    has: Callable[[StoredRun], bool] = lambda _: True
 
 
 DRAWINGS = {
@@ -121,6 +144,18 @@ DRAWINGS = {
         "each node over time: seen, missing, reacquired, ambiguous, undecoded; distance to the shape",
         _nodes,
         RunFile.RESIDUALS,
+    ),
+    "neighbours": Drawing(
+        "lists of neighbours of each link's markers, and what is left of them in a frame (Fig. 21)",
+        _neighbours,
+        RunFile.RESIDUALS,
+        of_frame=True,
+    ),
+    "web": Drawing(
+        "vectors between a link's markers in the reference picture and in a frame (Figs. 5b, 13, 14)",
+        _web,
+        RunFile.RESIDUALS,
+        of_frame=True,
     ),
     "angles": Drawing("angles and their standard uncertainties (Fig. 16)", _angles, RunFile.ANGLES),
     "phase": Drawing("phase portrait: rate over angle of each link", _phase, RunFile.STATES),
@@ -138,6 +173,13 @@ DRAWINGS = {
         _coefficients,
         FitFile.FIT,
         each=False,
+    ),
+    "ten": Drawing(
+        "the paper's ten coefficients with their errors (Fig. 20)",
+        _ten,
+        FitFile.FIT,
+        each=False,
+        has=_has_ten,
     ),
     "shares": Drawing("where the energy goes, by law and by joint", _shares, FitFile.FIT, each=False),
     "prediction": Drawing("error of each predicted window over time", _prediction, RunFile.WINDOWS),
@@ -166,15 +208,17 @@ def chosen(run: StoredRun, recording: str | None) -> StoredRecording:
 
 def available(run: StoredRun, r: StoredRecording) -> list[str]:
     """Names of the figures that there is something for."""
-    return [name for name, d in DRAWINGS.items() if _file(run, r, d).exists()]
+    return [name for name, d in DRAWINGS.items() if _file(run, r, d).exists() and d.has(run)]
 
 
 def _file(run: StoredRun, r: StoredRecording, d: Drawing) -> Path:
     return run.fit_folder.file(d.needs) if isinstance(d.needs, FitFile) else r.file(d.needs)
 
 
-def figure_of(name: str, run_folder: str | Path, recording: str | None = None) -> Figure:
-    """The figure called ``name`` (one of `DRAWINGS`) of a run folder.
+def figure_of(
+    name: str, run_folder: str | Path, recording: str | None = None, frame: int | None = None
+) -> Figure:
+    """The figure called ``name`` (one of `DRAWINGS`) of a run folder; ``frame`` for those of one frame.
 
     Raises FigureError if the folder has nothing for it, RunFileError if it is no run folder or damaged.
     """
@@ -183,6 +227,8 @@ def figure_of(name: str, run_folder: str | Path, recording: str | None = None) -
     drawing = DRAWINGS[name]
     if recording is not None and not drawing.each:
         raise FigureError(fault(Setting("recording"), f"{name} is of the whole run", "Leave it out"))
+    if frame is not None and not drawing.of_frame:
+        raise FigureError(fault(Setting("frame"), f"{name} is of the whole recording", "Leave it out"))
     run = read_run(run_folder)
     r = (
         chosen(run, recording)
@@ -199,4 +245,4 @@ def figure_of(name: str, run_folder: str | Path, recording: str | None = None) -
                 f"It has {', '.join(there)}" if there else "See the warnings in its report.html",
             )
         )
-    return drawing.draw(run, r)
+    return drawing.draw(run, r, frame) if drawing.of_frame else drawing.draw(run, r)

@@ -5,8 +5,10 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from pydpend.citing import bibtex
 from pydpend.report import damping, recording
-from pydpend.report.page import Block, Code, Heading, Listing, Page, Section, Table, Text
+from pydpend.report.page import Block, Code, Heading, Links, Listing, Page, Section, Table, Text
+from pydpend.report.tiles import tiles
 from pydpend.report.words import sentence
 from pydpend.run_folder import FIT_FOLDER, StoredRun, read_run
 
@@ -41,6 +43,7 @@ def report_page(folder: str | Path) -> Page:
     return Page(
         title=f"Analysis of {names}",
         subtitle=f"pydpend {run.version}",
+        tiles=tiles(read, fit),
         warnings=tuple(dict.fromkeys(warnings)),
         sections=(
             Section("answer", "Results", tuple(answer)),
@@ -73,6 +76,16 @@ def in_lines(command: str) -> str:
     return " \\\n    ".join(" ".join(line) for line in lines)
 
 
+def files_beside(run: StoredRun) -> list[str]:
+    """The files of a run that people open, from its folder."""
+    made = {name for done in run.stages.values() for name in done.files}
+    return [
+        "README.txt",
+        "run.json",
+        *sorted(name for name in made if not name.endswith((".png", ".svg", ".mp4"))),
+    ]
+
+
 def _reproduce(run: StoredRun) -> list[Block]:
     return [
         Text("This page was made by"),
@@ -88,13 +101,16 @@ def _reproduce(run: StoredRun) -> list[Block]:
             numbers=frozenset({2}),
         ),
         Text(
-            "Every number, table and option is in the folder beside this page; README.txt there lists them."
+            "Every number, table and option is in the folder beside this page; README.txt there lists them. "
+            "As long as the page lies in that folder, these open:"
         ),
+        Links(tuple(files_beside(run))),
         Text(
             f"Cite as: The pydpend developers, pydpend {run.version} (software), and for the method "
             "A. D. Myers, J. R. Tempelman, D. Petrushenko, F. A. Khasawneh, The Double Pendulum: An Experimental "
-            "Design Report (2020)."
+            "Design Report (2020). For BibTeX:"
         ),
+        Code(bibtex(run.version).strip(), "BibTeX"),
         Text(
             "Angles are absolute, counter-clockwise positive, zero hanging down, unwrapped over turns. An uncertainty "
             "is one standard uncertainty."

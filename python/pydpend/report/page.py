@@ -9,6 +9,7 @@ from __future__ import annotations
 import base64
 import json
 from dataclasses import dataclass
+from enum import Enum
 from importlib.resources import files
 from typing import Any
 
@@ -47,10 +48,18 @@ class Listing(_Block):
 
 
 @dataclass(frozen=True)
+class Links(_Block):
+    """Files beside the page, by their paths from it."""
+
+    paths: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Code(_Block):
-    """Text to be copied."""
+    """Text to be copied; ``label`` says what it is to those who hear the page."""
 
     text: str
+    label: str = "Command"
 
 
 LONGEST_NUMBER = 32
@@ -174,7 +183,38 @@ class StatusMap(_Block):
     )
 
 
-Block = Text | Heading | Listing | Code | Table | Figure | Reset | Film | Chart | StatusMap
+class Light(Enum):
+    """A traffic light, from what needs no second look to what is not to be trusted; its value is what it says."""
+
+    GOOD = "good"
+    LOOK = "look at it"
+    BAD = "not to be trusted"
+
+
+@dataclass(frozen=True)
+class Bar:
+    """A part of a whole: its name, its size in words, and its length in percent."""
+
+    label: str
+    value: str
+    percent: float
+
+
+@dataclass(frozen=True)
+class Tile:
+    """A summary at the top. ``svg`` is pydpend's own drawing; a ``film`` of this id gives its picture in its place."""
+
+    id: str
+    title: str
+    note: str = ""
+    light: Light | None = None
+    rows: tuple[tuple[str, str], ...] = ()
+    bars: tuple[tuple[Bar, ...], ...] = ()
+    svg: str = ""
+    film: str | None = None
+
+
+Block = Text | Heading | Listing | Links | Code | Table | Figure | Reset | Film | Chart | StatusMap
 
 
 @dataclass(frozen=True)
@@ -188,12 +228,13 @@ class Section:
 
 @dataclass(frozen=True)
 class Page:
-    """The whole page: warnings first, then the sections in order."""
+    """The whole page: tiles, warnings, then the sections in order."""
 
     title: str
     subtitle: str
     warnings: tuple[str, ...]
     sections: tuple[Section, ...]
+    tiles: tuple[Tile, ...] = ()
 
 
 class _Arrays:
@@ -275,6 +316,7 @@ def render(page: Page) -> str:
         for key, name in {
             "css": "report.css",
             "js": "report.js",
+            "save_js": "save.js",
             "uplot_css": "uPlot.min.css",
             "uplot_js": "uPlot.iife.min.js",
         }.items()

@@ -320,7 +320,7 @@ def read(r: StoredRecording) -> Part:
         part.warnings += [f"{part.label}: {note}" for note in part.meta.get("notes", [])]
         zero = part.meta.get("zero")
         if isinstance(zero, dict) and "from" in zero:
-            rows.append(("zero of the angles", _zero_in_words(zero)))
+            rows.append(("zero of the angles", zero_in_words(zero)))
         for k in range(part.angles.links):
             sigma = part.angles.sigma_rad[:, k]
             if np.isfinite(sigma).any():
@@ -363,7 +363,7 @@ def _camera_in_words(angles: LinkAngles, link: int) -> str:
     return f", {digits(part)} deg camera (one error of all frames, which no number of them averages out)"
 
 
-def _zero_in_words(zero: dict[str, Any]) -> str:
+def zero_in_words(zero: dict[str, Any]) -> str:
     """The origin of the angles' zero, with its standard uncertainty."""
     sigmas = zero.get("sigma_rad")
     if not sigmas:

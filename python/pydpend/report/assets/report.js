@@ -163,7 +163,7 @@
           dblclick: () => () => { setRange(g, ...full(g)); },
         },
       },
-      legend: { show: !map, live: true },
+      legend: { show: !map, live: true, markers: { dash: (u, i) => (u.series[i].dash ? "dashed" : "solid") } },
       hooks: {
         setSelect: [(u) => {
           const { left, width } = u.select;
@@ -327,5 +327,5 @@
   });
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", rebuild);
   // For tests and for people with a console: the charts and groups as they are.
-  window.pydpendReport = { groups, data, ready: true };
+  window.pydpendReport = { groups, data, array, css, numeral, charts: () => built, ready: true };
 })();
