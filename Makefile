@@ -82,6 +82,7 @@ validate: build .make/dev
 	target/release/examples/validate --seeds 200..220 --write docs/validation/identity.md
 	$(PY) -m tests.validation.validate_kinematics
 	$(PY) -m tests.validation.validate_resume
+	$(PY) -m tests.validation.validate_batch
 	$(PY) -m tests.validation.mutate --mutants 300
 	for sweep in angles default physics mechanisms; do $(PY) -m tests.validation.validate_$$sweep || exit 1; done
 	for part in energy inertias ratios slow all none added; do $(PY) -m tests.validation.validate_damping $$part || exit 1; done

@@ -12,8 +12,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
-from collections.abc import Callable
 from pathlib import Path
 
 import polars as pl
@@ -25,13 +23,11 @@ from pydpend.batching.lock import about_me, holding
 from pydpend.batching.status import status
 from pydpend.cli import main
 
+from tests.support.small_cluster import SPOILT, alive, contents, until
 from tests.support.small_films import small_film, small_films
 
-SPOILT = Path(__file__).parents[1] / "support" / "spoilt_helpers"
 PLAIN = Options(zero="vertical", overlay=False)
 PLAIN_FLAGS = ("--zero", "vertical", "--no-overlay")
-OF_THE_CALL = ("run.json", "README.txt", "report.html", "row.json")
-"""Files of a run folder that hold the command and durations."""
 
 
 @pytest.fixture(scope="module")
@@ -49,11 +45,6 @@ def spoilt(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def table(results: Path) -> pl.DataFrame:
     return pl.read_parquet(results / "batch.parquet")
-
-
-def contents(run: Path) -> dict[str, bytes]:
-    files = (p for p in run.rglob("*") if p.is_file() and p.name not in OF_THE_CALL)
-    return {p.relative_to(run).as_posix(): p.read_bytes() for p in files}
 
 
 def test_a_batch_is_what_serial_runs_are_and_is_done_once(films: Path, tmp_path: Path) -> None:
@@ -127,22 +118,6 @@ def started(*words: str, folder: Path) -> subprocess.Popen[bytes]:
     program = [sys.executable, "-m", "pydpend", "batch", *words, *PLAIN_FLAGS]
     with (folder / "words.txt").open("ab") as said:
         return subprocess.Popen(program, cwd=folder, stdout=said, stderr=said)
-
-
-def until(holds: Callable[[], bool]) -> None:
-    """Waits; a hang fails."""
-    end = time.monotonic() + 60
-    while not holds():
-        assert time.monotonic() < end
-        time.sleep(0.05)
-
-
-def alive(pid: int) -> bool:
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    return b"Z" not in Path(f"/proc/{pid}/stat").read_bytes().rpartition(b")")[2].split()[0]
 
 
 @pytest.mark.parametrize("by", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])

@@ -31,6 +31,9 @@ AHEAD = 2
 LOOK_S = 2.0
 """Seconds between two looks at whether scheduler and workers are there."""
 
+ATTEMPT_S = 5.0
+"""Seconds that one attempt to reach the scheduler may take."""
+
 NO_WORKERS_S = 30.0
 """Seconds without any worker after which it is said."""
 
@@ -85,7 +88,8 @@ class Cluster:
         named = self._how.scheduler or str(self._how.scheduler_file)
         end = time.monotonic() + self._how.reconnect_s
         while True:
-            left = max(1.0, end - time.monotonic())
+            # Again and again: a scheduler that is started anew may be at another address, which its file tells.
+            left = max(1.0, min(ATTEMPT_S, end - time.monotonic()))
             try:
                 if self._how.scheduler:
                     return self._dask.Client(self._how.scheduler, timeout=left, set_as_default=False)
