@@ -37,7 +37,7 @@ LEAST_SIGMA_PX = 1e-3
 UNEVEN = 1e-3
 """Steps of time that differ by more than this part of the middle one are told."""
 
-SINGLE_POINT = "no bodies are given: each node is a body by itself"
+SINGLE_POINT = "no bodies are given: each node is a body by itself (find_rig finds them)"
 
 
 @dataclass(frozen=True)

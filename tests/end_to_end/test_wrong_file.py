@@ -53,6 +53,7 @@ READERS = {
     "animate": ("animate {} -o OUT.mp4", {"drop.mp4": "a film"}),
     "export": ("export {} -o OUT.mat", {"drop.mp4": "a film", "encoder.csv": "an encoder recording"}),
     "import": ("import {} -o OUT.csv", {"drop.mp4": "a film", "motion.parquet": "an angles table"}),
+    "find-rig": ("find-rig {} -o OUT.csv", {"drop.mp4": "a film", "motion.parquet": "an angles table"}),
     "analyse": ("analyse {} -o OUT", {"scene.toml": "a scene", "encoder.csv": "an encoder recording"}),
 }
 

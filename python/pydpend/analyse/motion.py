@@ -80,7 +80,7 @@ def points(nodes: Nodes, options: Options, into: Path, tell: Tell) -> str:
     kept = _kept(found, nodes.rig, named)
     if not kept:
         raise DoesNotApply(f"no marker and no joint that moves has {LEAST_PLACES} places")
-    moving = point_states(found.select(kept))
+    moving = point_states(found.select(*kept))
     for note in found.meta["notes"]:
         tell(Note(note))
     RecordingFolder(into).write_points(moving, found.meta)

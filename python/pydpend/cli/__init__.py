@@ -38,6 +38,7 @@ COMMANDS: tuple[str, ...] = (
     "plot",
     "animate",
     "import",
+    "find-rig",
     "export",
     "completions",
 )
@@ -46,8 +47,8 @@ COMMANDS: tuple[str, ...] = (
 ALL = (*COMMANDS, *tracker.COMMANDS)
 """Every command; where several have an option, an earlier one is named."""
 
-MODULES = {"import": "import_tracks"}
-"""Modules of commands whose names are words of Python."""
+MODULES = {"import": "import_tracks", "find-rig": "find_rig"}
+"""Modules of commands whose names are no names of Python's."""
 
 
 def _version() -> str:

@@ -5,7 +5,8 @@ what.
 ``markers``: image to world. ``pose``, ``linkage``, ``pairwise``: the estimators. ``body_view``, ``camera``,
 ``camera_slopes``: what the camera does to the angles. ``unwrap``: turns. ``zero``, ``swing``, ``vertical``: rests,
 where the motion says that the links hang, where the picture does; ``rests``, ``hanging``: which of them is the zero.
-``estimate``: the one body that calls them.
+``estimate``: the one body that calls them. ``rig_search``: bodies and joints of tracks without any, by
+``constant_distances`` and ``shared_points``.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from pydpend.kinematics.names import LinkJoint
 from pydpend.kinematics.pairwise import PairAngles, pair_angles
 from pydpend.kinematics.point_places import Places, places
 from pydpend.kinematics.pose import Pose, fit_pose
+from pydpend.kinematics.rig_search import find_rig
 from pydpend.kinematics.shape import Shape
 from pydpend.kinematics.structure import Structure
 from pydpend.kinematics.swing import Swing, find_swing
@@ -39,6 +41,7 @@ __all__ = [
     "angles",
     "find_linkage",
     "find_rest",
+    "find_rig",
     "find_swing",
     "fit_pose",
     "misfits",

@@ -76,12 +76,12 @@ class Places(TableResult):
         return html_rows(repr(self)[1:-1], few)
 
     @typed()
-    def select(self, points: Sequence[str]) -> Places:
+    def select(self, *points: str) -> Places:
         """Some of the points, in the order named.
 
         Parameters
         ----------
-        points : sequence of str
+        *points : str
             Their names.
 
         Returns
@@ -99,7 +99,7 @@ class Places(TableResult):
                 advice = f"There are {', '.join(self.names)}"
                 raise AnglesError(fault(Setting("points"), f"there is no point {name!r}", advice))
         k = [self.names.index(name) for name in points]
-        return replace(self, names=tuple(points), xy=self.xy[:, k], sigma=self.sigma[:, k])
+        return replace(self, names=points, xy=self.xy[:, k], sigma=self.sigma[:, k])
 
     def to_columns(self) -> dict[str, NDArray[Any]]:
         """The places as columns of a table.
