@@ -64,6 +64,7 @@ if TYPE_CHECKING:
     from pydpend.live import NodeRow, Tracker, detect
     from pydpend.model import Damping, Model, derived, published, read_model
     from pydpend.nodes import Nodes, Rig, read_nodes
+    from pydpend.page.opening import edit
     from pydpend.plots.of_results import plot
     from pydpend.scoring import Score, score
     from pydpend.simulation import Simulation, simulate, simulate_many
@@ -122,6 +123,7 @@ __all__ = [
     "compare",
     "derived",
     "detect",
+    "edit",
     "encoder_angles",
     "export",
     "film",
@@ -210,6 +212,7 @@ _HOMES = {
     "live": ("NodeRow", "Tracker", "detect"),
     "model": ("Damping", "Model", "derived", "published", "read_model"),
     "nodes": ("Nodes", "Rig", "read_nodes"),
+    "page.opening": ("edit",),
     "free_swing": ("RingDown", "ring_down"),
     "plots.of_results": ("plot",),
     "scoring": ("Score", "score"),

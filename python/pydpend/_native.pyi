@@ -29,6 +29,7 @@ __all__ = [
     "DetectSettings",
     "EncodeSettings",
     "Film",
+    "FrameReader",
     "IntegratorSettings",
     "Law",
     "LiveTracker",
@@ -47,6 +48,7 @@ __all__ = [
     "commands",
     "damage_words",
     "detect",
+    "edited_table",
     "fingerprint",
     "follow_motion",
     "frame_range",
@@ -154,6 +156,16 @@ class OutputSettings:
     ) -> Self: ...
 
 @final
+class FrameReader:
+    """Frames of a film by their index; raises ArgumentError for one that is not there."""
+
+    def __new__(cls, input: str, open: OpenOptions) -> Self: ...
+    def frame(
+        self, index: int
+    ) -> tuple[NDArray[np.uint16] | None, int, tuple[NDArray[np.uint8], NDArray[np.uint8]] | None]:
+        """Samples (H, W), None where not decoded, bits of a sample, blue and red differences, a byte each, flat."""
+
+@final
 class OverlaySettings:
     """How a film with what was found is drawn; `width` is in px."""
 
@@ -174,6 +186,9 @@ class EncodeSettings:
         bits: int | None,
     ) -> Self: ...
 
+def edited_table(held: HeldColumns, meta: str, edits: str, name: str) -> Columns:
+    """Columns with decisions made on them; `name` is for messages."""
+
 def track(
     input: str,
     rig: str | None,
@@ -181,6 +196,7 @@ def track(
     detect: DetectSettings,
     open: OpenOptions,
     wanted: Wanted,
+    edits: str | None,
     output: OutputSettings,
     progress: Callback,
 ) -> tuple[Columns, list[Message], BaseException | None]:

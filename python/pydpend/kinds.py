@@ -27,6 +27,7 @@ Kind: TypeAlias = Literal[
     "tables",
     "calibration",
     "rig",
+    "edits",
     "scene",
     "model",
     "config",

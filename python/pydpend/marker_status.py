@@ -3,8 +3,11 @@
 `tracker::observation::Status` of the compiled half has the same.
 """
 
-MISSING, SEEN, REACQUIRED, AMBIGUOUS, UNDECODED = range(5)
+MISSING, SEEN, REACQUIRED, AMBIGUOUS, UNDECODED, MANUAL = range(6)
 """Numbers in `pydpend.Nodes.status`: not seen; seen; the first frame back; may be it, but another name is possible; the
-frame could not be decoded."""
+frame could not be decoded; a person said where it is, or what is it."""
 
-STATUS_WORDS = ("missing", "seen", "reacquired", "ambiguous", "undecoded")
+STATUS_WORDS = ("missing", "seen", "reacquired", "ambiguous", "undecoded", "manual")
+
+PLACED = (SEEN, REACQUIRED, MANUAL)
+"""States in which the place is known."""

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pydpend import _native
 from pydpend.errors import ArgumentError, Setting, TableError, Text, fault
-from pydpend.marker_status import MISSING, SEEN
+from pydpend.marker_status import MISSING, PLACED, SEEN
 from pydpend.raw_tracks import Floats, RawTracks
 from pydpend.rig import Node, Rig
 from pydpend.series import highpass_noise
@@ -123,7 +123,7 @@ def _seen(tracks: RawTracks, xy: Floats, who: Who) -> NDArray[np.bool_]:
     seen = np.asarray(there.all(axis=2))
     if tracks.status is None:
         return seen
-    is_seen = (tracks.status == 1) | (tracks.status == 2)
+    is_seen = np.isin(tracks.status, PLACED)
     wrong = np.argwhere(is_seen & ~seen)
     if wrong.size:
         t, n = wrong[0]

@@ -20,7 +20,16 @@ from pydpend.crossing import Columns, HeldColumns
 from pydpend.datasets import poses_dataset
 from pydpend.errors import ArgumentError, Step, TableError, fault
 from pydpend.kinds import kind_of, misplaced
-from pydpend.marker_status import AMBIGUOUS, MISSING, REACQUIRED, SEEN, STATUS_WORDS, UNDECODED
+from pydpend.marker_status import (
+    AMBIGUOUS,
+    MANUAL,
+    MISSING,
+    PLACED,
+    REACQUIRED,
+    SEEN,
+    STATUS_WORDS,
+    UNDECODED,
+)
 from pydpend.node_arrays import Bodies, Who, assembled
 from pydpend.output import AnyPath, path_of
 from pydpend.raw_tracks import RawTracks
@@ -35,6 +44,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "AMBIGUOUS",
+    "MANUAL",
     "MISSING",
     "REACQUIRED",
     "SEEN",
@@ -69,9 +79,9 @@ class Nodes:
         Standard uncertainty of each coordinate in square pixels as high as the recorded ones, the greater of the two;
         in recorded pixels that of x is as much smaller as these are wider than high.
     area_px : ndarray of float32, shape (T, N)
-        Area of each blob, px.
+        Area of each blob, px; NaN of what a person placed.
     status : ndarray of uint8, shape (T, N)
-        ``MISSING``, ``SEEN``, ``REACQUIRED``, ``AMBIGUOUS`` or ``UNDECODED`` (0 to 4, in `pydpend.nodes`).
+        ``MISSING``, ``SEEN``, ``REACQUIRED``, ``AMBIGUOUS``, ``UNDECODED`` or ``MANUAL`` (0 to 5, in `pydpend.nodes`).
     rig : Rig
         The rig; its nodes are in the order of the arrays.
     meta : dict
@@ -189,8 +199,8 @@ class Nodes:
 
     @property
     def seen(self) -> NDArray[np.bool_]:
-        """Whether a place is known, (T, N)."""
-        seen: NDArray[np.bool_] = (self.status == SEEN) | (self.status == REACQUIRED)
+        """Whether a place is known, (T, N): found in the film, or said by a person."""
+        seen: NDArray[np.bool_] = np.isin(self.status, PLACED)
         return seen
 
     @property
@@ -210,6 +220,12 @@ class Nodes:
         """
         damage = self.meta.get("damage")
         return None if damage is None else _native.damage_words(json.dumps(damage))
+
+    @property
+    def edits(self) -> str | None:
+        """How many rows a person decided and where, in a sentence; None if no edits were given."""
+        edits = self.meta.get("settings", {}).get("edits")
+        return None if edits is None else str(edits.get("words"))
 
     @property
     def notes(self) -> tuple[str, ...]:

@@ -92,6 +92,7 @@ def track(
     interlaced: Interlaced = "refuse",
     allow_protocol: bool = False,
     pixel_aspect: PixelAspect | None = None,
+    edits: Path | None = None,
 ) -> Nodes:
     """Nodes of a recording: its markers followed from frame to frame.
 
@@ -148,6 +149,8 @@ def track(
         Whether network addresses and devices are opened too.
     pixel_aspect : tuple of int or str, optional
         Width to height of a pixel, ``(16, 15)`` or ``"16:15"``, instead of what the recording says.
+    edits : path-like, optional
+        A file of people's decisions (docs/reference/edits.md), made on the rows before they are given or written.
 
     Returns
     -------
@@ -166,7 +169,8 @@ def track(
     TableError
         If `output` is there already or cannot be written.
     ArgumentError
-        If an argument makes no sense.
+        If an argument makes no sense, or edits are of another film or name a node, a frame or a detection that is not
+        there; with their line.
     KeyboardInterrupt
         On Ctrl-C, within two seconds. What was done until then is the exception's ``nodes``, and with `output` it is
         kept there, to go on with ``resume=True``.
@@ -179,7 +183,8 @@ def track(
     reading = given(ReadingOptions, locals())
     existing = "resume" if resume else "replace" if force else "refuse"
     target = None if output is None else os.fsdecode(output)
-    written = _native.OutputSettings(target, existing=existing, safe_csv=safe_csv, reads=_files(rig))
+    reads = [*_files(rig), *([] if edits is None else [os.fsdecode(edits)])]
+    written = _native.OutputSettings(target, existing=existing, safe_csv=safe_csv, reads=reads)
     told, close = callback(progress)
     try:
         columns, warnings, stopped = _native.track(
@@ -189,6 +194,7 @@ def track(
             reading.detected(),
             reading.opened(),
             wanted(marker, markers, also, same),
+            None if edits is None else os.fsdecode(edits),
             written,
             told,
         )

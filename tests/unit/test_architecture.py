@@ -78,6 +78,7 @@ GROUPS: tuple[tuple[str, ...], ...] = (
     ("citing", "report"),
     ("analyse",),
     ("batching",),
+    ("page",),
     ("cli",),
 )
 
@@ -109,6 +110,7 @@ RUST_GROUPS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("detect",),
         ("table", "store"),
         ("rigid", "link", "calibrate"),
+        ("edits",),
         ("discover", "moving", "track"),
         ("synth",),
         ("residual", "score"),

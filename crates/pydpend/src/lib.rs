@@ -7,6 +7,7 @@ mod command;
 mod dynamics;
 mod errors;
 mod film;
+mod frames;
 mod images;
 mod laws;
 mod live;
@@ -29,6 +30,8 @@ mod _native {
     #[pymodule_export]
     use super::film::{EncodeSettings, PyFilm, score_places};
     #[pymodule_export]
+    use super::frames::FrameReader;
+    #[pymodule_export]
     use super::live::{LiveTracker, detect};
     #[pymodule_export]
     use super::rig::{plane_places, plane_slopes, read_rig, recorded_places, rig_toml, write_rig};
@@ -45,7 +48,8 @@ mod _native {
     use super::smoothing::{learn_noise, smooth_angles};
     #[pymodule_export]
     use super::tables::{
-        arrow_reader, check_table, damage_words, kind_of, misplaced, read_meta, read_table, write_table,
+        arrow_reader, check_table, damage_words, edited_table, kind_of, misplaced, read_meta, read_table,
+        write_table,
     };
     #[pymodule_export]
     use super::track::{

@@ -13,6 +13,7 @@ use numpy::{
 };
 use pyo3::prelude::*;
 use pyo3_arrow::PyRecordBatchReader;
+use tracker::edits::{self, Edits};
 use tracker::error::{Error, Fault};
 use tracker::gaps::Damage;
 use tracker::kind::{self, Kind};
@@ -104,6 +105,20 @@ pub fn table_of(py: Python<'_>, held: &Held<'_>, meta: &str) -> PyResult<NodeTab
     let meta = TableMeta::from_json(meta, "nodes.meta").map_err(|e| raise(py, e))?;
     let rows = rows_of(py, held, meta.rig.nodes.len())?;
     Ok(NodeTable { meta, rows })
+}
+
+/// Columns with the decisions of a text of edits made on them, by rows alone.
+#[pyfunction]
+pub fn edited_table<'py>(
+    py: Python<'py>,
+    held: Held<'_>,
+    meta: &str,
+    edits: &str,
+    name: &str,
+) -> PyResult<Columns<'py>> {
+    let table = table_of(py, &held, meta)?;
+    let done = py.detach(|| edits::edited(table, &Edits::parse(edits, name)?));
+    columns(py, done.map_err(|e| raise(py, e))?)
 }
 
 /// The frames lost to damage by a table's `meta["damage"]`, in a sentence; `None` if none are.

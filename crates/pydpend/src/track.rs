@@ -5,12 +5,14 @@ use std::path::{Path, PathBuf};
 use numpy::{IntoPyArray, PyArray1, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use serde_json::json;
+use tracker::edits::Edits;
 use tracker::error::Error;
 use tracker::message::Message;
 use tracker::name::text;
 use tracker::output;
 use tracker::overlay::{self, FilmSettings};
 use tracker::pipeline::{self, RunSettings};
+use tracker::setting_words;
 use tracker::source;
 use tracker::table::{Fingerprint, SourceFacts};
 
@@ -44,7 +46,7 @@ fn settings(
 /// The frames of `A..B`, of which B may be left out.
 #[pyfunction]
 pub fn frame_range(py: Python<'_>, text: &str) -> PyResult<(u64, Option<u64>)> {
-    let frames = pipeline::frame_range(text)
+    let frames = setting_words::frame_range(text)
         .map_err(|problem| argument(py, "frames", format!("{text:?} cannot be"), &problem))?;
     Ok((frames.start, (frames.end < u64::MAX).then_some(frames.end)))
 }
@@ -67,11 +69,13 @@ pub fn track<'py>(
     detect: &PyDetectSettings,
     open: &PyOpenOptions,
     wanted: &PyWanted,
+    edits: Option<PathBuf>,
     output: &OutputSettings,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<(Columns<'py>, Messages<'py>, Option<PyErr>)> {
     let settings = RunSettings {
         rig: self::rig(py, rig)?,
+        edits: edits.map(|file| Edits::read(&file)).transpose().map_err(|e| raise(py, e))?,
         output: output.path.clone(),
         existing: output.existing,
         collect: true,

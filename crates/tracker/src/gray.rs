@@ -1,6 +1,6 @@
-//! Converts a frame to its brightness in 8 bits, for pictures and for looking at what moves.
+//! Converts a frame to its brightness, in 8 bits for pictures and for looking at what moves, or as it was recorded.
 //!
-//! Owns: [`gray8`]. Must not: serve measurement where a recording has more than 8 bits.
+//! Owns: [`gray8`], [`samples`]. Must not: serve measurement, which takes the frame's own bytes.
 
 use crate::error::{Error, Fault, FaultKind, Result};
 use crate::frame::{Frame, PixelFormat};
@@ -12,28 +12,39 @@ use crate::frame::{Frame, PixelFormat};
 pub fn gray8(frame: &Frame) -> Result<Vec<u8>> {
     let (w, h) = (frame.width as usize, frame.height as usize);
     let Some(bytes) = frame.bytes()? else { return Ok(vec![0; w * h]) };
-    let short = || {
-        Error::Source(
-            Fault::new(
-                format!("frame {}", frame.index),
-                format!("{} bytes are too few for {w} x {h} px", bytes.len()),
-            )
-            .of_kind(FaultKind::Damaged),
-        )
-    };
+    if frame.format == PixelFormat::Gray8 {
+        let mut out = Vec::with_capacity(w * h);
+        for y in 0..h {
+            let row = bytes.get(y * frame.stride..y * frame.stride + w);
+            out.extend_from_slice(row.ok_or_else(|| short(frame, bytes.len()))?);
+        }
+        return Ok(out);
+    }
     let down = frame.depth_bits.saturating_sub(8);
-    let shown = |v: u32| (v >> down).min(255) as u8;
+    let shown = |v: u16| (v >> down).min(255) as u8;
+    Ok(samples(frame)?.unwrap_or_default().into_iter().map(shown).collect())
+}
+
+/// Samples of a frame as they were recorded, row by row; `None` where it could not be decoded.
+///
+/// # Errors
+/// [`Error::Source`] if its plane is shorter than its size says.
+pub fn samples(frame: &Frame) -> Result<Option<Vec<u16>>> {
+    let (w, h) = (frame.width as usize, frame.height as usize);
+    let Some(bytes) = frame.bytes()? else { return Ok(None) };
+    let short = || short(frame, bytes.len());
     let mut out = Vec::with_capacity(w * h);
     match frame.format {
         PixelFormat::Gray8 => {
             for y in 0..h {
-                out.extend_from_slice(bytes.get(y * frame.stride..y * frame.stride + w).ok_or_else(short)?);
+                let row = bytes.get(y * frame.stride..y * frame.stride + w).ok_or_else(short)?;
+                out.extend(row.iter().map(|b| u16::from(*b)));
             }
         }
         PixelFormat::Gray16 => {
             for y in 0..h {
                 let row = bytes.get(y * frame.stride..y * frame.stride + 2 * w).ok_or_else(short)?;
-                out.extend(row.chunks_exact(2).map(|b| shown(u32::from(u16::from_le_bytes([b[0], b[1]])))));
+                out.extend(row.chunks_exact(2).map(|b| u16::from_le_bytes([b[0], b[1]])));
             }
         }
         PixelFormat::Packed10 | PixelFormat::Packed12 => {
@@ -47,12 +58,22 @@ pub fn gray8(frame: &Frame) -> Result<Vec<u8>> {
                     for k in 0..2 {
                         v = v << 8 | u32::from(*bytes.get(first / 8 + k).ok_or_else(short)?);
                     }
-                    out.push(shown(v >> (16 - first % 8 - bits) & ((1 << bits) - 1)));
+                    out.push((v >> (16 - first % 8 - bits) & ((1 << bits) - 1)) as u16);
                 }
             }
         }
     }
-    Ok(out)
+    Ok(Some(out))
+}
+
+fn short(frame: &Frame, bytes: usize) -> Error {
+    Error::Source(
+        Fault::new(
+            format!("frame {}", frame.index),
+            format!("{bytes} bytes are too few for {} x {} px", frame.width, frame.height),
+        )
+        .of_kind(FaultKind::Damaged),
+    )
 }
 
 #[cfg(test)]
@@ -74,5 +95,6 @@ mod tests {
             colour: None,
         };
         assert_eq!(gray8(&f).unwrap(), [0xAB, 0x12]);
+        assert_eq!(samples(&f).unwrap().unwrap(), [0xABC, 0x123]);
     }
 }

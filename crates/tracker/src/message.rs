@@ -42,6 +42,8 @@ pub enum Setting {
     Codec,
     /// The library that decodes compressed film.
     Decoder,
+    /// Decisions of people about single rows.
+    Edits,
     /// Only each n-th frame is drawn.
     Every,
     /// Replacing of files that are there already; a switch.
@@ -94,13 +96,14 @@ pub enum Setting {
 
 impl Setting {
     /// All of them.
-    pub const ALL: [Self; 30] = [
+    pub const ALL: [Self; 31] = [
         Self::AllowProtocol,
         Self::Also,
         Self::Bits,
         Self::Centroid,
         Self::Codec,
         Self::Decoder,
+        Self::Edits,
         Self::Every,
         Self::Force,
         Self::Fps,
@@ -136,6 +139,7 @@ impl Setting {
             Self::Centroid => "centroid",
             Self::Codec => "codec",
             Self::Decoder => "decoder",
+            Self::Edits => "edits",
             Self::Every => "every",
             Self::Force => "force",
             Self::Fps => "fps",

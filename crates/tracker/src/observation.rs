@@ -1,6 +1,6 @@
 //! Holds the observation of a node: its place in one frame, and how certain its name is.
 //!
-//! Owns: [`Observation`], [`Status`]. Must not: know how it was made.
+//! Owns: [`Observation`], [`Status`], [`STATUSES`], [`PART_SIGMA_PX`]. Must not: know how it was made.
 
 use nalgebra::Vector2;
 
@@ -21,7 +21,16 @@ pub enum Status {
     Ambiguous = 3,
     /// The frame could not be decoded, so nothing is known of any node in it.
     Undecoded = 4,
+    /// A person said where it is, or what is it.
+    Manual = 5,
 }
+
+/// All of them, by their numbers. `marker_status.py` has the same, and a test compares them.
+pub const STATUSES: [Status; 6] =
+    [Status::Missing, Status::Seen, Status::Reacquired, Status::Ambiguous, Status::Undecoded, Status::Manual];
+
+/// Added uncertainty of the centre of what is not the whole of one marker, px: its outline is that of a part.
+pub const PART_SIGMA_PX: f32 = 0.2;
 
 impl Status {
     /// The word in the table.
@@ -32,23 +41,22 @@ impl Status {
             Status::Reacquired => "reacquired",
             Status::Ambiguous => "ambiguous",
             Status::Undecoded => "undecoded",
+            Status::Manual => "manual",
         }
     }
 
     /// Whether the place is given.
     pub fn is_seen(self) -> bool {
-        matches!(self, Status::Seen | Status::Reacquired)
+        matches!(self, Status::Seen | Status::Reacquired | Status::Manual)
     }
 
     /// The status of a number, `None` if there is none.
     pub fn from_number(number: u8) -> Option<Self> {
-        [Status::Missing, Status::Seen, Status::Reacquired, Status::Ambiguous, Status::Undecoded]
-            .get(usize::from(number))
-            .copied()
+        STATUSES.get(usize::from(number)).copied()
     }
 }
 
-/// One node in one frame. The place is NaN unless its status is seen or reacquired.
+/// One node in one frame. The place is NaN unless its status is seen, reacquired or manual.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Observation {
     /// Centre, px; x right.
@@ -57,7 +65,7 @@ pub struct Observation {
     pub y_px: f64,
     /// Standard uncertainty of each coordinate in square pixels as high as the recorded ones, px.
     pub sigma_px: f32,
-    /// Blob area, px.
+    /// Blob area, px; NaN where a person placed it.
     pub area_px: f32,
     /// Whether the node was seen, and how.
     pub status: Status,

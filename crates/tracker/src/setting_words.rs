@@ -1,6 +1,6 @@
 //! Parses settings whose values are words: one list of words for the command line, Python and files.
 //!
-//! Owns: [`Worded`]. Each setting has its list beside its type.
+//! Owns: [`Worded`], [`frame_range`]. Each setting has its list beside its type.
 //!
 //! ```
 //! use tracker::setting_words::Worded;
@@ -12,8 +12,23 @@
 //! assert_eq!(said, "decoder: \"gstreamer\" is not known. Give auto, ffmpeg or opencv");
 //! ```
 
+use std::ops::Range;
+
 use crate::error::Fault;
 use crate::message::Setting;
+
+/// The frames of `A..B`, `A..` or `..B`: from A up to but not B.
+///
+/// # Errors
+/// What was expected.
+pub fn frame_range(text: &str) -> Result<Range<u64>, String> {
+    let form = "expected A..B, for example 0..1000";
+    let (start, end) = text.split_once("..").ok_or(form)?;
+    let number = |t: &str, none: u64| {
+        if t.is_empty() { Ok(none) } else { t.parse().map_err(|_| format!("{t:?} is not a frame; {form}")) }
+    };
+    Ok(number(start, 0)?..number(end, u64::MAX)?)
+}
 
 /// A setting whose values are words.
 pub trait Worded: Copy + PartialEq + Sized + 'static {

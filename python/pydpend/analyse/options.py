@@ -42,6 +42,8 @@ class Options(FitOptions, ReadingOptions):
         Numbers of the picture of ``pydpend setup`` that are to be followed too, with commas.
     same : tuple of str
         Two nodes of a film that are one marker, ``n1=n2``; once for each pair.
+    edits : str, optional
+        File of people's decisions on the markers of a film (docs/reference/edits.md), made before angles are taken.
     encoder : str, optional
         Encoder file of the first recording: time_s and voltage_v (or an angle) as CSV, TDMS or NumPy.
     column : str, optional
@@ -107,6 +109,7 @@ class Options(FitOptions, ReadingOptions):
     markers: int | None = None
     also: str | None = None
     same: tuple[str, ...] = ()
+    edits: str | None = None
     encoder: str | None = None
     column: str | None = None
     time_column: str | None = None
@@ -190,6 +193,7 @@ class Options(FitOptions, ReadingOptions):
 
 WANTED: Mapping[str, tuple[Kind, ...]] = {
     "rig": ("rig",),
+    "edits": ("edits",),
     "encoder": ("encoder", "angles"),
     "calibration": ("calibration", "tables", "encoder"),
     "model": ("model",),
@@ -208,7 +212,7 @@ def check_files(options: Options) -> None:
         if name is None or (field == "zero" and parse_zero(name) is not None):
             continue
         expect(name, kinds, OptionError, field)
-        if field in ("rig", "encoder", "calibration") and not Path(name).exists():
+        if field in ("rig", "edits", "encoder", "calibration") and not Path(name).exists():
             raise OptionError(fault(Setting(field), f"there is no file {name}", "Check the name"))
     check_model_called(options.model)
     zero = options.zero

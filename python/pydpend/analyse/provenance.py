@@ -13,7 +13,7 @@ from pydpend.analyse.options import Options, all_options
 from pydpend.option_fields import flag_of
 from pydpend.terminal import shell_word
 
-FILES = ("rig", "encoder", "calibration", "model", "zero")
+FILES = ("rig", "edits", "encoder", "calibration", "model", "zero")
 """Options that may name a file or a folder."""
 
 

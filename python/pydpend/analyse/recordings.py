@@ -80,6 +80,7 @@ def recordings(options: Options, digests: Digests) -> tuple[Recording, ...]:
 
 APPLIES: Mapping[str, tuple[str, ...]] = {
     "rig": ("film",),
+    "edits": ("film",),
     "marker": ("film",),
     "markers": ("film",),
     "also": ("film",),

@@ -232,6 +232,7 @@ def _plan_recording(
                 known.option(options.rig),
                 options.reading_key(),
                 *options.of_markers().items(),
+                *([] if options.edits is None else [known.option(options.edits)]),
             ],
             lambda into, tell, resume: stages.track(r, options, into, tell, resume),
             (RunFile.NODES,),

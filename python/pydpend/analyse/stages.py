@@ -63,6 +63,7 @@ def track(r: Recording, options: Options, into: Path, tell: Tell, resume: bool) 
             options.rig,
             **options.reading(),
             **options.of_markers(),
+            edits=options.edits,
             output=RecordingFolder(into).file(RunFile.NODES),
             resume=resume,
             force=True,

@@ -29,6 +29,7 @@ from pydpend.terminal import Shown, shortened
 COMMANDS: tuple[str, ...] = (
     "analyse",
     "batch",
+    "edit",
     "angles",
     "states",
     "calibrate",

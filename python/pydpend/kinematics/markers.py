@@ -16,12 +16,10 @@ from numpy.typing import NDArray
 from pydpend._native import plane_places, recorded_places
 from pydpend.errors import CHECK, AnglesError, Setting, fault
 from pydpend.kinematics.table import Floats
+from pydpend.marker_status import PLACED
 
 if TYPE_CHECKING:
     from pydpend.nodes import Nodes, Rig
-
-SEEN_STATUS = (1, 2)
-"""Row states whose centre is trusted: ``seen`` and ``reacquired``. ``ambiguous`` is not."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,7 +131,7 @@ def body_markers(
                 Setting("bodies"), f"{twice}: no body, or one twice", f"Name each once of {', '.join(names)}"
             )
         )
-    trusted = np.isin(nodes.status, SEEN_STATUS) & np.isfinite(nodes.xy_px).all(axis=2)
+    trusted = np.isin(nodes.status, PLACED) & np.isfinite(nodes.xy_px).all(axis=2)
     bad = np.argwhere(trusted & ~(np.isfinite(nodes.sigma_px) & (nodes.sigma_px > 0)))
     if bad.size:
         t, n = (int(v) for v in bad[0])

@@ -11,8 +11,8 @@ from pydpend.nodes import STATUS_WORDS, Nodes
 from pydpend.plots.angles import thinned
 from pydpend.plots.style import COLORS, new_figure, plain, style
 
-STATUS_COLORS = ("0.85", COLORS[2], COLORS[0], COLORS[1], COLORS[3])
-"""Missing, seen, reacquired, ambiguous, undecoded."""
+STATUS_COLORS = ("0.85", COLORS[2], COLORS[0], COLORS[1], COLORS[3], COLORS[4])
+"""Missing, seen, reacquired, ambiguous, undecoded, manual."""
 
 
 def nodes_figure(nodes: Nodes, residual_px: NDArray[np.float64]) -> Figure:

@@ -180,6 +180,7 @@ class StatusMap(_Block):
         ("ambiguous", "--s1"),
         ("missing", "--line"),
         ("undecoded", "--s3"),
+        ("manual", "--s4"),
     )
 
 

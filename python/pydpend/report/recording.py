@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pydpend.encoder import Comparison
 from pydpend.kinematics import LinkAngles
 from pydpend.kinematics.camera import rms_of
-from pydpend.nodes import Nodes
+from pydpend.nodes import AMBIGUOUS, MANUAL, Nodes
 from pydpend.plots.encoder import calibration_figure
 from pydpend.plots.style import inline_svg
 from pydpend.recording_folder import StoredOverlay
@@ -154,7 +154,7 @@ class Part:
         runs = tuple(_runs(n.t_s, n.status[:, i]) for i in range(len(names)))
         rows = []
         for i, node in enumerate(n.rig.nodes):
-            seen = np.isin(n.status[:, i], (1, 2))
+            seen = n.seen[:, i]
             lengths = _gaps(seen)
             sigma = n.sigma_px[seen, i]
             off = residual[np.isfinite(residual[:, i]), i]
@@ -165,7 +165,8 @@ class Part:
                     f"{100 * seen.mean():.2f} %",
                     str(len(lengths)),
                     str(max(lengths, default=0)),
-                    str(int((n.status[:, i] == 3).sum())),
+                    str(int((n.status[:, i] == AMBIGUOUS).sum())),
+                    str(int((n.status[:, i] == MANUAL).sum())),
                     f"{np.nanmedian(sigma):.4f}" if sigma.size else "–",
                     f"{np.sqrt(np.mean(off**2)):.4f}" if off.size else "–",
                     f"{off.max():.3f}" if off.size else "–",
@@ -200,6 +201,7 @@ class Part:
                     "gaps",
                     "longest gap (frames)",
                     "ambiguous (frames)",
+                    "by a person (frames)",
                     "median sigma (px)",
                     "RMS to shape (px)",
                     "largest (px)",
@@ -292,13 +294,14 @@ def read(r: StoredRecording) -> Part:
     if r.did("track") or r.kind == "nodes":
         nodes = r.nodes()
         part.nodes = nodes
-        seen = np.isin(nodes.status, (1, 2))
+        seen = nodes.seen
         rows += [
             ("frames", str(nodes.frame.size)),
             *_times(nodes.t_s, nodes.meta.get("time")),
             *_pixels(nodes),
             ("markers, bodies", f"{len(nodes.rig.nodes)}, {len(nodes.rig.bodies)}"),
             ("markers seen, of all frames", f"{100 * seen.mean():.1f} %"),
+            *([] if nodes.edits is None else [("decided by people", nodes.edits)]),
             ("median uncertainty of a centre", f"{digits(float(np.nanmedian(nodes.sigma_px)))} px"),
         ]
         time = nodes.meta.get("time")

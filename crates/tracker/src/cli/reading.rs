@@ -3,10 +3,10 @@
 use std::ops::Range;
 
 use crate::detect::{Centroid, DetectSettings, PolaritySetting, Threshold};
-use crate::pipeline::{RunSettings, frame_range};
+use crate::pipeline::RunSettings;
 use crate::pixel_aspect::PixelAspect;
 use crate::rig::Region;
-use crate::setting_words::Worded;
+use crate::setting_words::{Worded, frame_range};
 use crate::source::{Decoder, Interlaced, OpenOptions};
 use crate::wanted::{Pointed, Wanted};
 use clap::builder::{PossibleValuesParser, TypedValueParser};

@@ -6,6 +6,7 @@ use std::ffi::OsString;
 use std::path::PathBuf;
 
 use crate::csv_text::Cells;
+use crate::edits::Edits;
 use crate::error::Error;
 use crate::name::{shown, text};
 use crate::pipeline::{Existing, RunSettings, RunSummary, partial_path, run as run_pipeline};
@@ -29,6 +30,9 @@ pub struct Args {
     /// Nodes, bodies and joints, as `pydpend setup` writes them; found in the recording if not given
     #[arg(long, value_name = "RIG.toml")]
     rig: Option<PathBuf>,
+    /// Decisions of people, in the form of docs/reference/edits.md, made on the rows before they are written
+    #[arg(long, value_name = "EDITS.toml")]
+    edits: Option<PathBuf>,
     #[command(flatten)]
     read: ReadArgs,
     /// Go on where an earlier run stopped
@@ -58,8 +62,9 @@ impl Args {
                 _ => Existing::Refuse,
             },
             rig: self.rig.as_deref().map(Rig::read).transpose()?,
+            edits: self.edits.as_deref().map(Edits::read).transpose()?,
             cells: if self.safe_csv { Cells::Safe } else { Cells::Plain },
-            reads: self.rig.iter().cloned().collect(),
+            reads: self.rig.iter().chain(&self.edits).cloned().collect(),
             ..self.read.settings(text(&self.input))
         })
     }

@@ -156,6 +156,8 @@ fn kind_of_toml(table: &toml::Table) -> Kind {
     };
     if has("node") {
         Kind::Rig
+    } else if has("film") && has("schema") {
+        Kind::Edits
     } else if has_tables("marker") || has("link") || has("camera") {
         Kind::Scene
     } else if has("part") || has("constants") {

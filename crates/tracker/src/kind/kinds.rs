@@ -23,6 +23,8 @@ pub enum Kind {
     Calibration,
     /// A rig file.
     Rig,
+    /// Decisions of people about a film's markers.
+    Edits,
     /// A scene to film.
     Scene,
     /// A pendulum's parts or constants.
@@ -47,7 +49,7 @@ pub enum Kind {
 
 impl Kind {
     /// All of them.
-    pub const ALL: [Self; 19] = [
+    pub const ALL: [Self; 20] = [
         Self::Film,
         Self::Pictures,
         Self::NodeTable,
@@ -57,6 +59,7 @@ impl Kind {
         Self::Tables,
         Self::Calibration,
         Self::Rig,
+        Self::Edits,
         Self::Scene,
         Self::Model,
         Self::Config,
@@ -81,6 +84,7 @@ impl Kind {
             Self::Tables => "tables",
             Self::Calibration => "calibration",
             Self::Rig => "rig",
+            Self::Edits => "edits",
             Self::Scene => "scene",
             Self::Model => "model",
             Self::Config => "config",
@@ -106,6 +110,7 @@ impl Kind {
             Self::Tables => "a folder of tables",
             Self::Calibration => "an encoder calibration",
             Self::Rig => "a rig file",
+            Self::Edits => "a file of edits",
             Self::Scene => "a scene to film",
             Self::Model => "a pendulum's model file",
             Self::Config => "a file of options for pydpend analyse",

@@ -96,6 +96,7 @@ impl Kind {
                 format!("pydpend track FILM --rig {file} -o nodes.parquet"),
                 format!("dp.track(film, {name:?})"),
             ),
+            Self::Edits => "Next: " + with_edits(&file, &name),
             Self::Scene => type_this(
                 format!("pydpend film {file} -o film.mp4"),
                 format!("dp.film({name:?}, 'film.mp4')"),
@@ -138,6 +139,12 @@ impl Kind {
             Self::Unknown => Message::default(),
         }
     }
+}
+
+/// Tracking with a file of edits.
+fn with_edits(file: &str, name: &str) -> Message {
+    let command = format!("pydpend track FILM --edits {file} -o nodes.parquet");
+    Step { command: command.into(), call: format!("dp.track(film, edits={name:?})").into() }.into()
 }
 
 /// A stem with an ending, quoted once.

@@ -10,7 +10,7 @@ fn a_file_is_known_by_what_is_in_it_and_not_by_its_name() {
         bytes.extend(name.as_bytes());
         bytes
     };
-    let cases: [(&str, &[u8], Kind); 20] = [
+    let cases: [(&str, &[u8], Kind); 21] = [
         ("a.csv", b"\0\0\0\x18ftypisom", Kind::Film),
         ("b.mp4", b"time_s,phi1_rad\n0,1\n", Kind::Angles),
         ("c.csv", b"# made by hand\ntime_s;phi1_deg;phi2_deg\n", Kind::Angles),
@@ -22,6 +22,7 @@ fn a_file_is_known_by_what_is_in_it_and_not_by_its_name() {
         ("i.toml", b"[[part]]\nname = 'bar'\n", Kind::Model),
         ("j.toml", b"frames = 4\n[camera]\ndepth_bits = 8\n", Kind::Scene),
         ("j.toml", b"[[marker]]\nradius_px = 3\n", Kind::Scene),
+        ("j.toml", b"schema = 1\n[film]\nname = 'drop.mp4'\n", Kind::Edits),
         ("j.toml", b"inputs = []\nmarker = ['3,4@5']\n", Kind::Config),
         ("k.json", b"{\"slope_v_per_rad\": 0.1, \"offset_v\": 0, \"holds\": []}", Kind::Calibration),
         ("l.xlsx", &zip("[Content_Types].xml"), Kind::Spreadsheet),

@@ -13,9 +13,10 @@ use super::reading::Run;
 use super::repeats::Repeats;
 use super::sizes::{MOST_SIZES, Sizes};
 use super::state;
-use super::summary::RunSummary;
+use super::summary::{EDITS, RunSummary};
 use super::times::times;
 use crate::discover::{Discovery, discover};
+use crate::edits::{Decided, Replay, Seen};
 use crate::error::{Error, Fault, FaultKind, Result};
 use crate::frame::Ending;
 use crate::gaps::Damage;
@@ -30,7 +31,7 @@ use crate::table::{
 use crate::timing::{self, Clock, Steps, Timing};
 use crate::track::track_recording;
 
-impl Run<'_> {
+impl<'a> Run<'a> {
     /// Finds the rig if it is not given, follows the markers, writes the table.
     /// Where there is clutter what moves is looked at first; why it is `unclear` is told.
     pub fn finish(
@@ -85,14 +86,14 @@ impl Run<'_> {
         self.warnings.extend(timing::notes(&timing));
         let rig = self.rig(end.is_none(), observer)?;
         self.check_count(&rig)?;
-        let total = self.store.len() as u64;
-        observer.stage(Stage::Track, Some(total));
+        observer.stage(Stage::Track, Some(self.store.len() as u64));
         let mut writer = match &self.settings.output {
             Some(output) => Some(TableWriter::create(output, &rig, self.settings.cells)?),
             None => None,
         };
         let mut rows = self.settings.collect.then(Rows::default);
         let mut tally = Tally::new(&rig);
+        let mut replay = self.replay(&rig, end.is_some())?;
         let mut repeats = Repeats::default();
         let mut sizes = Sizes::of(self.settings.rig.as_ref(), &rig);
         // A run that was stopped while it read is only stopped here if the user does not want to wait.
@@ -106,6 +107,9 @@ impl Run<'_> {
         let tracked = attended.run(observer, leave, |attended| {
             track_recording(&self.store, &rig, &attended.stop, &mut |stamp, observations| {
                 let time_s = clock.seconds(done, stamp.ticks);
+                sizes.push(observations);
+                repeats.push(observations);
+                let observations = replay.made(stamp.index, observations);
                 if let Some(writer) = &mut writer {
                     writer.push(stamp.index, time_s, observations)?;
                 }
@@ -113,8 +117,6 @@ impl Run<'_> {
                     rows.push(stamp.index, time_s, observations);
                 }
                 tally.push(observations);
-                sizes.push(observations);
-                repeats.push(observations);
                 if !stamp.decoded {
                     damage.undecoded.push(stamp.index);
                 }
@@ -137,8 +139,10 @@ impl Run<'_> {
         let nodes = tally.summary();
         let doubtful = if stop { Vec::new() } else { self.judge(&nodes, &mut sizes)? };
         let ending = end.map(|e| e.ending).filter(|_| !stop);
-        let meta = self.meta(rig, timing, damage, ending);
+        let decided = replay.finish();
+        let meta = self.meta(rig, timing, damage, ending, decided.as_ref());
         self.warnings.extend(meta.damage.gaps.dropped_words().map(Message::from));
+        self.warnings.extend(decided.map(|d| d.words().into()));
         if let Some(writer) = writer {
             writer.finish(&meta)?;
         }
@@ -156,6 +160,13 @@ impl Run<'_> {
             table: rows.map(|rows| NodeTable { meta: meta.clone(), rows }),
             meta,
         })
+    }
+
+    /// The decisions of people, to be made on the rows; `to_end`: the recording was read to its end.
+    fn replay(&self, rig: &Rig, to_end: bool) -> Result<Replay<'a>> {
+        let settings = self.settings;
+        let is_all = settings.frames.is_none() && to_end;
+        Replay::new(settings.edits.as_ref(), rig, Seen::Detections(&self.store), is_all)
     }
 
     /// Refuses a rig of another number of nodes than there are markers, if that was said.
@@ -243,11 +254,22 @@ impl Run<'_> {
     }
 
     /// The table's metadata; `ending` is the recording's, `None` where the run was stopped.
-    fn meta(&self, rig: Rig, timing: Timing, damage: Damage, ending: Option<Ending>) -> TableMeta {
+    fn meta(
+        &self,
+        rig: Rig,
+        timing: Timing,
+        damage: Damage,
+        ending: Option<Ending>,
+        decided: Option<&Decided>,
+    ) -> TableMeta {
+        let mut settings = self.settings_json();
+        if let Some(decided) = decided {
+            settings[EDITS] = decided.to_json();
+        }
         TableMeta {
             schema_version: SCHEMA_VERSION,
             tool: TableMeta::this_tool(),
-            settings: self.settings_json(),
+            settings,
             source: SourceFacts {
                 rate_hz: timing.rate_hz,
                 rate_origin: timing.rate_origin,

@@ -20,13 +20,14 @@ mod sizes;
 mod state;
 mod summary;
 mod times;
+mod unite;
 
 pub use candidates::{Candidate, Candidates};
 pub use observer::{Observer, Silent, Stage};
 pub use opening::open;
 pub(crate) use opening::{learn, sample};
 pub use run::run;
-pub use settings::{Existing, RunSettings, frame_range};
+pub use settings::{Existing, RunSettings};
 pub use state::partial_path;
 pub use summary::RunSummary;
 pub use times::{survey, times};

@@ -154,6 +154,9 @@ pub(super) fn run(settings: &RunSettings, observer: &mut dyn Observer) -> Result
     let mut source = open(&settings.input, &options, observer)?;
     let info = source.info().clone();
     let facts = SourceFacts::of(&info, &source::files(&settings.input)?)?;
+    if let Some(edits) = &settings.edits {
+        edits.belongs(&facts)?;
+    }
     let wanted = settings.asked().clone();
     wanted.check([facts.width, facts.height])?;
     if let Some(rig) = &settings.rig {

@@ -8,11 +8,12 @@ use super::candidates::words;
 use super::one_place::leave_open;
 use super::repeats::copies_words;
 use super::settings::RunSettings;
-use super::summary::{MOVING, RunSummary};
+use super::summary::{EDITS, MOVING, RunSummary};
 use super::times::times;
 use crate::detect::DetectSettings;
 use crate::discover::PathRig;
-use crate::error::{Error, Fault, Place, Result};
+use crate::edits::{Replay, Seen};
+use crate::error::Result;
 use crate::frame::{Ending, SourceInfo};
 use crate::gaps::Damage;
 use crate::message::{Message, Setting};
@@ -48,7 +49,7 @@ pub(super) struct Moving {
     pub(super) names: Vec<String>,
     pub(super) markers: Vec<Marker>,
     chosen: Chosen,
-    scale: f64,
+    pub(super) scale: f64,
     copies: usize,
     decoded: usize,
     pub(super) stamps: Vec<FrameStamp>,
@@ -88,48 +89,6 @@ impl Moving {
         self
     }
 
-    /// Makes one column of each two that are one marker; the first name stays.
-    ///
-    /// # Errors
-    /// [`Error::Argument`] for a name that is none, and where both are seen in one frame at two places.
-    pub fn unite(&mut self, same: &[[String; 2]]) -> Result<()> {
-        for pair in same {
-            let column = |name: &String| {
-                self.names.iter().position(|n| n == name).ok_or_else(|| {
-                    Error::Argument(
-                        Fault::of(Setting::Same, format!("{name} is no node of what is followed"))
-                            .advice(format!("Its nodes are {}", self.names.join(", "))),
-                    )
-                })
-            };
-            let (a, b) = (column(&pair[0])?, column(&pair[1])?);
-            if a == b {
-                continue;
-            }
-            let near_px = self.markers[a].radius_px * self.scale;
-            for (stamp, row) in self.stamps.iter().zip(&mut self.rows) {
-                let apart = (row[a].x_px - row[b].x_px).hypot(row[a].y_px - row[b].y_px);
-                if apart > near_px {
-                    return Err(Error::Argument(
-                        Fault::of(
-                            Setting::Same,
-                            format!("{} and {} are both seen, {apart:.0} px apart", pair[0], pair[1]),
-                        )
-                        .at(Place::Frame(stamp.index))
-                        .advice("Give two that are never seen together"),
-                    ));
-                }
-                if !row[a].status.is_seen() && row[b].status.is_seen() {
-                    row[a] = row[b];
-                }
-                row.remove(b);
-            }
-            self.names.remove(b);
-            self.markers.remove(b);
-        }
-        Ok(())
-    }
-
     /// Puts the columns into the order of a rig's nodes, by their places in its reference frame. Whether each node has one.
     pub fn name_by(&mut self, rig: &Rig) -> bool {
         let Some(order) = self.named(rig) else { return false };
@@ -162,8 +121,11 @@ impl Moving {
         };
         let mut collected = settings.collect.then(Rows::default);
         let mut tally = Tally::new(&rig);
+        let seen = Seen::Rows(&self.stamps, &self.rows);
+        let mut replay = Replay::new(settings.edits.as_ref(), &rig, seen, settings.frames.is_none())?;
         for (place, (stamp, observations)) in self.stamps.iter().zip(&self.rows).enumerate() {
             let time_s = clock.seconds(place as u64, stamp.ticks);
+            let observations = replay.made(stamp.index, observations);
             if let Some(writer) = &mut writer {
                 writer.push(stamp.index, time_s, observations)?;
             }
@@ -178,7 +140,9 @@ impl Moving {
         warnings.extend(damage.gaps.dropped_words().map(Message::from));
         warnings.extend(self.notes());
         let doubtful = self.doubts(&rig, &mut warnings);
-        let meta = TableMeta {
+        let decided = replay.finish();
+        warnings.extend(decided.iter().map(|d| Message::from(d.words())));
+        let mut meta = TableMeta {
             schema_version: SCHEMA_VERSION,
             tool: TableMeta::this_tool(),
             settings: self.settings_json(settings, wanted, &facts),
@@ -192,6 +156,9 @@ impl Moving {
             rig,
             damage,
         };
+        if let Some(decided) = &decided {
+            meta.settings[EDITS] = decided.to_json();
+        }
         if let Some(writer) = writer {
             writer.finish(&meta)?;
         }

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use super::settings::{Existing, RunSettings};
 use super::state::{State, anew, partial_path};
-use super::summary::{MOVING, RunSummary};
+use super::summary::{EDITS, MOVING, RunSummary};
 use crate::detect::DetectSettings;
 use crate::error::{Error, Fault, FaultKind, Place, Result};
 use crate::frame::SourceInfo;
@@ -66,6 +66,9 @@ pub(super) struct Request {
 impl Request {
     pub fn new(settings: &RunSettings, info: &SourceInfo, files: Vec<PathBuf>) -> Result<Self> {
         let facts = SourceFacts::of(info, &files)?;
+        if let Some(edits) = &settings.edits {
+            edits.belongs(&facts)?;
+        }
         let mut detect = settings.detect.clone();
         detect.pixel_aspect = facts.pixel_aspect;
         if let Some(rig) = &settings.rig {
@@ -112,6 +115,13 @@ pub(super) fn already_done(settings: &RunSettings, request: &Request) -> Result<
         return Err(Error::Table(
             Fault::new(text(output), "its run is complete and had another rig")
                 .advice("Give " + Setting::Rig + " as it was then, or begin anew with " + Setting::Force),
+        ));
+    }
+    let before = table.meta.settings[EDITS]["sha256"].as_str();
+    if before != settings.edits.as_ref().map(|e| e.sha256.as_str()) {
+        return Err(Error::Table(
+            Fault::new(text(output), "its run is complete and had other edits")
+                .advice("Give " + Setting::Edits + " as it was then, or begin anew with " + Setting::Force),
         ));
     }
     Ok(Some(RunSummary {

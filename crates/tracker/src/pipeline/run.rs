@@ -38,6 +38,7 @@ pub fn run(settings: &RunSettings, observer: &mut dyn Observer) -> Result<RunSum
             Ok(Outcome::Followed(summary)) => return Ok(*summary),
             Ok(Outcome::Unclear(unclear)) => unclear,
             Err(Error::Interrupted) => return Err(Error::Interrupted),
+            Err(error @ Error::Argument(_)) if settings.edits.is_some() => return Err(error),
             Err(_) => return markers,
         },
     };

@@ -1,6 +1,6 @@
 //! Defines the settings of a run.
 //!
-//! Owns: [`RunSettings`], [`Existing`], [`frame_range`]. Must not: look at a recording.
+//! Owns: [`RunSettings`], [`Existing`]. Must not: look at a recording.
 
 use std::ops::Range;
 use std::path::PathBuf;
@@ -9,6 +9,7 @@ use serde_json::json;
 
 use crate::csv_text::Cells;
 use crate::detect::DetectSettings;
+use crate::edits::Edits;
 use crate::rig::Rig;
 use crate::source::{Interlaced, OpenOptions};
 use crate::wanted::Wanted;
@@ -23,19 +24,6 @@ pub enum Existing {
     Replace,
     /// Go on where an earlier run stopped; begin anew where none did.
     Resume,
-}
-
-/// The frames of `A..B`, `A..` or `..B`: from A up to but not B.
-///
-/// # Errors
-/// What was expected.
-pub fn frame_range(text: &str) -> Result<Range<u64>, String> {
-    let form = "expected A..B, for example 0..1000";
-    let (start, end) = text.split_once("..").ok_or(form)?;
-    let number = |t: &str, none: u64| {
-        if t.is_empty() { Ok(none) } else { t.parse().map_err(|_| format!("{t:?} is not a frame; {form}")) }
-    };
-    Ok(number(start, 0)?..number(end, u64::MAX)?)
 }
 
 /// Settings of a run.
@@ -61,6 +49,8 @@ pub struct RunSettings {
     pub wanted: Wanted,
     /// Threads for detection; 0 is one for each core. The result is the same for any number.
     pub threads: usize,
+    /// Decisions of people, made on the rows before they are written.
+    pub edits: Option<Edits>,
     /// How a CSV writes names.
     pub cells: Cells,
     /// Files besides the recording that are read, which the output never replaces.

@@ -6,6 +6,9 @@ use crate::table::{NodeSummary, NodeTable, TableMeta};
 /// Key of the table's settings under which is said what was followed in place of markers.
 pub(super) const MOVING: &str = "moving";
 
+/// Key of the table's settings under which is said which rows people decided.
+pub(super) const EDITS: &str = "edits";
+
 /// Summary of a run.
 #[derive(Debug, Clone)]
 pub struct RunSummary {

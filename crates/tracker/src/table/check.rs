@@ -11,7 +11,7 @@ use crate::rig::Rig;
 
 impl NodeTable {
     /// Checks everything a reader may rely on: as many rows as frames times nodes; frames and times increasing;
-    /// a place, an uncertainty and an area exactly where a node is seen; no two nodes at one place in a frame.
+    /// a place, an uncertainty and an area exactly where a node is seen (what a person placed needs no area); no two nodes at one place in a frame.
     ///
     /// # Errors
     /// [`Error::Table`] naming the first row at fault; `name` is for the message.
@@ -98,7 +98,7 @@ impl Block<'_> {
                     format!("node {node} is {} but its place is ({x}, {y})", status.as_str())
                 } else if !(s.is_finite() && s > 0.0) {
                     format!("node {node} is {} but its sigma_px is {s}", status.as_str())
-                } else if !(a.is_finite() && a >= 0.0) {
+                } else if !(a.is_finite() && a >= 0.0 || status == Status::Manual && a.is_nan()) {
                     format!("node {node} is {} but its area_px is {a}", status.as_str())
                 } else if let Some(m) =
                     (0..n).find(|&m| rows.xy_px[2 * at(m)] == x && rows.xy_px[2 * at(m) + 1] == y)

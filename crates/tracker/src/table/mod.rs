@@ -7,8 +7,8 @@
 //! | `node`, `body` | string (dictionary) | names of the rig |
 //! | `x_px`, `y_px` | float64, null when not seen | centre; x right, y down |
 //! | `sigma_px` | float32, null when not seen | standard uncertainty of each coordinate |
-//! | `area_px` | float32, null when not seen | blob area |
-//! | `status` | string (dictionary) | `seen`, `reacquired`, `missing`, `ambiguous`, `undecoded` |
+//! | `area_px` | float32, null when not seen or placed by a person | blob area |
+//! | `status` | string (dictionary) | `seen`, `reacquired`, `missing`, `ambiguous`, `undecoded`, `manual` |
 //!
 //! Owns: [`NodeTable`], [`Rows`], what makes them valid, their files ([`read_table`], [`TableWriter`]).
 //! Must not: track, or know where rows come from.

@@ -4,14 +4,15 @@
 
 use super::TableMeta;
 use crate::error::{Error, Fault, Place};
-use crate::observation::{Observation, Status};
+use crate::observation::{Observation, STATUSES, Status};
 
 /// Columns of the table in their order.
 pub const COLUMNS: [&str; 9] =
     ["frame", "time_s", "node", "body", "x_px", "y_px", "sigma_px", "area_px", "status"];
 
 /// The words of the column `status`, by their number in [`Rows::status`].
-pub const STATUS_WORDS: [&str; 5] = ["missing", "seen", "reacquired", "ambiguous", "undecoded"];
+pub const STATUS_WORDS: [&str; STATUSES.len()] =
+    ["missing", "seen", "reacquired", "ambiguous", "undecoded", "manual"];
 
 /// T frames of N nodes, column by column. What is not seen is NaN.
 #[derive(Debug, Clone, Default)]

@@ -17,6 +17,8 @@ pub struct NodeSummary {
     pub body: String,
     /// Frames in which its place is known.
     pub seen: u64,
+    /// Frames among them in which a person said where it is, or what is it.
+    pub manual: u64,
     /// How often it came back.
     pub reacquired: u64,
     /// Frames without it.
@@ -58,6 +60,7 @@ impl Tally {
                 node: node.name.clone(),
                 body: node.body.clone(),
                 seen: 0,
+                manual: 0,
                 reacquired: 0,
                 missing: 0,
                 ambiguous: 0,
@@ -74,8 +77,9 @@ impl Tally {
     pub fn push(&mut self, observations: &[Observation]) {
         for ((node, square), o) in self.nodes.iter_mut().zip(&mut self.squares).zip(observations) {
             match o.status {
-                Status::Seen | Status::Reacquired => {
+                Status::Seen | Status::Reacquired | Status::Manual => {
                     node.seen += 1;
+                    node.manual += u64::from(o.status == Status::Manual);
                     node.reacquired += u64::from(o.status == Status::Reacquired);
                     node.longest_gap = node.longest_gap.max(node.missing_at_end);
                     node.missing_at_end = 0;

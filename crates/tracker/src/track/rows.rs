@@ -6,7 +6,7 @@ use nalgebra::Vector2;
 
 use super::seen::BodySeen;
 use crate::detect::{Detection, Flags};
-use crate::observation::{Observation, Status};
+use crate::observation::{Observation, PART_SIGMA_PX, Status};
 use crate::rigid::body::Mechanism;
 
 /// The observations of one frame, in the order of the rig's nodes.
@@ -23,7 +23,7 @@ pub fn observations(mechanism: &Mechanism, seen: &[BodySeen], index: &[Detection
                 out[node] = Observation {
                     x_px: d.x_px,
                     y_px: d.y_px,
-                    sigma_px: if doubt { sigma_px.hypot(0.2) } else { sigma_px },
+                    sigma_px: if doubt { sigma_px.hypot(PART_SIGMA_PX) } else { sigma_px },
                     area_px: d.area_px,
                     status: Status::Seen,
                 };

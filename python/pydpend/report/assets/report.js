@@ -3,8 +3,8 @@
 (() => {
   const data = JSON.parse(document.getElementById("report-data").textContent);
   const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-  const STATUS = { missing: "--line", seen: "--s2", reacquired: "--s0", ambiguous: "--s1", undecoded: "--s3" };
-  const STATUS_BY_CODE = ["missing", "seen", "reacquired", "ambiguous", "undecoded"];
+  const STATUS = { missing: "--line", seen: "--s2", reacquired: "--s0", ambiguous: "--s1", undecoded: "--s3", manual: "--s4" };
+  const STATUS_BY_CODE = ["missing", "seen", "reacquired", "ambiguous", "undecoded", "manual"];
 
   // Arrays are base64 of little-endian float32, or float64 where the name starts with "d".
   const cache = new Map();
