@@ -1,6 +1,6 @@
 //! Converts names of files to text: without loss on the way in, harmless on the way to a terminal.
 //!
-//! Owns: [`text`], [`path`], [`shown`], [`shown_json`], [`shell_word`]. A name on a disk is bytes. One that is not UTF-8 is carried as
+//! Owns: [`text`], [`path`], [`shown`], [`shown_json`], [`shell_word`], [`python_word`]. A name on a disk is bytes. One that is not UTF-8 is carried as
 //! text whose undecodable bytes are private characters, as Python carries them as surrogates.
 
 use std::ffi::{OsStr, OsString};
@@ -47,15 +47,39 @@ pub fn path(text: &str) -> PathBuf {
     PathBuf::from(OsString::from_vec(bytes))
 }
 
-/// A name as a word for a shell, which no program takes for an option.
+/// A name as a word for a shell, which no program takes for an option. What is no character to be seen is written out,
+/// `$'dr\xf6p.mp4'`, as bash, zsh and ksh read it.
 pub fn shell_word(name: &str) -> String {
     let plain = |c: char| c.is_alphanumeric() || "-_./+,:@%=".contains(c);
     let before = if name.starts_with('-') { "./" } else { "" };
-    if !name.is_empty() && name.chars().all(plain) {
+    if !name.is_empty() && name.chars().all(|c| plain(c) && byte_of(c).is_none()) {
         format!("{before}{name}")
+    } else if name.chars().any(|c| is_control(c) || byte_of(c).is_some()) {
+        let written = |c: char| match byte_of(c) {
+            Some(byte) => format!("\\x{byte:02x}"),
+            None if is_control(c) => {
+                c.encode_utf8(&mut [0; 4]).bytes().map(|b| format!("\\x{b:02x}")).collect()
+            }
+            None if ['\\', '\''].contains(&c) => format!("\\{c}"),
+            None => c.to_string(),
+        };
+        format!("$'{before}{}'", name.chars().map(written).collect::<String>())
     } else {
         format!("'{before}{}'", name.replace('\'', "'\\''"))
     }
+}
+
+/// A name as Python writes it: the same text, with nothing in it that a terminal would obey.
+pub fn python_word(name: &str) -> String {
+    let written = |c: char| match (c, byte_of(c)) {
+        (_, Some(byte)) => format!("\\udc{byte:02x}"),
+        ('\\' | '"', _) => format!("\\{c}"),
+        ('\n' | '\r' | '\t', _) => c.escape_default().to_string(),
+        _ if is_control(c) && u32::from(c) < 0x100 => format!("\\x{:02x}", u32::from(c)),
+        _ if is_control(c) => format!("\\u{:04x}", u32::from(c)),
+        _ => c.to_string(),
+    };
+    format!("\"{}\"", name.chars().map(written).collect::<String>())
 }
 
 /// Whether a terminal would do something else than show the character: controls (escape sequences begin with one),
@@ -121,6 +145,32 @@ mod tests {
             let carried = text(OsStr::new(&name));
             prop_assert_eq!(path(&carried), PathBuf::from(&name));
             prop_assert!(!shown(&carried).chars().any(is_control));
+        }
+    }
+
+    #[test]
+    fn a_shell_and_python_read_the_name_that_was_meant() {
+        let names: [&[u8]; 6] = [
+            b"dr\xf6p.mp4",
+            b"a\x1b[31mb.gz",
+            b"it's \\ \n",
+            "\u{202e}\u{85}\u{e9}".as_bytes(),
+            b"-\x07",
+            b"\"plain\"",
+        ];
+        for name in names {
+            let carried = text(OsStr::from_bytes(name));
+            let (word, python) = (shell_word(&carried), python_word(&carried));
+            assert_eq!([shown(&word), shown(&python)], [word.clone(), python.clone()]);
+            let told = std::process::Command::new("bash")
+                .args(["-c", &format!("printf %s {word}")])
+                .output()
+                .unwrap();
+            assert_eq!(told.stdout.strip_prefix(b"./").unwrap_or(&told.stdout), name, "{word}");
+            let write = format!("import os, sys; sys.stdout.buffer.write(os.fsencode({python}))");
+            let told =
+                std::process::Command::new("python3").args(["-X", "utf8", "-c", &write]).output().unwrap();
+            assert_eq!(told.stdout, name, "{python}");
         }
     }
 

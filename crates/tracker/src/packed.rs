@@ -6,7 +6,7 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-use crate::name::shell_word;
+use crate::name::{shell_word, text};
 
 /// Command that unpacks a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -79,7 +79,7 @@ pub fn unpacking(path: &Path) -> Option<String> {
     let mut bytes = Vec::new();
     File::open(path).ok()?.take(BEGINNING).read_to_end(&mut bytes).ok()?;
     let form = form_of(&bytes)?;
-    let file = shell_word(&path.display().to_string());
+    let file = shell_word(&text(path));
     Some(match form.command {
         Command::Archive(command) => format!("{command} {file}"),
         Command::Stream(command) => {
@@ -87,11 +87,15 @@ pub fn unpacking(path: &Path) -> Option<String> {
             let out = if has_ending {
                 path.with_extension("")
             } else {
-                let ending = path.extension().map(|e| format!(".{}", e.display())).unwrap_or_default();
-                let stem = path.file_stem().unwrap_or_default().display();
-                path.with_file_name(format!("{stem}-unpacked{ending}"))
+                let mut name = path.file_stem().unwrap_or_default().to_owned();
+                name.push("-unpacked");
+                if let Some(ending) = path.extension() {
+                    name.push(".");
+                    name.push(ending);
+                }
+                path.with_file_name(name)
             };
-            format!("{command} {file} > {}", shell_word(&out.display().to_string()))
+            format!("{command} {file} > {}", shell_word(&text(out)))
         }
     })
 }

@@ -8,6 +8,7 @@ use super::contents::kind_of;
 use super::kinds::Kind;
 use super::next_step::part_of;
 use crate::error::{Error, Fault, FaultKind, Result};
+use crate::name::text;
 
 /// The fault of a file that is of none of the kinds that are wanted, a command where there are none; `None` if it is of one, or if
 /// nobody can tell.
@@ -23,11 +24,11 @@ pub fn misplaced(path: &Path, wanted: &[Kind]) -> Option<Fault> {
         [only] => (*only).to_owned(),
         [before @ .., last] => format!("{} or {last}", before.join(", ")),
     };
-    let fault = Fault::new(path.display(), format!("it is {}, not {expected}", kind.noun()))
+    let fault = Fault::new(text(path), format!("it is {}, not {expected}", kind.noun()))
         .of_kind(FaultKind::Unsupported);
     let inside = if kind == Kind::RunFolder { wanted.iter().find_map(|w| part_of(path, *w)) } else { None };
     Some(match inside {
-        Some((what, file)) => fault.advice(format!("Give its {what}, {}", file.display())),
+        Some((what, file)) => fault.advice(format!("Give its {what}, {}", text(file))),
         None => fault.advice(kind.towards(wanted, path).unwrap_or_else(|| kind.next(path))),
     })
 }

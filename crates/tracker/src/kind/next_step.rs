@@ -8,14 +8,14 @@ use std::path::{Path, PathBuf};
 
 use super::kinds::Kind;
 use crate::message::{Message, Step};
-use crate::name::shell_word;
+use crate::name::{python_word, shell_word, text};
 use crate::packed::{first_part, unpacking};
 
 impl Kind {
     /// The step that makes a file of a wanted kind of this one, where that is not its next step anyway.
     pub(super) fn towards(self, wanted: &[Self], path: &Path) -> Option<Message> {
-        let name = path.display().to_string();
-        let file = shell_word(&name);
+        let name = text(path);
+        let (file, name) = (shell_word(&name), python_word(&name));
         let step = |command: String, call: String| {
             Some("Next: " + Message::from(Step { command: command.into(), call: call.into() }))
         };
@@ -23,14 +23,14 @@ impl Kind {
             Self::Film | Self::Pictures | Self::NodeTable | Self::Angles
                 if wanted.contains(&Self::RunFolder) =>
             {
-                let options = format!("pydpend.analyse.Options(inputs=({name:?},))");
+                let options = format!("pydpend.analyse.Options(inputs=({name},))");
                 step(
                     format!("pydpend analyse {file} -o run/"),
                     format!("pydpend.analyse.analyse({options}, 'run')"),
                 )
             }
             Self::Film | Self::Pictures if wanted.contains(&Self::Angles) => {
-                let stem = shell_word(path.with_extension("").display().to_string().trim_end_matches('/'));
+                let stem = shell_word(text(path.with_extension("")).trim_end_matches('/'));
                 let (nodes, angles) = (joined(&stem, ".parquet"), joined(&stem, "-angles.parquet"));
                 let then = Step {
                     command: format!("pydpend angles {nodes} -o {angles}").into(),
@@ -50,7 +50,7 @@ impl Kind {
             }
             Self::Encoder if wanted.contains(&Self::Calibration) => step(
                 format!("pydpend calibrate {file} -o encoder.json"),
-                format!("dp.calibrate(dp.read_holds([{name:?}]))"),
+                format!("dp.calibrate(dp.read_holds([{name}]))"),
             ),
             _ => None,
         }
@@ -58,78 +58,78 @@ impl Kind {
 
     /// The next step with the file.
     pub(super) fn next(self, path: &Path) -> Message {
-        let name = path.display().to_string();
-        let file = shell_word(&name);
-        let stem = shell_word(path.with_extension("").display().to_string().trim_end_matches('/'));
+        let name = text(path);
+        let (file, name) = (shell_word(&name), python_word(&name));
+        let stem = shell_word(text(path.with_extension("")).trim_end_matches('/'));
         let type_this = |command: String, call: String| {
             "Next: " + Message::from(Step { command: command.into(), call: call.into() })
         };
         match self {
             Self::Film | Self::Pictures => type_this(
                 format!("pydpend track {file} -o {}", joined(&stem, ".parquet")),
-                format!("dp.track({name:?})"),
+                format!("dp.track({name})"),
             ),
             Self::NodeTable => type_this(
                 format!("pydpend angles {file} -o {}", joined(&stem, "-angles.parquet")),
-                format!("dp.angles(dp.read_nodes({name:?}))"),
+                format!("dp.angles(dp.read_nodes({name}))"),
             ),
             Self::Truth => {
-                type_this(format!("pydpend score NODES {file}"), format!("dp.score(nodes, {name:?})"))
+                type_this(format!("pydpend score NODES {file}"), format!("dp.score(nodes, {name})"))
             }
             Self::Angles => type_this(
                 format!("pydpend fit {file} -o {}", joined(&stem, "-damping/")),
-                format!("dp.fit_damping(dp.read_angles({name:?}), model)"),
+                format!("dp.fit_damping(dp.read_angles({name}), model)"),
             ),
             Self::Encoder => type_this(
                 format!("pydpend compare ANGLES {file} --calibration HOLDS -o compared/"),
-                format!("dp.compare(angles, dp.encoder_angles(dp.read_encoder({name:?}), calibration))"),
+                format!("dp.compare(angles, dp.encoder_angles(dp.read_encoder({name}), calibration))"),
             ),
             Self::Tables => type_this(
                 format!("pydpend calibrate {file} -o encoder.json"),
-                format!("dp.calibrate(dp.read_holds([{name:?}]))"),
+                format!("dp.calibrate(dp.read_holds([{name}]))"),
             ),
             Self::Calibration => type_this(
                 format!("pydpend compare ANGLES ENCODER --calibration {file} -o compared/"),
-                format!("dp.read_calibration({name:?})"),
+                format!("dp.read_calibration({name})"),
             ),
             Self::Rig => type_this(
                 format!("pydpend track FILM --rig {file} -o nodes.parquet"),
-                format!("dp.track(film, {name:?})"),
+                format!("dp.track(film, {name})"),
             ),
             Self::Edits => "Next: " + with_edits(&file, &name),
-            Self::Scene => type_this(
-                format!("pydpend film {file} -o film.mp4"),
-                format!("dp.film({name:?}, 'film.mp4')"),
-            ),
+            Self::Scene => {
+                type_this(format!("pydpend film {file} -o film.mp4"), format!("dp.film({name}, 'film.mp4')"))
+            }
             Self::Model => type_this(
                 format!("pydpend fit ANGLES --model {file} -o damping/"),
-                format!("dp.read_model({name:?})"),
+                format!("dp.read_model({name})"),
             ),
             Self::Config => type_this(
                 format!("pydpend analyse --config {file} -o run/"),
-                format!("pydpend.analyse.read_config({name:?})"),
+                format!("pydpend.analyse.read_config({name})"),
             ),
             Self::RunFolder => {
                 let angles = part_of(path, Self::Angles).map_or_else(|| path.to_owned(), |(_, file)| file);
-                let inside = angles.display().to_string();
-                Message::from(format!("Its page is {}. ", path.join("report.html").display()))
+                let inside = python_word(&text(angles));
+                Message::from(format!("Its page is {}. ", text(path.join("report.html"))))
                     + type_this(
                         format!("pydpend plot energy {file} -o energy.pdf"),
-                        format!("dp.read_angles({inside:?})"),
+                        format!("dp.read_angles({inside})"),
                     )
             }
             Self::Fit => type_this(
                 format!("pydpend predict ANGLES --fit {file} -o predicted/"),
-                format!("pydpend.fit_folder.load_fit({name:?})"),
+                format!("pydpend.fit_folder.load_fit({name})"),
             ),
             Self::Page => "Open it in a browser".into(),
             Self::Spreadsheet => "Save it as CSV with a header line".into(),
             Self::NumpyArchive => {
                 let array = numpy_array(path).unwrap_or_else(|| "NAME".to_owned());
-                let out = path.with_extension("npy").display().to_string();
+                let array = python_word(&array);
+                let out = python_word(&text(path.with_extension("npy")));
                 format!(
                     "Write its arrays as columns of a CSV with a header line, or one array as .npy in Python: \
-                     numpy.save({out:?}, numpy.load({name:?})[{array:?}])"
+                     numpy.save({out}, numpy.load({name})[{array}])"
                 )
                 .into()
             }
@@ -144,7 +144,7 @@ impl Kind {
 /// Tracking with a file of edits.
 fn with_edits(file: &str, name: &str) -> Message {
     let command = format!("pydpend track FILM --edits {file} -o nodes.parquet");
-    Step { command: command.into(), call: format!("dp.track(film, edits={name:?})").into() }.into()
+    Step { command: command.into(), call: format!("dp.track(film, edits={name})").into() }.into()
 }
 
 /// A stem with an ending, quoted once.

@@ -143,6 +143,11 @@ impl<'a> Run<'a> {
         let meta = self.meta(rig, timing, damage, ending, decided.as_ref());
         self.warnings.extend(meta.damage.gaps.dropped_words().map(Message::from));
         self.warnings.extend(decided.map(|d| d.words().into()));
+        if let (Some(last), false) =
+            (self.store.len().checked_sub(1), stop || matches!(meta.ending, RunEnding::Early { .. }))
+        {
+            self.warnings.extend(self.settings.beyond(self.store.stamp(last).index));
+        }
         if let Some(writer) = writer {
             writer.finish(&meta)?;
         }

@@ -138,6 +138,8 @@ impl Moving {
         let mut warnings = info.warnings.clone();
         warnings.extend(timing::notes(&timing));
         warnings.extend(damage.gaps.dropped_words().map(Message::from));
+        let last = self.stamps.last().filter(|_| self.ending == Ending::Complete);
+        warnings.extend(last.and_then(|stamp| settings.beyond(stamp.index)));
         warnings.extend(self.notes());
         let doubtful = self.doubts(&rig, &mut warnings);
         let decided = replay.finish();

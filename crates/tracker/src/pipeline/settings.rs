@@ -10,6 +10,7 @@ use serde_json::json;
 use crate::csv_text::Cells;
 use crate::detect::DetectSettings;
 use crate::edits::Edits;
+use crate::message::{Message, Setting};
 use crate::rig::Rig;
 use crate::source::{Interlaced, OpenOptions};
 use crate::wanted::Wanted;
@@ -72,6 +73,13 @@ impl RunSettings {
     /// The markers asked for as JSON, `null` unless something was asked.
     pub(super) fn wanted_json(&self) -> serde_json::Value {
         json!(Some(self.asked()).filter(|w| !w.is_default()))
+    }
+
+    /// The warning of a recording that is whole and ends before the frames that were asked for, its last frame being `last`.
+    pub(super) fn beyond(&self, last: u64) -> Option<Message> {
+        let asked = self.frames.as_ref().filter(|f| f.end < u64::MAX && last.saturating_add(1) < f.end)?;
+        let words = format!("frames up to {} were asked for with ", asked.end - 1);
+        Some(Message::from(words) + Setting::Frames + format!(", and the recording ends with frame {last}"))
     }
 
     /// The first frame and one past the last; `null` for an open end, as in `--frames 5..`.

@@ -119,12 +119,38 @@ impl State {
         let Some(object) = self.identity.as_object() else { return Ok(()) };
         match object.iter().find(|&(key, value)| before.get(key) != Some(value)) {
             None => Ok(()),
-            Some((key, value)) => Err(Error::Table(
-                Fault::new(text(path), Message::from(format!("{what} ")) + named(key))
-                    .at(Place::Key(difference(before.get(key), value)))
-                    .advice("Run with what it had, or begin anew with " + Setting::Force),
-            )),
+            Some((key, value)) => {
+                let problem = Message::from(format!("{what} ")) + named(key);
+                let advice = "Run with what it had, or begin anew with " + Setting::Force;
+                let fault = match self.changed_file(key, before.get(key), value) {
+                    Some(how) => Fault::new(text(path), problem + how),
+                    None => {
+                        Fault::new(text(path), problem).at(Place::Key(difference(before.get(key), value)))
+                    }
+                };
+                Err(Error::Table(fault.advice(advice)))
+            }
         }
+    }
+
+    /// The file that is another than it was, where that is the difference of a key's values.
+    fn changed_file(&self, key: &str, before: Option<&Value>, now: &Value) -> Option<String> {
+        let name = self.identity["recording"]["name"].as_str().unwrap_or("the recording");
+        if key == TIMES {
+            return Some(format!(
+                ": {name}, or another file of the recording, was written or replaced since then"
+            ));
+        }
+        let differs = |key: &str| before.is_some_and(|b| b[key] != now[key]);
+        let facts = now.as_object().filter(|_| key == "recording")?;
+        let is_contents = |key: &str| key.starts_with("sha256");
+        if facts.keys().any(|k| !is_contents(k) && differs(k)) {
+            return None;
+        }
+        let part = if differs("sha256_first_mib") { "the first" } else { "the first or last" };
+        Some(format!(
+            ": {name} has the same size as then, but {part} MiB of it, or of a file that belongs to it, is another"
+        ))
     }
 
     /// Begins a new state; an older one is gone.
@@ -169,7 +195,10 @@ fn named(key: &str) -> Message {
 fn difference(before: Option<&Value>, now: &Value) -> String {
     match (before.and_then(Value::as_object), now.as_object()) {
         (Some(before), Some(now)) => {
-            let key = now.keys().find(|&k| before.get(k) != now.get(k)).cloned().unwrap_or_default();
+            // Sums of contents tell nobody anything where something else differs too.
+            let mut differ: Vec<&String> = now.keys().filter(|&k| before.get(k) != now.get(k)).collect();
+            differ.sort_by_key(|k| k.starts_with("sha256"));
+            let key = differ.first().map_or_else(String::new, |k| (*k).clone());
             let show = |v: Option<&Value>| v.map_or_else(|| "nothing".into(), ToString::to_string);
             format!("{key} was {}, is {}", show(before.get(&key)), show(now.get(&key)))
         }
@@ -231,6 +260,31 @@ pub fn remove(output: &Path) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_recording_of_other_contents_is_named_and_its_hash_is_not() {
+        let of = |hash: &str, width: u32| json!({"recording": {"name": "drop.mp4", "sha256_first_mib": hash, "sha256_ends": hash, "width": width}});
+        let state = State { identity: of("ab12", 640), changes: None };
+        let said = |before: Value| {
+            state
+                .same(&before, Path::new("o.partial"), "the earlier run had another")
+                .unwrap_err()
+                .to_string()
+        };
+        let words = said(of("cd34", 640));
+        assert!(words.contains("drop.mp4 has the same size as then") && !words.contains("12"), "{words}");
+        assert!(said(of("cd34", 320)).contains("width was 320, is 640"));
+        let state =
+            State { identity: json!({TIMES: {"newest": 1}, "recording": {"name": "a.mraw"}}), changes: None };
+        let words = state
+            .same(&json!({TIMES: {"newest": 2}}), Path::new("o"), "it had another")
+            .unwrap_err()
+            .to_string();
+        assert!(
+            words.contains("a.mraw, or another file of the recording, was written or replaced since"),
+            "{words}"
+        );
+    }
 
     #[test]
     fn a_run_of_before_is_known_by_its_older_word_for_the_centre() {

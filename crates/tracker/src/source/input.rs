@@ -25,6 +25,10 @@ impl Input {
         if name == "-" {
             return Ok(Input::Pipe("pipe:0".into()));
         }
+        if name.is_empty() {
+            let fault = Fault::new("''", "the name is empty").of_kind(FaultKind::Missing);
+            return Err(Error::Source(fault.advice("Give the name of a file")));
+        }
         let Ok(facts) = fs::metadata(path(name)) else {
             return Self::address(name, options);
         };

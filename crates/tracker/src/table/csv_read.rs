@@ -40,6 +40,7 @@ pub(super) fn read(path: &Path) -> Result<NodeTable> {
         reader: BufReader::with_capacity(1 << 18, file),
         number: 0,
         line: String::new(),
+        is_ended: true,
     };
     if !lines.next()? {
         return Err(lines.fault("the file is empty", "Run " + TRACK + " again"));
@@ -50,6 +51,7 @@ pub(super) fn read(path: &Path) -> Result<NodeTable> {
     let mut n = 0;
     let mut unquoted = String::new();
     let mut ends = Vec::new();
+    let mut shortest = usize::MAX;
     while lines.next()? {
         split(&lines.line, &mut unquoted, &mut ends)
             .map_err(|problem| lines.fault(problem, "Write the table again"))?;
@@ -98,6 +100,8 @@ pub(super) fn read(path: &Path) -> Result<NodeTable> {
         rows.xy_px.push(lines.optional(cell(5)?, COLUMNS[5])?);
         rows.sigma_px.push(lines.optional(cell(6)?, COLUMNS[6])? as f32);
         rows.area_px.push(lines.optional(cell(7)?, COLUMNS[7])? as f32);
+        let last = cell(columns.iter().position(|at| *at == width - 1).unwrap_or(8))?.trim();
+        shortest = lines.longer_than(last, shortest)?;
         n = (n + 1) % nodes;
     }
     if n != 0 {
@@ -107,6 +111,12 @@ pub(super) fn read(path: &Path) -> Result<NodeTable> {
         ));
     }
     Ok(NodeTable { meta, rows })
+}
+
+/// Whether a cell may be the beginning of a number, where those before it are no shorter than this.
+fn is_cut(cell: &str, shortest: usize) -> bool {
+    let is_open = cell.ends_with(['.', 'e', 'E', '-', '+']);
+    (cell.parse::<f64>().is_ok() || is_open) && (is_open || cell.len() < shortest) && shortest < usize::MAX
 }
 
 /// For each of [`COLUMNS`] its place in the file.
@@ -155,6 +165,8 @@ struct Lines {
     reader: BufReader<File>,
     number: u64,
     line: String,
+    /// The line has an end.
+    is_ended: bool,
 }
 
 impl Lines {
@@ -170,6 +182,7 @@ impl Lines {
             }
             Err(e) => return Err(read_fault(&self.path, &e)),
         }
+        self.is_ended = self.line.ends_with(['\r', '\n']);
         let whole = self.line.trim_end_matches(['\r', '\n']).len();
         self.line.truncate(whole);
         Ok(true)
@@ -177,6 +190,20 @@ impl Lines {
 
     fn fault(&self, problem: impl Into<Message>, advice: impl Into<Message>) -> Error {
         Error::Table(Fault::new(self.path.display(), problem).at(Place::Line(self.number)).advice(advice))
+    }
+
+    /// The shortest of the last cells up to this one. Refuses the number with which a table ends whose last line has no end,
+    /// if each of those above it is longer: it may be the beginning of one.
+    fn longer_than(&self, last: &str, shortest: usize) -> Result<usize> {
+        if self.is_ended || !is_cut(last, shortest) {
+            return Ok(shortest.min(last.len()));
+        }
+        Err(self.fault(
+            format!(
+                "the file ends with {last:?} and no end of a line, and every number above it has more digits"
+            ),
+            "The table may be cut off here: copy it again, or end its last line if it is whole",
+        ))
     }
 
     fn number_in<T: std::str::FromStr>(&self, text: &str, column: &str) -> Result<T> {

@@ -171,6 +171,34 @@ fn a_csv_is_refused_with_the_line_and_column_at_fault() {
 }
 
 #[test]
+fn a_csv_cut_inside_its_last_number_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("t.csv");
+    two_by_three().write(&path, Cells::Plain).unwrap();
+    let text = std::fs::read_to_string(&path).unwrap();
+    // As a spreadsheet may write it: the size of the spot last, seen or not.
+    let turned: String = text
+        .lines()
+        .map(|line| {
+            let (rest, status) = line.rsplit_once(',').unwrap();
+            let (rest, area) = rest.rsplit_once(',').unwrap();
+            format!("{rest},{status},{}\n", if area.is_empty() { "50.0" } else { area })
+        })
+        .collect();
+    let complaint = |text: &str| {
+        std::fs::write(&path, text).unwrap();
+        read_table(&path).err().map(|e| e.to_string()).unwrap_or_default()
+    };
+    let whole = turned.trim_end();
+    for cut in 1..3 {
+        let said = complaint(&whole[..whole.len() - cut]);
+        assert!(said.contains("line 7: the file ends with") && said.contains("cut off"), "{said}");
+        assert!(!complaint(&format!("{}\n", &whole[..whole.len() - cut])).contains("cut off"));
+    }
+    assert!(!complaint(whole).contains("cut off"));
+}
+
+#[test]
 fn a_csv_without_its_json_or_of_a_newer_schema_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("t.csv");

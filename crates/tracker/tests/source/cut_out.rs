@@ -1,10 +1,12 @@
 //! Frames cut out of containers that do not number their packets, or whose packets lie in pages; MPEG program streams.
 
-use tracker::frame::Ending;
-use tracker::gaps::{Cause, Gap, Gaps};
-use tracker::source::{OpenOptions, open};
+use std::path::Path;
 
-use crate::film::{encode, have_ffmpeg};
+use tracker::frame::{Ending, Frame};
+use tracker::gaps::{Cause, Gap, Gaps};
+use tracker::source::{Interlaced, OpenOptions, open};
+
+use crate::film::{encode, have_ffmpeg, read_all, samples};
 use crate::gaps::{COUNT, read, told};
 
 /// Film of other containers, and arguments that make it. Its key frames are 12 apart.
@@ -210,5 +212,73 @@ fn a_program_stream_has_each_picture_once_in_its_time() {
         let mut source = open(path.to_str().unwrap(), &OpenOptions::default()).unwrap();
         let times = source.stamps().unwrap().unwrap().0;
         assert_eq!(times, frames.iter().map(|f| f.ticks).collect::<Vec<_>>(), "{name}");
+    }
+}
+
+/// Film in MXF, which gives packets no times: libavformat counts them. The last lies whole in one element.
+const MXF: [(&str, &[&str]); 7] = [
+    ("b.mxf", &["-c:v", "mpeg2video", "-bf", "2", "-g", "12"]),
+    ("i.mxf", &["-c:v", "mpeg2video", "-g", "1"]),
+    ("h.mxf", &["-c:v", "libx264", "-bf", "2", "-g", "12", "-sc_threshold", "0"]),
+    ("j.mxf", &["-c:v", "jpeg2000"]),
+    ("x.mxf", &["-s", "720x576", "-pix_fmt", "yuv422p", "-c:v", "dnxhd", "-profile:v", "dnxhr_sq"]),
+    ("d.mxf", &["-s", "720x576", "-c:v", "dvvideo"]),
+    (
+        "o.mxf",
+        &[
+            "-s",
+            "720x576",
+            "-pix_fmt",
+            "yuv422p",
+            "-c:v",
+            "dnxhd",
+            "-profile:v",
+            "dnxhr_sq",
+            "-f",
+            "mxf_opatom",
+        ],
+    ),
+];
+
+#[test]
+fn bytes_cut_out_of_mxf_are_told_and_no_picture_is_out_of_its_time() {
+    if !have_ffmpeg() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let options = OpenOptions { interlaced: Interlaced::AsFrames, ..OpenOptions::default() };
+    let read = |path: &Path| {
+        let mut source = open(path.to_str().unwrap(), &options).unwrap();
+        let frames = read_all(&mut *source);
+        assert_eq!(source.info().declared_frames, Some(COUNT as u64), "{path:?}");
+        (frames, source.ending(), source.gaps())
+    };
+    for (name, arguments) in MXF {
+        // Of noise, so that each packet is long.
+        let mut all = vec!["-vf", "setpts=N/25/TB,noise=alls=8:all_seed=1", "-r", "25", "-q:v", "3"];
+        all.extend(arguments);
+        let path = encode(folder.path(), name, COUNT, &all);
+        let whole = std::fs::read(&path).unwrap();
+        let (frames, ending, gaps) = read(&path);
+        assert_eq!((frames.len(), ending, gaps), (COUNT, Ending::Complete, Gaps::default()), "{name}");
+        let truth: Vec<_> = frames.iter().map(|f| (f.ticks, samples(f).unwrap())).collect();
+        assert!(truth.iter().zip(0..).all(|((ticks, _), i)| *ticks == i), "{name}");
+        for (from, to) in [(0.5, 0.501), (0.5, 0.6), (0.3, 0.32), (0.75, 0.88), (0.85, 1.0)] {
+            let place = |part: f64| (whole.len() as f64 * part) as usize;
+            let mut bytes = whole.clone();
+            bytes.drain(place(from)..place(to));
+            std::fs::write(&path, &bytes).unwrap();
+            let (frames, ending, gaps) = read(&path);
+            let undecoded = frames.iter().filter(|f| f.plane.is_none()).count();
+            let what = format!(
+                "{name} {from}: {} frames, {undecoded} undecoded, {ending:?}, {gaps:?}",
+                frames.len()
+            );
+            assert!(gaps.is_damage() || undecoded > 0 || ending != Ending::Complete, "{what}");
+            // Of one element nothing tells where it is broken.
+            let is_in_time = |f: &Frame| samples(f).is_none_or(|s| (f.ticks, s) == truth[f.index as usize]);
+            assert!(name == "o.mxf" || frames.iter().all(is_in_time), "{what}");
+            assert!(frames.len() - undecoded > COUNT / 5, "{what}");
+        }
     }
 }

@@ -22,6 +22,7 @@ mod mraw;
 mod mutants;
 mod norpix;
 mod noticed;
+mod ome;
 mod opencv;
 mod orientation;
 mod pictures;

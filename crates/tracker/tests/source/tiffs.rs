@@ -11,11 +11,12 @@ use tracker::source::{OpenOptions, open};
 use crate::film::{encode, gray_jpeg, have_ffmpeg, read_all, samples};
 
 /// Size of the pictures, px: a row of 12 or of 1 bit ends inside a byte.
-const W: usize = 21;
-const H: usize = 6;
+pub const W: usize = 21;
+/// See [`W`].
+pub const H: usize = 6;
 
 /// Values of a tag.
-enum Values {
+pub enum Values {
     Short(Vec<u16>),
     Long(Vec<u32>),
     Text(String),
@@ -23,15 +24,15 @@ enum Values {
 use Values::{Long, Short, Text};
 
 /// A TIFF file in the making: each page's directory, what belongs to it, and then its samples.
-struct Tiff {
+pub struct Tiff {
     big_endian: bool,
-    bytes: Vec<u8>,
+    pub bytes: Vec<u8>,
     /// Where the place of the next directory is written.
     link: usize,
 }
 
 impl Tiff {
-    fn new(big_endian: bool) -> Self {
+    pub fn new(big_endian: bool) -> Self {
         let mut tiff = Self { big_endian, bytes: Vec::new(), link: 4 };
         tiff.bytes.extend(if big_endian { b"MM" } else { b"II" });
         tiff.short(42);
@@ -54,7 +55,7 @@ impl Tiff {
     }
 
     /// A page whose strip takes `strip` bytes of `data`; what is left of them lies behind it.
-    fn page(self, tags: Vec<(u16, Values)>, data: &[u8], strip: usize) -> Self {
+    pub fn page(self, tags: Vec<(u16, Values)>, data: &[u8], strip: usize) -> Self {
         self.strips(tags, data, &[strip])
     }
 
@@ -119,7 +120,7 @@ impl Tiff {
 }
 
 /// The tags that every page has.
-fn tags(bits: u16, photometric: u16, samples: u16) -> Vec<(u16, Values)> {
+pub fn tags(bits: u16, photometric: u16, samples: u16) -> Vec<(u16, Values)> {
     vec![
         (256, Short(vec![W as u16])),
         (257, Short(vec![H as u16])),
@@ -131,7 +132,7 @@ fn tags(bits: u16, photometric: u16, samples: u16) -> Vec<(u16, Values)> {
     ]
 }
 
-fn with(mut tags: Vec<(u16, Values)>, more: Vec<(u16, Values)>) -> Vec<(u16, Values)> {
+pub fn with(mut tags: Vec<(u16, Values)>, more: Vec<(u16, Values)>) -> Vec<(u16, Values)> {
     tags.retain(|t| more.iter().all(|m| m.0 != t.0));
     tags.extend(more);
     tags
@@ -142,12 +143,12 @@ fn value(k: usize, i: usize, bits: u32) -> u32 {
     ((k * 7919 + i * 104_729 + 13) as u32).wrapping_mul(2_654_435_761) >> (32 - bits)
 }
 
-fn values(k: usize, bits: u32) -> Vec<u32> {
+pub fn values(k: usize, bits: u32) -> Vec<u32> {
     (0..W * H).map(|i| value(k, i, bits)).collect()
 }
 
 /// Samples as TIFF packs them: rows from whole bytes on, the most significant bit first; 16 bits in the file's order.
-fn packed(values: &[u32], bits: usize, big_endian: bool) -> Vec<u8> {
+pub fn packed(values: &[u32], bits: usize, big_endian: bool) -> Vec<u8> {
     let pair = |v: u32| if big_endian { (v as u16).to_be_bytes() } else { (v as u16).to_le_bytes() };
     if bits == 16 {
         return values.iter().flat_map(|v| pair(*v)).collect();
@@ -169,7 +170,7 @@ fn problem(path: &Path) -> String {
 }
 
 /// Depth and samples of all frames, how it ended, and what was said of the file.
-fn read(path: &Path) -> (u32, Vec<Vec<u32>>, Ending, Vec<String>) {
+pub fn read(path: &Path) -> (u32, Vec<Vec<u32>>, Ending, Vec<String>) {
     let options = OpenOptions { fps: Some(100.0), ..OpenOptions::default() };
     let mut source = open(path.to_str().unwrap(), &options).unwrap();
     let frames = read_all(&mut *source);

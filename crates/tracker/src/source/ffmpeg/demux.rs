@@ -161,6 +161,33 @@ impl Demuxer {
         self.container() != "mpeg"
     }
 
+    /// Whether a film's display times lack, whose first packets have these times to be shown and to be decoded. MXF whose index
+    /// does not say how the film is reordered has the same for both.
+    pub(super) fn lacks_display_times(&self, first: impl IntoIterator<Item = (i64, i64)>) -> bool {
+        let is_reordered = self.parameters().video_delay > 0;
+        let mut first = first.into_iter().peekable();
+        self.counts_edit_units()
+            && is_reordered
+            && first.peek().is_some()
+            && first.all(|(pts, dts)| pts == dts || dts == ffi::AV_NOPTS_VALUE)
+    }
+
+    /// Whether a packet has no time in the file, and libavformat counts packets in place of it.
+    pub(super) fn counts_edit_units(&self) -> bool {
+        self.container().starts_with("mxf")
+    }
+
+    /// Frames by the length of a recording that is counted in frames.
+    pub(super) fn edit_units(&self) -> Option<u64> {
+        let stream = self.stream();
+        let (base, rate) = (stream.time_base, stream.avg_frame_rate);
+        let is_frame = i64::from(base.num) * i64::from(rate.num) == i64::from(base.den) * i64::from(rate.den);
+        if !self.counts_edit_units() || !is_frame {
+            return None;
+        }
+        u64::try_from(stream.duration).ok().filter(|n| *n > 0)
+    }
+
     /// Width to height of a pixel: the container's, else the codec's; and the codec's own. 0 is not said.
     pub(super) fn pixel_aspect(&self) -> [ffi::AVRational; 2] {
         // SAFETY: the context is open and the stream one of its own; without a frame the codec's parameters are asked.
@@ -342,6 +369,11 @@ impl Packet {
     pub(super) fn get(&self) -> &ffi::AVPacket {
         // SAFETY: never null after `new`.
         unsafe { &*self.0 }
+    }
+
+    /// When it is shown and when decoded, ticks.
+    pub(super) fn times(&self) -> (i64, i64) {
+        (self.get().pts, self.get().dts)
     }
 
     /// The packet's bytes of the stream.

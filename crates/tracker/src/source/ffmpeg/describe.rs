@@ -51,7 +51,8 @@ pub(super) fn describe(
                 .into(),
         );
     }
-    let declared = u64::try_from(stream.nb_frames).ok().filter(|n| *n > 0);
+    let counted = u64::try_from(stream.nb_frames).ok().filter(|n| *n > 0);
+    let declared = counted.or_else(|| demuxer.edit_units());
     let indexed = demuxer.indexed();
     let mut details = details(parameters, layout);
     if let (Some(all), Some((there, hidden))) = (declared, indexed)

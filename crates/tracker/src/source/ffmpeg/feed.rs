@@ -82,6 +82,8 @@ pub(super) struct Feed {
     empty: u64,
     failed: Option<String>,
     at_end: bool,
+    /// Reading stopped at damage.
+    is_broken_off: bool,
     ends_broken: bool,
 }
 
@@ -113,6 +115,7 @@ impl Feed {
             empty: 0,
             failed: None,
             at_end: false,
+            is_broken_off: false,
             ends_broken: false,
         };
         for _ in 0..first {
@@ -207,7 +210,11 @@ impl Feed {
             match self.ahead.front() {
                 Some(after) => given.is_damaged |= after.fit == Fit::Broken,
                 None => {
-                    let rest = self.structure.as_mut().map_or(Fit::Whole, Structure::rest);
+                    let rest = match &mut self.structure {
+                        _ if self.is_broken_off => Fit::Broken,
+                        Some(structure) => structure.rest(),
+                        None => Fit::Whole,
+                    };
                     self.ends_broken =
                         rest != Fit::Whole && (self.ends_in_pictures() || !self.is_declared_end());
                     given.is_damaged |= self.ends_broken;
@@ -268,6 +275,9 @@ impl Feed {
                     self.failed = None;
                     self.numbers += 1;
                     self.arrive(packet, lost);
+                    if self.numbers > 1 && self.demuxer.counts_edit_units() {
+                        self.end_at_break();
+                    }
                     return Ok(());
                 }
                 Read::End => self.at_end = true,
@@ -289,6 +299,19 @@ impl Feed {
             }
         }
         Ok(())
+    }
+
+    /// Ends the reading where the packet read last comes after damage: frames that were between have no numbers, and those that
+    /// follow no times.
+    fn end_at_break(&mut self) {
+        self.is_broken_off = self.ahead.back().is_some_and(|arrived| arrived.fit == Fit::Broken);
+        if !self.is_broken_off {
+            return;
+        }
+        let place = self.ahead.pop_back().and_then(|broken| u64::try_from(broken.packet.get().pos).ok());
+        let place = place.map_or_else(String::new, |at| format!(" before byte {at}"));
+        self.failed = Some(format!("it is damaged{place}, and frames after that have no times of their own"));
+        self.at_end = true;
     }
 
     fn arrive(&mut self, mut packet: Packet, mut lost: Vec<i64>) {

@@ -10,7 +10,7 @@ use ffmpeg_next::ffi;
 use super::demux::{Demuxer, Packet};
 use crate::error::{Error, Fault, FaultKind};
 use crate::message::{Message, Setting};
-use crate::name::shell_word;
+use crate::name::{shell_word, text};
 use crate::setting_words::Worded;
 use crate::source::Interlaced;
 
@@ -132,7 +132,7 @@ impl FieldOrder {
 fn command(name: &str) -> String {
     let is_address = name.contains("://");
     let file = if is_address { name.rsplit('/').next().unwrap_or_default() } else { name };
-    let stem = Path::new(file).with_extension("").display().to_string();
+    let stem = text(Path::new(file).with_extension(""));
     // Standard input and an address name no file beside which the other could be.
     let stem = if ["", "-"].contains(&stem.as_str()) { "film" } else { &stem };
     // What is before a colon would be a protocol, and what begins with a hyphen an option.
@@ -159,7 +159,7 @@ pub(super) fn refusal(name: &str, order: FieldOrder) -> Error {
         .of_kind(FaultKind::Unsupported)
         .advice(
             Message::from(format!(
-                "Make a picture of each field, at twice the rate: {}. If the camera filmed whole pictures and only the \
+                "Make a picture of each field, at twice the rate, with `{}`. If the camera filmed whole pictures and only the \
                  file says interlaced, read it as it is with ",
                 command(name)
             )) + Setting::Interlaced.set_to(Interlaced::AsFrames.word()),
@@ -171,7 +171,7 @@ pub(super) fn refusal(name: &str, order: FieldOrder) -> Error {
 pub(super) fn warning(name: &str, order: FieldOrder) -> Message {
     format!(
         "interlaced, {}: its pictures are read whole, as if both fields were filmed at once. If they were not, a marker \
-         that moves is in two places; then make a picture of each field: {}",
+         that moves is in two places; then make a picture of each field with `{}`",
         order.words(),
         command(name)
     )

@@ -143,7 +143,9 @@ impl FfmpegSource {
         let lacks = |p: &Packet| {
             p.get().pts == ffi::AV_NOPTS_VALUE && !(intra_only && p.get().dts != ffi::AV_NOPTS_VALUE)
         };
-        let unstamped = !feed.demuxer.has_display_times() || feed.ahead().any(lacks);
+        let unstamped = !feed.demuxer.has_display_times()
+            || feed.ahead().any(lacks)
+            || feed.demuxer.lacks_display_times(feed.ahead().map(Packet::times));
         let is_blind = feed.is_blind();
         let lost = Lost::new(stream_base(&feed.demuxer), &info.claims.container, is_blind);
         Ok(Self {

@@ -190,7 +190,10 @@ impl Survey {
         }
         // A stream has display times if its first packets have.
         let lacks = |(pts, ..): &Times| *pts == ffi::AV_NOPTS_VALUE;
-        let unstamped = !demuxer.has_display_times() || packets.iter().take(FIRST).any(lacks);
+        let first = || packets.iter().take(FIRST);
+        let unstamped = !demuxer.has_display_times()
+            || first().any(lacks)
+            || demuxer.lacks_display_times(first().map(|(pts, dts, _)| (*pts, *dts)));
         Ok(Self {
             packets,
             is_whole,

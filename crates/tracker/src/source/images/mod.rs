@@ -6,6 +6,7 @@ mod coded_picture;
 mod jpeg_bits;
 mod jpeg_scan;
 pub mod names;
+mod ome;
 mod orientation_tag;
 mod picture;
 pub mod picture_file;

@@ -64,21 +64,6 @@ pub(super) fn declared<R: Read + Seek>(decoder: &mut Decoder<R>, layout: &Layout
     found.filter(|d| d.pictures > 1)
 }
 
-/// The warning of an OME-TIFF whose pages are not simply one for each moment.
-pub(super) fn channels_of_ome<R: Read + Seek>(decoder: &mut Decoder<R>, layout: &Layout) -> Option<String> {
-    let text = decoder.get_tag_ascii_string(Tag::ImageDescription).ok().filter(|t| t.contains("<OME"))?;
-    let number = |key: &str| text.split_once(key)?.1.split('"').nth(1)?.parse::<u64>().ok();
-    let [channels, slices, moments] = [number(" SizeC=")?, number(" SizeZ=")?, number(" SizeT=")?];
-    // The colours of a pixel count as channels there.
-    let channels = channels / u64::from(layout.samples).max(1);
-    (channels > 1 || slices > 1 && moments > 1).then(|| {
-        format!(
-            "OME says {channels} channels, {slices} slices and {moments} moments: its pages are read as frames, in the file's \
-             order. Save one channel and slice as a stack of its own"
-        )
-    })
-}
-
 fn by_imagej(text: &str) -> Option<Declared> {
     if !text.starts_with("ImageJ=") {
         return None;

@@ -108,7 +108,8 @@ fn size_of_most<'a>(
     Ok((picture, path))
 }
 
-fn file_name(path: &Path) -> String {
+/// The last part of a path, as text.
+pub(super) fn file_name(path: &Path) -> String {
     text(path.file_name().unwrap_or_default())
 }
 

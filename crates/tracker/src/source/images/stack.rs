@@ -5,8 +5,10 @@ use std::io::BufReader;
 
 use tiff::decoder::Decoder;
 
-use super::picture::{Alike, Picture, format, frame, other_kind, rate};
+use super::ome::Ome;
+use super::picture::{Alike, Picture, format, frame, other_kind, other_size, rate};
 use super::planes::{self, Declared, Planes};
+use super::sequence::file_name;
 use super::tiff_layout::{Layout, is_reduced};
 use super::{orientation_tag, pixel_size, tiff_page};
 use crate::error::{Error, Fault, FaultKind, Result};
@@ -27,6 +29,8 @@ pub struct StackSource {
     next: u64,
     /// Why frames are empty.
     empty: Vec<Reason>,
+    /// Where the description says that pictures are which the file lacks, a clause to add.
+    elsewhere: String,
     ending: Ending,
 }
 
@@ -55,6 +59,20 @@ impl Pages {
         Ok(pages)
     }
 
+    /// The pages at their second and its layout, if that and the third are of one size and the first, laid out so, is of another: that is
+    /// a small copy which is not marked as one.
+    fn unlike_first(name: &str, first: &Layout) -> Result<Option<(Self, Layout)>> {
+        let mut pages = Self::open(name)?;
+        let mut turned = || if pages.turn() == Ok(true) { Layout::of(&mut pages.decoder).ok() } else { None };
+        match turned().zip(turned()) {
+            Some((second, third)) if kind(&second) == kind(&third) && kind(&second) != kind(first) => {
+                let mut pages = Self::open(name)?;
+                Ok((pages.turn() == Ok(true)).then_some((pages, second)))
+            }
+            _ => Ok(None),
+        }
+    }
+
     /// Goes to the next page; `false` at the end, with what was wrong if that is not a clean one.
     fn turn(&mut self) -> std::result::Result<bool, String> {
         loop {
@@ -67,6 +85,11 @@ impl Pages {
             }
         }
     }
+}
+
+/// Width and height in px, and depth in bits.
+fn kind(layout: &Layout) -> (u32, u32, u32) {
+    (layout.width, layout.height, layout.bits)
 }
 
 /// The error for a file of one page whose other pictures cannot be found, for the `problem`.
@@ -94,12 +117,19 @@ impl StackSource {
             ))
         };
         let mut pages = Pages::open(name)?;
-        let layout = Layout::of(&mut pages.decoder).map_err(unreadable)?;
-        layout.judge().map_err(unreadable)?;
+        let mut layout = Layout::of(&mut pages.decoder).map_err(unreadable)?;
         let declared = planes::declared(&mut pages.decoder, &layout);
+        let ome = Ome::of(&mut pages.decoder, &layout);
         let mut warnings = Vec::new();
         warnings.extend(declared.as_ref().and_then(|d| d.order()).map(Message::from));
-        warnings.extend(planes::channels_of_ome(&mut pages.decoder, &layout).map(Message::from));
+        warnings.extend(ome.iter().flat_map(|o| o.warnings.clone()).map(Message::from));
+        if let Some((second, of_second)) = Pages::unlike_first(name, &layout)? {
+            let size = other_size("the page", kind(&layout), kind(&of_second));
+            warnings.push(format!("frame 0: {size}: such a frame stays empty").into());
+            (pages, layout) = (second, of_second);
+        }
+        layout.judge().map_err(unreadable)?;
+        let elsewhere = ome.as_ref().map_or_else(String::new, |o| o.elsewhere(&file_name(&path(name))));
         let size_bytes = std::fs::metadata(path(name)).ok().map(|m| m.len());
         let (time_base, rate_hz, rate_origin) = rate(options, &mut warnings)?;
         let orientation = orientation_tag::of_tiff(&mut pages.decoder);
@@ -121,7 +151,10 @@ impl StackSource {
             format: format(layout.bits),
             depth_bits: layout.bits.max(8),
             pixel_damage: PixelDamage::of("tiff"),
-            declared_frames: declared.as_ref().map(|d| d.pictures),
+            declared_frames: declared
+                .as_ref()
+                .map(|d| d.pictures)
+                .or_else(|| ome.as_ref()?.pictures.filter(|n| *n > 1)),
             time_base,
             rate_hz,
             rate_origin,
@@ -130,7 +163,9 @@ impl StackSource {
             size_bytes,
             details: declared
                 .as_ref()
-                .map(|d| ("described by".to_owned(), d.by.to_owned()))
+                .map(|d| d.by)
+                .or(ome.map(|_| "OME-XML"))
+                .map(|by| ("described by".to_owned(), by.to_owned()))
                 .into_iter()
                 .collect(),
             warnings,
@@ -150,6 +185,7 @@ impl StackSource {
                 pictures: Pictures::Planes(raw, planes),
                 next: 0,
                 empty: Vec::new(),
+                elsewhere,
                 ending: Ending::Complete,
             });
         }
@@ -162,6 +198,7 @@ impl StackSource {
             pictures: Pictures::Pages(Some(Box::new(Pages::open(name)?))),
             next: 0,
             empty: Vec::new(),
+            elsewhere,
             ending: Ending::Complete,
         })
     }
@@ -180,8 +217,8 @@ impl StackSource {
             frames: self.next,
             byte: self.info.size_bytes,
             reason: format!(
-                "the file ends after {} of {declared} pictures that its description declares",
-                self.next
+                "the file ends after {} of {declared} pictures that its description declares{}",
+                self.next, self.elsewhere
             ),
         })
     }

@@ -6,7 +6,7 @@ use std::fs::File;
 
 use super::bytes::Bytes;
 use super::walk::{Fit, Walk};
-use super::{asf, boxes, flv, gif, matroska, nut, ogg, pages, program, transport};
+use super::{asf, boxes, flv, gif, matroska, mxf, nut, ogg, pages, program, transport};
 
 /// Follows the elements of a file from packet to packet.
 pub(in super::super) struct Structure {
@@ -32,6 +32,8 @@ impl Structure {
             Box::new(flv::Flv::new(&mut file)?)
         } else if has("ogg") {
             Box::new(pages::Paged::new(ogg::Ogg::default(), 0))
+        } else if has("mxf") {
+            Box::new(mxf::Mxf::new(&mut file)?)
         } else if has("nut") {
             Box::new(nut::Nut::default())
         } else if has("mpeg") {

@@ -10,6 +10,7 @@ mod container;
 mod flv;
 mod gif;
 mod matroska;
+mod mxf;
 mod nut;
 mod ogg;
 mod pages;
