@@ -122,6 +122,7 @@ def _films() -> dict[str, Format]:
         "asf": film("film.wmv", _remuxed("film.wmv", "-c:v", "wmv2", "-q:v", "2")),
         "ogg": film("film.ogv", _remuxed("film.ogv", "-c:v", "libtheora", "-q:v", "10")),
         "nut": film("film.nut", _remuxed("film.nut", "-c:v", "mpeg4", "-q:v", "2")),
+        "mxf": film("film.mxf", _remuxed("film.mxf", *mpeg2, "-bf", "2")),
         "webm": film("film.webm", _remuxed("film.webm", "-c:v", "libvpx")),
         "y4m": film("film.y4m", _film("film.y4m")),
         "cine": film("film.cine", _cine),
