@@ -141,7 +141,8 @@ impl State {
                 ": {name}, or another file of the recording, was written or replaced since then"
             ));
         }
-        let differs = |key: &str| before.is_some_and(|b| b[key] != now[key]);
+        let before = before?;
+        let differs = |key: &str| before[key] != now[key];
         let facts = now.as_object().filter(|_| key == "recording")?;
         let is_contents = |key: &str| key.starts_with("sha256");
         if facts.keys().any(|k| !is_contents(k) && differs(k)) {
@@ -277,7 +278,11 @@ mod tests {
         let state =
             State { identity: json!({TIMES: {"newest": 1}, "recording": {"name": "a.mraw"}}), changes: None };
         let words = state
-            .same(&json!({TIMES: {"newest": 2}}), Path::new("o"), "it had another")
+            .same(
+                &json!({TIMES: {"newest": 2}, "recording": {"name": "a.mraw"}}),
+                Path::new("o"),
+                "it had another",
+            )
             .unwrap_err()
             .to_string();
         assert!(
