@@ -19,6 +19,16 @@ def test_every_marker_has_its_name_and_its_body(kind: str, tmp_path: Path) -> No
     assert got.bodies_right
 
 
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_chain_of_single_markers_is_named_also_where_they_go_by_each_other(
+    seed: int, tmp_path: Path
+) -> None:
+    got = run("one a link, three links", seed, tmp_path)
+    assert (got.status, got.wrong, got.false) == (0, 0, 0)
+    assert got.coverage > 0.99
+    assert got.bodies_right
+
+
 def test_bodies_are_made_of_what_moves_before_clutter_and_have_angles(tmp_path: Path) -> None:
     got = run("clutter and a hand", 1, tmp_path)
     assert (got.wrong, got.false) == (0, 0)

@@ -233,18 +233,30 @@ def test_the_command_line_takes_the_same(tmp_path: Path) -> None:
         ({"same": "n0=n7"}, "same: n7 is no node"),
         ({"same": "n0"}, "same: 'n0' cannot be"),
         ({"markers": 0}, "markers: 0 markers cannot be followed"),
-        ({"marker": [(160, 200, 0), (161, 201, 0)]}, "are one marker"),
         ({"region": (5, 5, 1, 1)}, "region"),
     ],
 )
 def test_what_cannot_be_wanted_is_refused_in_words(told: dict[str, Any], said: str, tmp_path: Path) -> None:
     film(tmp_path / "bob.mp4", 60)
-    if "one marker" in said:
-        u, v = bob(0)
-        told = {"marker": [(u, v, 0), (u + 1, v, 0)]}
     with pytest.raises(dp.PydpendError) as refused:
         dp.track(tmp_path / "bob.mp4", **told)
     assert said.replace("'", '"') in str(refused.value).replace("'", '"')
+
+
+def test_a_place_that_cannot_be_followed_is_told_and_the_others_are_followed(tmp_path: Path) -> None:
+    """Names are the numbers of the places; the exit status says that one lacks: here one marker is pointed at twice."""
+    film(tmp_path / "bob.mp4", 60)
+    (u, v), table = bob(0), tmp_path / "t.parquet"
+    run: list[str | Path] = [TRACKER, "track", tmp_path / "bob.mp4", "-o", table]
+    places = [word for off in (2, 0) for word in ("--marker", f"{u + off:.0f},{v + off:.0f}")]
+    done = subprocess.run([*run, *places], capture_output=True, text=True, check=False)
+    assert done.returncode == 1, done.stderr
+    assert "note: nothing is followed from (" in done.stderr
+    assert "are one marker, which is followed from there" in done.stderr
+    assert "not followed, as the notes say: (" in done.stderr
+    nodes = dp.read_nodes(table)
+    assert [n.name for n in nodes.rig.nodes] == ["n1"]
+    assert on(nodes.xy_px[:, 0], bob) > 0.95
 
 
 def test_a_refusal_has_a_picture_with_numbers_and_the_way_on(tmp_path: Path) -> None:

@@ -116,8 +116,16 @@ pub fn run(args: Args, front: &CommandLine) -> anyhow::Result<u8> {
             front.tell(format!("not seen again up to the end: {}", lost.join(", ")));
             1
         }
+        RunEnding::Complete if !summary.not_followed.is_empty() => {
+            front.tell(format!("not followed, as the notes say: {}", summary.not_followed.join(", ")));
+            1
+        }
         RunEnding::Complete if !summary.doubtful.is_empty() => {
             front.tell(format!("doubtful, as the notes say: {}", summary.doubtful.join(", ")));
+            1
+        }
+        RunEnding::Complete if !summary.open.is_empty() => {
+            front.tell(format!("names stay open, as the notes say: {}", summary.open.join(", ")));
             1
         }
         RunEnding::Damaged => 1,
@@ -140,6 +148,8 @@ fn print_json(args: &Args, summary: &RunSummary, status: u8, front: &CommandLine
         "frames": summary.frames,
         "resumed_frames": summary.resumed,
         "lost": summary.lost(),
+        "not_followed": summary.not_followed,
+        "open": summary.open,
         "nodes": summary.nodes,
         "warnings": summary.warnings.iter().map(|w| front.say(w)).collect::<Vec<_>>(),
         "source": summary.meta.source,

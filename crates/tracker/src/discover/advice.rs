@@ -13,13 +13,46 @@ const ALIKE_PX: f64 = 1.5;
 /// Markers this near to each other, in radii, run together in the picture.
 const MERGING_RADII: f64 = 2.5;
 
+/// What makes names hard to tell in a recording, the likeliest first, a sentence each. `rate_hz` is the rate of the recording, if known;
+/// `rows` some of its nodes' frames.
+pub fn causes(rig: &Rig, rows: &Rows, rate_hz: Option<f64>) -> Vec<String> {
+    let home = home(rig);
+    let mut out: Vec<String> = rate(rig, &home, rows, rate_hz).into_iter().collect();
+    out.extend(alike(rig, &home));
+    for body in &rig.bodies {
+        let own: Vec<&str> =
+            rig.nodes.iter().filter(|n| n.body == body.name).map(|n| n.name.as_str()).collect();
+        if let [a, b] = own[..] {
+            out.push(format!(
+                "{} has two markers, {a} and {b}, which look the same after half a turn: a third one would tell them apart",
+                body.name
+            ));
+        }
+    }
+    out.extend(merging(rig, rows));
+    out
+}
+
 /// Warnings, a sentence each. `rate_hz` is the rate of the recording, if known; `rows` its nodes.
 pub fn advise(rig: &Rig, rows: &Rows, rate_hz: Option<f64>) -> Vec<String> {
-    let n = rig.nodes.len();
-    let home: Vec<Vector2<f64>> =
-        rig.nodes.iter().map(|a| rig.pixel_aspect.to_square(Vector2::new(a.x_px, a.y_px))).collect();
+    let home = home(rig);
     let mut out = Vec::new();
     out.extend(rate(rig, &home, rows, rate_hz));
+    out.extend(alike(rig, &home));
+    out.extend(merging(rig, rows));
+    out.extend(not_at_rest(rig, rows));
+    out
+}
+
+/// The nodes' places in the reference picture, square px.
+fn home(rig: &Rig) -> Vec<Vector2<f64>> {
+    rig.nodes.iter().map(|a| rig.pixel_aspect.to_square(Vector2::new(a.x_px, a.y_px))).collect()
+}
+
+/// Nodes of a body that its others do not tell apart.
+fn alike(rig: &Rig, home: &[Vector2<f64>]) -> Vec<String> {
+    let n = rig.nodes.len();
+    let mut out = Vec::new();
     for (b, body) in rig.bodies.iter().enumerate() {
         let nodes: Vec<usize> = (0..n).filter(|&i| rig.node_bodies()[i] == b).collect();
         let places: Vec<Vector2<f64>> = nodes.iter().map(|&i| home[i]).collect();
@@ -31,8 +64,6 @@ pub fn advise(rig: &Rig, rows: &Rows, rate_hz: Option<f64>) -> Vec<String> {
             ));
         }
     }
-    out.extend(merging(rig, rows));
-    out.extend(not_at_rest(rig, rows));
     out
 }
 

@@ -37,7 +37,8 @@ pub fn rig_of_paths(
     frame: &(dyn Fn(usize) -> u64 + Sync),
     stop: &Stop,
 ) -> Result<Option<PathRig>> {
-    let evidence = Evidence::new(paths, stop)?;
+    let mut evidence = Evidence::new(paths, stop)?;
+    evidence.are_markers = true;
     let size_px = [f64::from(image_px[0]) * pixel_aspect.ratio(), f64::from(image_px[1])];
     let camera = continuity::camera(&evidence, size_px, stop)?;
     let plane = Plane { pixel_aspect, camera: camera.as_ref().map(|c| c.camera) };

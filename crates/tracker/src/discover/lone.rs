@@ -199,7 +199,7 @@ fn found_of(path: &Path, sample: &Sample) -> Found {
 }
 
 /// Makes one body of every two lone markers that keep their distance, unless one hangs on the other: then one of them
-/// goes about a point of the ground or of a body, and the other does not.
+/// goes about a point of the ground or of a body, and the other does not, or is farther out along a chain of them.
 ///
 /// # Errors
 /// [`crate::error::Error::Interrupted`] once `stop` was asked for.
@@ -223,6 +223,18 @@ fn next_pair(found: &[Found], stop: &Stop) -> Result<Option<(usize, usize, Found
     };
     let joints: Vec<Option<(usize, Vector2<f64>)>> =
         lone.iter().map(|&k| stop.heed().map(|()| about(k))).collect::<Result<_>>()?;
+    // How far out along a chain each is: one that keeps its distance from a marker that hangs, hangs on that.
+    let mut out: Vec<Option<usize>> = joints.iter().map(|j| j.map(|_| 0)).collect();
+    for level in 0..lone.len() {
+        for a in (0..lone.len()).filter(|&a| joints[a].is_none()) {
+            stop.heed()?;
+            let hangs =
+                |b: usize| out[b] == Some(level) && rigid_pair(&found[lone[b]], &found[lone[a]]).is_some();
+            if out[a].is_none() && (0..lone.len()).any(hangs) {
+                out[a] = Some(level + 1);
+            }
+        }
+    }
     // Those about one point first: a body found may be what the next hang on.
     for together in [true, false] {
         for (a, &i) in lone.iter().enumerate() {
@@ -230,7 +242,7 @@ fn next_pair(found: &[Found], stop: &Stop) -> Result<Option<(usize, usize, Found
                 stop.heed()?;
                 let one = match (&joints[a], &joints[b]) {
                     (Some(p), Some(q)) => together && p.0 == q.0 && (p.1 - q.1).norm() < SAME_JOINT_PX,
-                    (None, None) => !together,
+                    (None, None) => !together && out[a] == out[b],
                     _ => false,
                 };
                 if one && let Some(body) = rigid_pair(&found[i], &found[j]) {

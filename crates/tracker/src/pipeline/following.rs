@@ -6,8 +6,9 @@ use serde_json::json;
 
 use super::ahead::End;
 use super::clutter::is_cluttered;
-use super::moving::{self, Outcome, Unclear};
+use super::moving::{self, Outcome};
 use super::observer::{Observer, Stage};
+use super::open_names::OpenNames;
 use super::opening::{Attended, on_threads};
 use super::reading::Run;
 use super::repeats::Repeats;
@@ -15,6 +16,7 @@ use super::sizes::{MOST_SIZES, Sizes};
 use super::state;
 use super::summary::{EDITS, RunSummary};
 use super::times::times;
+use super::unclear::Unclear;
 use crate::discover::{Discovery, discover};
 use crate::edits::{Decided, Replay, Seen};
 use crate::error::{Error, Fault, FaultKind, Result};
@@ -22,6 +24,7 @@ use crate::frame::Ending;
 use crate::gaps::Damage;
 use crate::message::{Message, Setting};
 use crate::name::shown;
+use crate::observation::Observation;
 use crate::rig::Rig;
 use crate::rigid::search::MOST_SEEDS;
 use crate::source::Interlaced;
@@ -30,6 +33,37 @@ use crate::table::{
 };
 use crate::timing::{self, Clock, Steps, Timing};
 use crate::track::track_recording;
+
+/// Facts of the rows that are told at the end.
+struct Watched {
+    tally: Tally,
+    open_names: OpenNames,
+    repeats: Repeats,
+    sizes: Sizes,
+}
+
+impl Watched {
+    fn of(given: Option<&Rig>, rig: &Rig) -> Self {
+        Self {
+            tally: Tally::new(rig),
+            open_names: OpenNames::default(),
+            repeats: Repeats::default(),
+            sizes: Sizes::of(given, rig),
+        }
+    }
+
+    /// What the tracker saw, before a person's edits.
+    fn seen(&mut self, observations: &[Observation]) {
+        self.sizes.push(observations);
+        self.repeats.push(observations);
+    }
+
+    /// What is written, with a person's edits.
+    fn written(&mut self, frame: u64, time_s: f64, observations: &[Observation]) {
+        self.tally.push(observations);
+        self.open_names.push(frame, time_s, observations);
+    }
+}
 
 impl<'a> Run<'a> {
     /// Finds the rig if it is not given, follows the markers, writes the table.
@@ -92,10 +126,8 @@ impl<'a> Run<'a> {
             None => None,
         };
         let mut rows = self.settings.collect.then(Rows::default);
-        let mut tally = Tally::new(&rig);
+        let mut watched = Watched::of(self.settings.rig.as_ref(), &rig);
         let mut replay = self.replay(&rig, end.is_some())?;
-        let mut repeats = Repeats::default();
-        let mut sizes = Sizes::of(self.settings.rig.as_ref(), &rig);
         // A run that was stopped while it read is only stopped here if the user does not want to wait.
         let mut stop = end.is_none();
         let reading_was_stopped = stop;
@@ -107,8 +139,7 @@ impl<'a> Run<'a> {
         let tracked = attended.run(observer, leave, |attended| {
             track_recording(&self.store, &rig, &attended.stop, &mut |stamp, observations| {
                 let time_s = clock.seconds(done, stamp.ticks);
-                sizes.push(observations);
-                repeats.push(observations);
+                watched.seen(observations);
                 let observations = replay.made(stamp.index, observations);
                 if let Some(writer) = &mut writer {
                     writer.push(stamp.index, time_s, observations)?;
@@ -116,7 +147,7 @@ impl<'a> Run<'a> {
                 if let Some(rows) = &mut rows {
                     rows.push(stamp.index, time_s, observations);
                 }
-                tally.push(observations);
+                watched.written(stamp.index, time_s, observations);
                 if !stamp.decoded {
                     damage.undecoded.push(stamp.index);
                 }
@@ -135,9 +166,12 @@ impl<'a> Run<'a> {
             Err(error) => return Err(error),
         }
         self.store.check()?;
-        self.warnings.extend(repeats.words());
-        let nodes = tally.summary();
-        let doubtful = if stop { Vec::new() } else { self.judge(&nodes, &mut sizes)? };
+        self.warnings.extend(watched.repeats.words());
+        let nodes = watched.tally.summary();
+        let doubtful = if stop { Vec::new() } else { self.judge(&nodes, &mut watched.sizes)? };
+        let told = watched.open_names.told(&rig, &nodes, timing.rate_hz).filter(|_| !stop);
+        let (open, words) = told.unzip();
+        self.warnings.extend(words);
         let ending = end.map(|e| e.ending).filter(|_| !stop);
         let decided = replay.finish();
         let meta = self.meta(rig, timing, damage, ending, decided.as_ref());
@@ -160,6 +194,8 @@ impl<'a> Run<'a> {
             resumable: stop && self.settings.output.is_some() && !self.files.is_empty(),
             moving: false,
             doubtful,
+            not_followed: Vec::new(),
+            open: open.unwrap_or_default(),
             nodes,
             warnings: std::mem::take(&mut self.warnings),
             table: rows.map(|rows| NodeTable { meta: meta.clone(), rows }),

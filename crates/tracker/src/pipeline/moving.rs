@@ -4,29 +4,25 @@
 
 use std::sync::atomic::Ordering;
 
-use super::candidates::{Candidates, look, words};
+use super::candidates::{Candidates, words};
 use super::moving_nodes::{Chosen, Moving};
 use super::observer::{Observer, Stage};
 use super::opening::{Attended, on_threads, open};
+use super::pointed::{Columns, pointed};
 use super::request::fits;
 use super::settings::RunSettings;
 use super::summary::RunSummary;
+use super::unclear::{Found, LEAST_CONFIDENCE, Unclear, candidates, point_at};
 use crate::detect::{Centroid, DetectSettings, Threshold};
 use crate::error::{Error, Fault, Result};
 use crate::frame::SourceInfo;
-use crate::message::{Message, Setting};
-use crate::moving::{
-    Click, End, Limits, Lost, Marker, Missed, Search, Survey, Unheld, WorkFilm, finish, follow_clicks,
-    strongest, survey,
-};
+use crate::message::Setting;
+use crate::moving::{Limits, Marker, Search, Survey, WorkFilm, finish, survey};
 use crate::rig::Rig;
 use crate::source::{self, OpenOptions};
 use crate::table::{NodeSummary, RunEnding, SourceFacts};
 use crate::wanted::{Pointed, Wanted};
 
-/// Confidence from which on what moves is named: right results of the films with truth have 0.2 to 0.8, and of the wrong ones
-/// none has more than 0.16 (docs/validation/moving.md).
-const LEAST_CONFIDENCE: f64 = 0.2;
 /// Part of the decoded frames in which one marker at least must be seen for the rig to be believed.
 const LEAST_SEEN: f64 = 0.5;
 
@@ -36,21 +32,6 @@ pub(super) enum Outcome {
     Followed(Box<RunSummary>),
     /// Why nothing is named, and the way on.
     Unclear(Unclear),
-}
-
-/// The reason for which nothing is named.
-#[derive(Debug, Clone)]
-pub(super) struct Unclear {
-    /// A clause.
-    pub why: String,
-    /// A sentence without its full stop; empty if there is nothing to do.
-    pub advice: Message,
-}
-
-impl Unclear {
-    fn new(why: impl Into<String>, advice: impl Into<Message>) -> Self {
-        Self { why: why.into(), advice: advice.into() }
-    }
 }
 
 /// Whether what moves may be followed in place of markers: only where no more was said of how markers look than where they are
@@ -210,17 +191,6 @@ fn limits(settings: &RunSettings, info: &SourceInfo, shrink: usize) -> Limits {
     }
 }
 
-struct Found {
-    moving: Result<Moving, Unclear>,
-    candidates: Option<Candidates>,
-}
-
-impl Found {
-    fn unclear(why: Unclear, candidates: Candidates) -> Self {
-        Self { moving: Err(why), candidates: Some(candidates) }
-    }
-}
-
 /// Follows what is wanted, or else what is likeliest meant; with a rig, what is at the places of its nodes.
 fn follow(film: &WorkFilm, limits: &Limits, wanted: &Wanted, rig: Option<&Rig>) -> Result<Found> {
     let Some(search) = Search::learn(film, limits)? else {
@@ -230,7 +200,7 @@ fn follow(film: &WorkFilm, limits: &Limits, wanted: &Wanted, rig: Option<&Rig>) 
     let mut found = if wanted.marker.is_empty() {
         surveyed(film, &search, wanted, rig)?
     } else {
-        pointed(film, &search, &wanted.marker)?
+        pointed(film, &search, &wanted.marker, Columns::Followed)?
     };
     if let Ok(moving) = &mut found.moving {
         moving.unite(&wanted.same)?;
@@ -245,9 +215,9 @@ fn follow(film: &WorkFilm, limits: &Limits, wanted: &Wanted, rig: Option<&Rig>) 
         _ if named => {}
         // The rig's own places are as good as any that are pointed at.
         Some(places) if wanted.is_default() => {
-            found = pointed(film, &search, &places)?;
+            found = pointed(film, &search, &places, Columns::All)?;
             if let Ok(moving) = &mut found.moving {
-                moving.name_by(rig);
+                moving.name_in_order(rig);
             }
         }
         _ if found.moving.is_ok() => {
@@ -311,42 +281,6 @@ fn surveyed(film: &WorkFilm, search: &Search, wanted: &Wanted, rig: Option<&Rig>
     Ok(Found { moving: Ok(moving), candidates: Some(candidates) })
 }
 
-/// All that moves, or what stands out where nothing does.
-fn candidates(
-    film: &WorkFilm,
-    search: &Search,
-    markers: &[Marker],
-    answers: usize,
-    confidence: f64,
-    chosen: &[usize],
-) -> Result<Candidates> {
-    if markers.is_empty() {
-        let (picture, spots) = strongest(search)?;
-        return Ok(Candidates::of_spots(film, picture, &spots));
-    }
-    Ok(Candidates::of_markers(film, markers, |k| match k {
-        _ if chosen.contains(&k) => None,
-        k if k < answers => Some(format!(
-            "of the likeliest look, which explains {:.0} % of what looks like it ({:.0} % are needed)",
-            100.0 * confidence,
-            100.0 * LEAST_CONFIDENCE
-        )),
-        _ => Some("of another look, and less likely meant".into()),
-    }))
-}
-
-/// The way on where it is not clear what is meant.
-fn point_at(candidates: &Candidates) -> Message {
-    match candidates.all.first() {
-        Some(first) => {
-            Message::from("Say what is meant with ")
-                + first.advice()
-                + ", for what has number 1 in the picture"
-        }
-        None => "Point at it with " + Setting::Marker.set_to("X,Y@FRAME"),
-    }
-}
-
 /// The reason for which what moves is not named.
 fn unclear(
     film: &WorkFilm,
@@ -366,89 +300,6 @@ fn unclear(
         ),
     };
     Unclear::new(why, point_at(candidates))
-}
-
-/// The tracks through the places that were pointed at.
-fn pointed(film: &WorkFilm, search: &Search, places: &[Pointed]) -> Result<Found> {
-    let first = film.stamps().first().map_or(0, |s| s.index);
-    let clicks = places
-        .iter()
-        .map(|p| {
-            let frame = p.frame.unwrap_or(first);
-            let picture = film.picture_of(frame).ok_or_else(|| {
-                let last = film.stamps().last().map_or(0, |s| s.index);
-                Error::Argument(
-                    Fault::of(Setting::Marker, format!("frame {frame} is not among those that are decoded"))
-                        .advice(format!("Give a frame of {first} to {last}")),
-                )
-            })?;
-            Ok(Click { picture, x: film.work_px(p.x_px), y: film.work_px(p.y_px) })
-        })
-        .collect::<Result<Vec<Click>>>()?;
-    let shown = |k: usize| {
-        let p = &places[k];
-        format!("({:.0}, {:.0}) px in frame {}", p.x_px, p.y_px, p.frame.unwrap_or(first))
-    };
-    let mut markers: Vec<Marker> = Vec::with_capacity(clicks.len());
-    let Survey { markers: known, answers, confidence, .. } = survey(search)?;
-    for (k, followed) in follow_clicks(search, &clicks, &known)?.into_iter().enumerate() {
-        match followed {
-            Ok(marker) => {
-                if let Some(other) = markers.iter().position(|m| m.is_same(&marker, marker.radius_px)) {
-                    return Err(Error::Argument(
-                        Fault::of(
-                            Setting::Marker,
-                            format!("{} and {} are one marker", shown(other), shown(k)),
-                        )
-                        .advice("Point at each marker once"),
-                    ));
-                }
-                markers.push(marker);
-            }
-            Err(missed) => {
-                let candidates = candidates(film, search, &known, answers, confidence, &[])?;
-                let why = format!("at {} {}", shown(k), unheld_words(missed, film.shrink() as f64));
-                return Ok(Found::unclear(Unclear::new(why, point_at(&candidates)), candidates));
-            }
-        }
-    }
-    finish(film, &mut markers)?;
-    Ok(Found { moving: Ok(Moving::of(film, markers, Chosen::Pointed)), candidates: None })
-}
-
-fn unheld_words(unheld: Unheld, scale: f64) -> String {
-    let picture = match unheld.picture {
-        Lost::Still => "what is there stands still all through the recording".into(),
-        Lost::Plain => "what is there has too little of a picture to be told from the noise".into(),
-        Lost::Soon(1) => "its picture is not found again with certainty in the frames beside it".into(),
-        Lost::Soon(count) => format!("its picture is found with certainty in {count} frames only"),
-    };
-    format!("{}; and {picture}", missed_words(unheld.spot, scale))
-}
-
-fn missed_words(missed: Missed, scale: f64) -> String {
-    match missed {
-        Missed::Nothing => "nothing stands out from what is around it".into(),
-        Missed::Ends(model, count, end) => {
-            let why = match end {
-                End::Ambiguous => "two places compete for it",
-                End::Look => "it changes its look",
-                End::Lost | End::Recording => "nothing is where it is expected",
-            };
-            let look = look(&model, model.radius_px(), scale);
-            format!("something stands out ({look}) and is followed through {count} frames only: then {why}")
-        }
-        Missed::Beside(model) => {
-            let look = look(&model, model.radius_px(), scale);
-            format!("the middle of what stands out ({look}) is not there but beside it")
-        }
-        Missed::Restless(model, count) => {
-            let look = look(&model, model.radius_px(), scale);
-            format!(
-                "something stands out ({look}), and in the {count} frames in which it is seen it jumps about"
-            )
-        }
-    }
 }
 
 #[cfg(test)]

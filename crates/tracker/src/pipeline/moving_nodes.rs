@@ -27,12 +27,6 @@ use crate::wanted::Wanted;
 
 /// A marker this near to the place that a given rig has for a node is that node, in radii.
 const NAMED_RADII: f64 = 1.0;
-/// From this part of the radius on it is said that a centre is not well known.
-const TELL_SIGMA_RADII: f64 = 0.1;
-
-/// Below this confidence what is followed is named, and whether it is what is meant is doubtful.
-const SURE_CONFIDENCE: f64 = 0.3;
-
 /// The way in which what is followed was chosen.
 pub(super) enum Chosen {
     /// The likeliest answer, with its confidence and the number of other things that move.
@@ -48,7 +42,7 @@ pub(super) struct Moving {
     /// A name for each column.
     pub(super) names: Vec<String>,
     pub(super) markers: Vec<Marker>,
-    chosen: Chosen,
+    pub(super) chosen: Chosen,
     pub(super) scale: f64,
     copies: usize,
     decoded: usize,
@@ -61,6 +55,8 @@ pub(super) struct Moving {
     pub(super) bodies: Option<PathRig>,
     /// Rows of shorter tracks, which may be pieces of the columns.
     pub(super) pieces: Vec<Vec<Observation>>,
+    /// Places that were pointed at and are not followed, and a sentence on each.
+    refused: Vec<(String, Message)>,
 }
 
 impl Moving {
@@ -80,7 +76,14 @@ impl Moving {
             rows,
             bodies: None,
             pieces: Vec::new(),
+            refused: Vec::new(),
         }
+    }
+
+    /// With names of its columns, and what was pointed at and is not followed.
+    pub fn pointed_at(mut self, names: Vec<String>, refused: Vec<(String, Message)>) -> Self {
+        (self.names, self.refused) = (names, refused);
+        self
     }
 
     /// With tracks that may be pieces of its columns.
@@ -98,6 +101,11 @@ impl Moving {
         self.markers = order.iter().map(|&k| self.markers[k].clone()).collect();
         self.names = rig.nodes.iter().map(|n| n.name.clone()).collect();
         true
+    }
+
+    /// Names the columns by the nodes of a rig at whose places they were looked for.
+    pub fn name_in_order(&mut self, rig: &Rig) {
+        self.names = rig.nodes.iter().map(|n| n.name.clone()).collect();
     }
 
     /// Writes the table. The columns are those of a rig that is given, in its order.
@@ -170,44 +178,13 @@ impl Moving {
             resumable: false,
             moving: true,
             doubtful,
+            open: Vec::new(),
+            not_followed: self.refused.into_iter().map(|(place, _)| place).collect(),
             nodes: tally.summary(),
             warnings,
             table: collected.map(|rows| NodeTable { meta: meta.clone(), rows }),
             meta,
         })
-    }
-
-    /// Names of the nodes of which it is doubtful where their centres are or whether they are what is meant; it is told why.
-    fn doubts(&self, rig: &Rig, warnings: &mut Vec<Message>) -> Vec<String> {
-        let mut doubtful = Vec::new();
-        for (node, usual) in self.doubtful() {
-            let name = rig.nodes[node].name.clone();
-            warnings.push(
-                format!(
-                    "the centre of {name} depends on what is taken for the marker: brightness, colour and outline have centres \
-                     that differ; its standard uncertainty is {usual:.1} px in half of the frames"
-                )
-                .into(),
-            );
-            doubtful.push(name);
-        }
-        for (node, said) in self.lost(rig.image_px) {
-            let name = rig.nodes[node].name.clone();
-            warnings.push(format!("{name} {said}: nothing there is certainly it").into());
-            doubtful.push(name);
-        }
-        if let Chosen::Likeliest { confidence, .. } = self.chosen
-            && confidence < SURE_CONFIDENCE
-        {
-            warnings.push(
-                Message::from(format!(
-                    "whether this is what is meant is doubtful: it explains {:.0} % of what looks like it. If it is, say so with ",
-                    100.0 * confidence
-                )) + Setting::Also.set_to("1"),
-            );
-            doubtful = rig.nodes.iter().map(|n| n.name.clone()).collect();
-        }
-        doubtful
     }
 
     fn settings_json(&self, settings: &RunSettings, wanted: &Wanted, facts: &SourceFacts) -> Value {
@@ -306,47 +283,6 @@ impl Moving {
         }
     }
 
-    /// Columns whose usual standard uncertainty is a large part of the radius, with that uncertainty, px.
-    fn doubtful(&self) -> Vec<(usize, f32)> {
-        let limit = |node: usize| TELL_SIGMA_RADII * self.markers[node].radius_px * self.scale;
-        let usual = |node: usize| {
-            let seen = self.rows.iter().map(|r| &r[node]).filter(|o| o.status.is_seen());
-            let mut sigma: Vec<f32> = seen.map(|o| o.sigma_px).collect();
-            sigma.sort_unstable_by(f32::total_cmp);
-            sigma.get(sigma.len() / 2).copied()
-        };
-        let columns = 0..self.rows.first().map_or(0, Vec::len);
-        columns.filter_map(|k| Some((k, usual(k).filter(|s| f64::from(*s) > limit(k))?))).collect()
-    }
-
-    /// Columns of what is followed by its picture and is lost for good within a picture of that size, with a clause of where.
-    fn lost(&self, image_px: [u32; 2]) -> Vec<(usize, String)> {
-        let mut all = Vec::new();
-        for (node, marker) in self.markers.iter().enumerate().filter(|(_, m)| m.model.is_none()) {
-            let seen: Vec<usize> =
-                (0..self.rows.len()).filter(|&k| self.rows[k][node].status.is_seen()).collect();
-            let (Some(&first), Some(&last)) = (seen.first(), seen.last()) else { continue };
-            let margin = 2.0 * marker.radius_px * self.scale;
-            let within = |k: usize| {
-                let o = &self.rows[k][node];
-                let inside = |v: f64, n: f64| v > margin && v < n - margin;
-                inside(o.x_px, f64::from(image_px[0])) && inside(o.y_px, f64::from(image_px[1]))
-            };
-            let index = |k: usize| self.stamps[k].index;
-            let mut said = Vec::new();
-            if first > 0 && within(first) {
-                said.push(format!("is not seen before frame {}", index(first)));
-            }
-            if last + 1 < self.rows.len() && within(last) {
-                said.push(format!("is lost after frame {}", index(last)));
-            }
-            if !said.is_empty() {
-                all.push((node, said.join(" and ")));
-            }
-        }
-        all
-    }
-
     /// The notes on how the nodes were found.
     fn notes(&self) -> Vec<Message> {
         let count = self.markers.len();
@@ -367,7 +303,7 @@ impl Moving {
             }
             Chosen::Pointed | Chosen::Numbered => {
                 let by = if matches!(self.chosen, Chosen::Pointed) { "place" } else { "number" };
-                let each = self.names.iter().zip(&self.markers);
+                let each = self.names.iter().zip(&self.markers).filter(|(_, m)| m.track.count > 0);
                 let each: Vec<String> = each.map(|(n, m)| format!("{n} ({})", looks(m))).collect();
                 format!("followed what moves and was named by its {by}: {}", each.join(", "))
             }
@@ -375,6 +311,7 @@ impl Moving {
         let mut notes: Vec<Message> = vec![
             format!("{what}. {}. Look at the overlay before you use the table", self.bodies_words()).into(),
         ];
+        notes.extend(self.refused.iter().map(|(_, words)| words.clone()));
         notes.extend(self.bodies.iter().flat_map(|b| b.warnings.clone()));
         if self.copies > 0 {
             notes.push(copies_words(self.copies, self.decoded));
@@ -435,6 +372,7 @@ mod tests {
             damage: Damage::default(),
             bodies: None,
             pieces: Vec::new(),
+            refused: Vec::new(),
         }
     }
 

@@ -129,6 +129,8 @@ pub(super) fn already_done(settings: &RunSettings, request: &Request) -> Result<
         resumed: table.frames() as u64,
         resumable: false,
         doubtful: Vec::new(),
+        not_followed: Vec::new(),
+        open: Vec::new(),
         moving: table.meta.settings.get(MOVING).is_some(),
         nodes: table.summary(),
         warnings: vec![format!("{} was complete already", text(output)).into()],

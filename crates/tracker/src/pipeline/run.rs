@@ -2,7 +2,7 @@
 //!
 //! Owns: [`run`]. Must not: print, read a clock, or do any of the steps' work.
 
-use super::moving::{self, Outcome, Unclear};
+use super::moving::{self, Outcome};
 use super::observer::{Observer, Stage};
 use super::opening::open;
 use super::reading::Run;
@@ -10,6 +10,7 @@ use super::request::{Request, already_done, check};
 use super::settings::RunSettings;
 use super::state;
 use super::summary::RunSummary;
+use super::unclear::Unclear;
 use crate::error::{Error, Fault, FaultKind, Result};
 use crate::frame::FrameSource;
 use crate::message::Message;

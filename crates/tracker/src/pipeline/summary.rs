@@ -24,6 +24,10 @@ pub struct RunSummary {
     pub moving: bool,
     /// Names of nodes of which it is doubtful whether they are what is meant, or where their centres are; notes say which.
     pub doubtful: Vec<String>,
+    /// Places that were pointed at and from which nothing is followed; notes say why.
+    pub not_followed: Vec<String>,
+    /// Names of nodes whose names stay open in many frames; notes say the likeliest cause.
+    pub open: Vec<String>,
     /// Each node's counts of rows by status.
     pub nodes: Vec<NodeSummary>,
     /// Warnings to the user, a sentence each.

@@ -6,6 +6,7 @@
 //! is very unlikely to be chance and no other pose explains as much; else the body stays open. Never guessed.
 
 use super::bodies::Bodies;
+use super::chain::find_chains;
 use super::motion_priors::MotionPriors;
 use super::occluded::find_occluded;
 use super::seen::{BodySeen, accepted};
@@ -86,6 +87,7 @@ impl FrameTracker {
                 }
             }
         }
+        find_chains(&self.bodies, index, &mut free, &mut seen);
         // Step 2: hypotheses that nothing decided are followed until their motion decides.
         for k in 0..n {
             let b = self.bodies.mechanism.order[k];

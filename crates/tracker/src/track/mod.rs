@@ -4,6 +4,7 @@
 
 mod bodies;
 mod body_search;
+mod chain;
 mod false_matches;
 mod frame_tracker;
 mod motion_priors;

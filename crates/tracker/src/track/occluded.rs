@@ -95,7 +95,7 @@ fn occluded(
 }
 
 /// The place of a node by its body's pose, if the pose is known firmly.
-fn firm_place(link: &Link, seen: &BodySeen, j: usize) -> Option<Vector2<f64>> {
+pub(super) fn firm_place(link: &Link, seen: &BodySeen, j: usize) -> Option<Vector2<f64>> {
     let local = link.template[j];
     seen.fit.as_ref().filter(|f| f.sigma_at(local) <= FIRM_PX).map(|f| place(&f.pose, local))
 }

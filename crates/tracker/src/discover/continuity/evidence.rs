@@ -40,6 +40,8 @@ pub struct Evidence<'a> {
     places: Vec<Vec<Option<Vector2<f64>>>>,
     /// Standard uncertainty of each coordinate of a centre, px.
     pub sigma_px: f64,
+    /// Whether each tracklet is known to be a marker: then an arc tells of a body, however short the recording.
+    pub are_markers: bool,
 }
 
 impl<'a> Evidence<'a> {
@@ -68,7 +70,7 @@ impl<'a> Evidence<'a> {
             })
             .collect();
         let sigma_px = noise(&moving);
-        Ok(Self { tracklets: moving, frames, spans, places, sigma_px })
+        Ok(Self { tracklets: moving, frames, spans, places, sigma_px, are_markers: false })
     }
 
     /// The evidence in the plane of a camera.
@@ -80,6 +82,7 @@ impl<'a> Evidence<'a> {
             spans: self.spans.clone(),
             places: self.places.iter().map(|t| t.iter().map(seen).collect()).collect(),
             sigma_px: self.sigma_px,
+            are_markers: self.are_markers,
         }
     }
 

@@ -2,12 +2,16 @@
 //!
 //! Owns: [`PairFacts`]. Must not: form bodies.
 
+use std::f64::consts::PI;
+
 use nalgebra::Vector2;
 
 use super::evidence::Evidence;
 
 /// Frames that two tracklets must share to be compared.
 const LEAST_FRAMES: usize = 30;
+/// Distances are not known better than this, px.
+const LEAST_SCATTER_PX: f64 = 0.02;
 /// Part of these in which the distance is the same. Not all: a marker may be half hidden for a while.
 const SAME_PART: f64 = 0.6;
 /// All but 3 % of the distances are within this of it, px: what half hides a disc of 6 px moves its centre by 1 px.
@@ -15,6 +19,9 @@ const FAR_PX: f64 = 1.6;
 /// Frames, or turn in rad, from which on keeping the distance says something.
 const MANY_FRAMES: usize = 100;
 const TURNED_RAD: f64 = 0.3;
+/// Or, between markers, how far a straight way would be from the arc that keeps the distance, in units of what the distances scatter about it: of less
+/// motion, seen in few frames, a rigid pair is not told from one that moves straight on.
+const ARC_SCATTERS: f64 = 10.0;
 
 /// The relation of two tracklets: how their distance and direction change.
 #[derive(Debug, Clone, Copy)]
@@ -33,6 +40,8 @@ pub(super) struct PairFacts {
     pub varies: f64,
     /// How far the line between them turned, rad.
     pub turned_rad: f64,
+    /// Whether both are known to be markers.
+    are_markers: bool,
 }
 
 impl PairFacts {
@@ -82,13 +91,21 @@ impl PairFacts {
             far_px: errors[frames * 97 / 100],
             varies: about[frames * 85 / 100] / median.max(1e-6),
             turned_rad: high - low,
+            are_markers: evidence.are_markers,
         })
+    }
+
+    /// Height of the arc on which one goes about the other over its chord, px.
+    fn sagitta_px(&self) -> f64 {
+        self.distance_px * (1.0 - (self.turned_rad.min(PI) / 2.0).cos())
     }
 
     /// Whether they are on one body, as far as their distance tells.
     pub(super) fn rigid(&self) -> bool {
         self.part > SAME_PART
             && self.far_px < FAR_PX
-            && (self.frames >= MANY_FRAMES || self.turned_rad > TURNED_RAD)
+            && (self.frames >= MANY_FRAMES
+                || self.turned_rad > TURNED_RAD
+                || self.are_markers && self.sagitta_px() > ARC_SCATTERS * self.rms_px.max(LEAST_SCATTER_PX))
     }
 }
