@@ -201,6 +201,19 @@ def test_what_is_pointed_at_is_followed_in_that_order_and_kept_in_the_rig(tmp_pa
     assert on(dp.track(film, rig=tmp_path / "bare.toml").xy_px[:, 0], small) > 0.95
 
 
+def test_a_place_that_holds_nothing_does_not_refuse_the_others(tmp_path: Path) -> None:
+    two(tmp_path / "two.mp4")
+    run: list[str | Path] = [TRACKER, "track", tmp_path / "two.mp4", "-o", tmp_path / "t.parquet"]
+    run += ["--marker", "3,3@40", "--marker", place(small, 40)]
+    done = subprocess.run(run, check=False, capture_output=True, text=True)
+    assert done.returncode == 1
+    assert "at (3, 3) px in frame 40" in done.stderr
+    nodes = dp.read_nodes(tmp_path / "t.parquet")
+    # The name is the number of the place, from 0 on.
+    assert [node.name for node in nodes.rig.nodes] == ["n1"]
+    assert on(nodes.xy_px[:, 0], small) > 0.95
+
+
 def test_the_command_line_takes_the_same(tmp_path: Path) -> None:
     two(tmp_path / "two.mp4")
     run: list[str | Path] = [TRACKER, "track", tmp_path / "two.mp4", "-o", tmp_path / "t.parquet", "--force"]

@@ -134,3 +134,34 @@ def film_waving(path: Path, frames: int = 110) -> None:
         return over(out, disc(x, 120 + 3 * float(np.sin(k / 4)), 32), SKIN)
 
     encode(path, frames, 30, scene)
+
+
+def roll(frame: float) -> tuple[float, float]:
+    """A ball that rolls in from the left and out to the right."""
+    return -30 + 11.3 * frame, 300 + 0.4 * frame
+
+
+def film_rolling(path: Path, frames: int = 62) -> None:
+    """A blue ball that comes into the picture and leaves it."""
+    behind = wall(17, (150, 130, 110))
+    encode(path, frames, 60, lambda k: ball(behind, *roll(k), 20, (40, 70, 190)))
+
+
+def arms(frame: float) -> tuple[tuple[float, float], tuple[float, float]]:
+    """The ends of two arms that hang on each other."""
+    a, b = 0.9 * float(np.cos(frame / 9)), 1.3 * float(np.sin(frame / 5.7 + 0.4))
+    x, y = 320 + 130 * float(np.sin(a)), 160 + 130 * float(np.cos(a))
+    return (x, y), (x + 110 * float(np.sin(b)), y + 110 * float(np.cos(b)))
+
+
+def film_two_colours(path: Path, frames: int = 110) -> None:
+    """Two dark arms with a red sticker on the elbow and a blue one, of the same size, on the tip."""
+    behind = wall(18, (185, 180, 170))
+
+    def scene(k: float) -> Picture:
+        elbow, tip = arms(k)
+        out = over(behind, capsule((320, 160), elbow, 15), (55, 50, 45))
+        out = over(out, capsule(elbow, tip, 14), (60, 55, 50))
+        return over(over(out, disc(*elbow, 10), (210, 40, 50)), disc(*tip, 10), (40, 80, 215))
+
+    encode(path, frames, 30, scene)

@@ -51,6 +51,12 @@ const PLACES_AROUND: usize = 10;
 const OTHER_CIRCLE_RADII: f64 = 0.15;
 /// Uncertainty of a centre by the filter's response alone, radii.
 const COARSE_DOUBT_RADII: f64 = 0.3;
+/// Uncertainty of a place that is none, radii: it is left out.
+const NO_PLACE_RADII: f64 = 1.0;
+/// Where this part of a track's places have a region, those at an end of a piece that have none are left out, so many at most: the
+/// marker is half covered there, or it is something beside it that is seen.
+const USUALLY_FOUND: f64 = 0.75;
+const MOST_TRIMMED: usize = 3;
 
 /// The refined centres of a track.
 #[derive(Debug, Clone, Copy, Default)]
@@ -189,8 +195,12 @@ pub fn refine(
         .collect();
     let middle = [0, 1].map(|k| median(&mut shifts.iter().flatten().map(|(s, _)| s[k]).collect::<Vec<_>>()));
     let off = |s: &[f64; 2]| (s[0] - middle[0]).hypot(s[1] - middle[1]);
+    let is_cut = |found: &Option<Found>| found.as_ref().is_some_and(|f| f.region.is_cut);
+    // What always reaches the border is no marker that leaves the picture.
+    let leaves = 2 * results.iter().filter(|f| is_cut(f)).count() < results.len();
+    let mut coarse: Vec<Place> = Vec::new();
     let mut good = 0;
-    for (&(p, i), shift) in places.iter().zip(&shifts) {
+    for ((&(p, i), shift), found) in places.iter().zip(&shifts).zip(&results) {
         let usual = shift.filter(|(s, _)| off(s) < OTHER_REGION_RADII * radius);
         let s = &mut track.pieces[p].spots[i];
         let [dx, dy] = usual.map_or(middle, |(shift, _)| shift);
@@ -203,10 +213,29 @@ pub fn refine(
             Some((_, doubt)) => doubt,
             None => COARSE_DOUBT_RADII * radius,
         };
+        let doubt = if leaves && is_cut(found) { NO_PLACE_RADII * radius } else { doubt };
+        if usual.is_none() {
+            coarse.push((p, i));
+        }
         s.doubt_px = doubt * scale;
         good += usize::from(usual.is_some());
     }
-    Ok(Centres { radius_px: radius * scale, found: good as f64 / places.len().max(1) as f64 })
+    let found = good as f64 / places.len().max(1) as f64;
+    if found >= USUALLY_FOUND {
+        trim(track, &coarse, NO_PLACE_RADII * radius * scale);
+    }
+    Ok(Centres { radius_px: radius * scale, found })
+}
+
+/// Gives the coarse places at the ends of a track's pieces an uncertainty of so many px.
+fn trim(track: &mut Track, coarse: &[Place], doubt_px: f64) {
+    for (p, piece) in track.pieces.iter_mut().enumerate() {
+        let is_coarse = |i: &usize| coarse.contains(&(p, *i));
+        let n = piece.spots.len();
+        let first: Vec<usize> = (0..n).take(MOST_TRIMMED).take_while(is_coarse).collect();
+        let last: Vec<usize> = (0..n).rev().take(MOST_TRIMMED).take_while(is_coarse).collect();
+        first.into_iter().chain(last).for_each(|i| piece.spots[i].doubt_px = doubt_px);
+    }
 }
 
 /// From each region to the middle of its outline's circle, px of the octave; 0 where they agree or most have none. Where they do not

@@ -4,6 +4,7 @@
 
 use rayon::prelude::*;
 
+use super::beside::{goes_beside, is_companion, join_by_look, overlap};
 use super::ground::spread;
 use super::marker::{Marker, compact};
 use super::model::Model;
@@ -25,6 +26,10 @@ const FIRST_LIMIT: f32 = 6.0;
 /// Models that are run over the whole recording, and the least part of the best one's score.
 const FINALISTS: usize = 4;
 const FINALIST_PART: f64 = 0.1;
+/// Further models that are run over the whole recording because one of their looks explains much, whatever else they see, and the
+/// looks that are tried.
+const LOOK_FINALISTS: usize = 2;
+const SEEDS: usize = 4;
 /// A look: factors 2.5 in peak and 2.1 in area, as logarithms.
 const LOOK: [f64; 2] = [0.9, 0.75];
 /// Quality from which on a track may be an answer.
@@ -35,16 +40,13 @@ const ANSWER_PART: f64 = 0.12;
 /// colour direction or octave.
 const OTHER_LOOK_PART: f64 = 0.3;
 const OTHER_MODEL_PART: f64 = 0.5;
-/// A companion is seen in at most this part of the pictures in which the other one is, and it in at least this part of its own
-/// pictures; its offset changes by at most this part of its travel.
-const COMPANION_PART: f64 = 0.5;
-const COMPANION_SEEN: f64 = 0.8;
-const COMPANION_OFFSET: f64 = 0.25;
-/// Looks of one marker in two stretches: its contrast changes by a third with what is behind it, its area by a tenth (standard
-/// deviations of the logarithms). They agree below two of them, and others' looks must be two farther away.
-const LOOK_SCATTER: [f64; 2] = [0.3, 0.1];
-const SAME_LOOK: f64 = 2.0;
-const CLEAR_LOOK: f64 = 2.0;
+/// Markers of several colours are made alike: their radii agree to this factor, as a logarithm; each is whole in this part of its
+/// places, and explains this part of what looks like it.
+const MADE_ALIKE: f64 = 0.22;
+const MADE_WHOLE: f64 = 0.7;
+const MADE_PURE: f64 = 0.2;
+/// Part of the longest answer's pictures in which a marker of another colour must be seen.
+const MADE_PART: f64 = 0.8;
 /// Part of what looks like the only thing that moves which it must explain.
 const SOLE_PART: f64 = 0.2;
 /// Pieces that are kept at most, the longest.
@@ -52,6 +54,8 @@ const MOST_PIECES: usize = 40;
 /// Pictures of which the one that shows most is taken, and places in it.
 const STRONGEST_PICTURES: usize = 15;
 const STRONGEST: usize = 9;
+/// Spots of a picture and model where what stands still is among them.
+const MOST_WITH_STILL: usize = 80;
 /// Two tracks this near to each other, in radii, are one marker.
 const SAME_RADII: f64 = 1.2;
 
@@ -69,17 +73,29 @@ pub struct Survey {
     /// Whether there is nothing but one thing that moves, whole, smoothly and far, though it is seldom of the size that it was
     /// looked for: beside it there are only scraps.
     pub is_sole: bool,
+    /// Whether much else moves along the way of looking that finds the answers: one of its looks explains much, and not all of them.
+    pub is_one_look_of_many: bool,
 }
 
 struct Candidate {
     model: Model,
+    /// What all that moves along it explains of all its spots, and what the best look explains of that look's.
     score: f64,
+    look: f64,
     /// Limit for the whole recording.
     limit: f32,
 }
 
+/// Spots of a picture and model, at most.
+fn most(against: Against) -> usize {
+    match against {
+        Against::Ground => MOST_SPOTS,
+        Against::Around => MOST_WITH_STILL,
+    }
+}
+
 /// Tries every model on bursts; the best first.
-fn candidates(search: &Search) -> Result<Vec<Candidate>> {
+fn candidates(search: &Search, against: Against) -> Result<Vec<Candidate>> {
     let film = search.film;
     let n = film.count();
     let length = BURST_PICTURES.min(n);
@@ -97,7 +113,7 @@ fn candidates(search: &Search) -> Result<Vec<Candidate>> {
                     let picture = film.read(i)?;
                     let all = responses(&picture, search.count);
                     let spots = |m: &Model| {
-                        search.spots(&picture, &all[m.octave], m, Against::Ground, (FIRST_LIMIT, MOST_SPOTS))
+                        search.spots(&picture, &all[m.octave], m, against, (FIRST_LIMIT, most(against)))
                     };
                     Ok(models.iter().map(spots).collect())
                 })
@@ -108,48 +124,65 @@ fn candidates(search: &Search) -> Result<Vec<Candidate>> {
         .par_iter()
         .enumerate()
         .filter_map(|(k, model)| {
-            let radius = model.radius_px();
-            let (mut moved, mut all, mut standing) = (0.0, 0, 0);
-            let (mut snr, mut snr_good) = (Vec::new(), Vec::new());
-            for (burst, &first) in found.iter().zip(&starts) {
-                let pictures: Vec<Vec<Spot>> = burst.iter().map(|p| p[k].clone()).collect();
-                all += pictures.iter().map(Vec::len).sum::<usize>();
-                for t in link(&pictures, radius, search.width, first).iter().filter(|t| t.spots.len() >= 6) {
-                    if extent(t.spots.iter()) < (0.3 * radius).max(2.0) {
-                        standing += t.spots.len();
-                        continue;
-                    }
-                    let q = quality(t, radius);
-                    moved += q * t.spots.len() as f64;
-                    let strength = median(&mut t.spots.iter().map(|s| s.snr).collect::<Vec<_>>());
-                    snr.push(strength);
-                    if q > 0.3 {
-                        snr_good.push(strength);
-                    }
-                }
-            }
-            if moved < 5.0 {
-                return None;
-            }
-            let per_picture = moved / (starts.len() * length) as f64;
-            let purity = moved / (all - standing).max(1) as f64;
-            let strength = median(&mut snr);
-            snr_good.sort_unstable_by(f64::total_cmp);
-            let quartile = snr_good.get(snr_good.len() / 4).copied().unwrap_or(20.0);
-            let limit = (0.35 * quartile).max(5.0) as f32;
-            Some(Candidate {
-                model: *model,
-                score: per_picture * purity * strength / (strength + 15.0),
-                limit,
-            })
+            let burst = |(pictures, &first): (&Vec<Vec<Vec<Spot>>>, &usize)| {
+                (first, pictures.iter().map(|p| p[k].clone()).collect())
+            };
+            tried(*model, &found.iter().zip(&starts).map(burst).collect::<Vec<_>>(), search.width)
         })
         .collect();
     out.sort_by(|a, b| b.score.total_cmp(&a.score));
     Ok(out)
 }
 
+/// What a model explains of bursts, each with the index of its first picture and the spots of each; `None` if hardly any.
+fn tried(model: Model, bursts: &[(usize, Vec<Vec<Spot>>)], width: f64) -> Option<Candidate> {
+    let radius = model.radius_px();
+    let (mut moved, mut all, mut standing) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut snr, mut snr_good) = (Vec::new(), Vec::new());
+    for (first, pictures) in bursts {
+        all.extend(pictures.iter().flatten().map(Spot::look));
+        for t in link(pictures, radius, width, *first).iter().filter(|t| t.spots.len() >= 6) {
+            if extent(t.spots.iter()) < (0.3 * radius).max(2.0) {
+                standing.push((t.spots.len() as f64, t.look()));
+                continue;
+            }
+            let q = quality(t, radius);
+            moved.push((q * t.spots.len() as f64, t.look()));
+            let strength = median(&mut t.spots.iter().map(|s| s.snr).collect::<Vec<_>>());
+            snr.push(strength);
+            if q > 0.3 {
+                snr_good.push(strength);
+            }
+        }
+    }
+    let sum = |tracks: &[(f64, [f64; 2])]| tracks.iter().map(|t| t.0).sum::<f64>();
+    let total = sum(&moved);
+    if total < 5.0 {
+        return None;
+    }
+    let count = bursts.iter().map(|b| b.1.len()).sum::<usize>() as f64;
+    let score =
+        |moved: f64, all: usize, standing: f64| moved / count * moved / (all as f64 - standing).max(1.0);
+    moved.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let of_look = |seed: &(f64, [f64; 2])| {
+        let like = |look: &[f64; 2]| alike(&seed.1, look, LOOK);
+        let part = |t: &[(f64, [f64; 2])]| t.iter().filter(|t| like(&t.1)).map(|t| t.0).sum::<f64>();
+        score(part(&moved), all.iter().filter(|l| like(l)).count(), part(&standing))
+    };
+    let look = moved.iter().take(SEEDS).map(of_look).fold(0.0, f64::max);
+    let strength = median(&mut snr);
+    let strength = strength / (strength + 15.0);
+    snr_good.sort_unstable_by(f64::total_cmp);
+    let quartile = snr_good.get(snr_good.len() / 4).copied().unwrap_or(20.0);
+    let limit = (0.35 * quartile).max(5.0) as f32;
+    let score = score(total, all.len(), sum(&standing)) * strength;
+    Some(Candidate { model, score, look: look * strength, limit })
+}
+
 struct Run {
     model: Model,
+    /// Whether it is run for one of its looks: what else moves along it is not offered.
+    by_look: bool,
     pictures: Vec<Vec<Spot>>,
     /// Moving tracks of the winning look.
     group: Vec<Track>,
@@ -196,6 +229,7 @@ fn run(film: &dyn Film, model: Model, pictures: Vec<Vec<Spot>>, width: f64) -> R
     let Some((score, purity, chosen)) = best else {
         return Ok(Run {
             model,
+            by_look: false,
             pictures,
             group: Vec::new(),
             others: good,
@@ -212,7 +246,8 @@ fn run(film: &dyn Film, model: Model, pictures: Vec<Vec<Spot>>, width: f64) -> R
     let compact: Vec<f64> =
         group.par_iter().take(4).map(|t| Ok(compact(film, t, &model)?.1)).collect::<Result<_>>()?;
     let compact = compact.iter().sum::<f64>() / compact.len().max(1) as f64;
-    Ok(Run { model, pictures, group, others, purity, compact, score: score * (0.2 + 0.8 * compact) })
+    let score = score * (0.2 + 0.8 * compact);
+    Ok(Run { model, by_look: false, pictures, group, others, purity, compact, score })
 }
 
 /// The tracks of a recording, with those that are likeliest meant. Places are those of the filter alone; [`super::finish`]
@@ -220,12 +255,16 @@ fn run(film: &dyn Film, model: Model, pictures: Vec<Vec<Spot>>, width: f64) -> R
 ///
 /// # Errors
 /// Those of the film; [`crate::error::Error::Interrupted`] once the work is to stop.
-pub fn survey(search: &Search) -> Result<Survey> {
+pub fn survey(search: &Search, against: Against) -> Result<Survey> {
     let film = search.film;
-    let candidates = candidates(search)?;
+    let candidates = candidates(search, against)?;
     let Some(best) = candidates.first().map(|c| c.score) else { return Ok(Survey::default()) };
-    let finalists: Vec<&Candidate> =
+    let mut finalists: Vec<&Candidate> =
         candidates.iter().take(FINALISTS).filter(|c| c.score >= FINALIST_PART * best).collect();
+    let mut by_look: Vec<&Candidate> = candidates.iter().skip(finalists.len()).collect();
+    by_look.sort_by(|a, b| b.look.total_cmp(&a.look));
+    let usual = finalists.len();
+    finalists.extend(by_look.into_iter().take(LOOK_FINALISTS));
     let found: Vec<Vec<Vec<Spot>>> = (0..film.count())
         .into_par_iter()
         .map(|i| {
@@ -236,7 +275,7 @@ pub fn survey(search: &Search) -> Result<Survey> {
             let spots = |c: &&Candidate| {
                 let octave = c.model.octave;
                 let response = known[octave].get_or_insert_with(|| response(&picture, octave));
-                search.spots(&picture, response, &c.model, Against::Ground, (c.limit, MOST_SPOTS))
+                search.spots(&picture, response, &c.model, against, (c.limit, most(against)))
             };
             Ok(finalists.iter().map(spots).collect())
         })
@@ -244,11 +283,15 @@ pub fn survey(search: &Search) -> Result<Survey> {
     let mut runs: Vec<Run> = finalists
         .par_iter()
         .enumerate()
-        .map(|(k, c)| run(film, c.model, found.iter().map(|p| p[k].clone()).collect(), search.width))
+        .map(|(k, c)| {
+            let pictures = found.iter().map(|p| p[k].clone()).collect();
+            Ok(Run { by_look: k >= usual, ..run(film, c.model, pictures, search.width)? })
+        })
         .collect::<Result<_>>()?;
     runs.sort_by(|a, b| b.score.total_cmp(&a.score));
     let mut runs = runs.into_iter();
     let Some(winner) = runs.next() else { return Ok(Survey::default()) };
+    let is_one_look_of_many = winner.by_look;
     let (model, purity, confidence) = (winner.model, winner.purity, winner.purity * winner.compact);
     let Answers { keep, others, pieces, heaviest } = answers(winner, search.width);
     let marker = |t: Track, model: Model| Marker::of(film, t, model);
@@ -262,22 +305,59 @@ pub fn survey(search: &Search) -> Result<Survey> {
     for t in others {
         markers.push(marker(t, model)?);
     }
-    for r in runs {
-        for t in r.group.into_iter().chain(r.others).filter(|t| t.weight() >= OTHER_MODEL_PART * heaviest) {
-            let within = SAME_RADII * r.model.radius_px().max(model.radius_px());
-            let new = Marker { track: t, model: Some(r.model), radius_px: r.model.radius_px() };
-            if !markers.iter().any(|o| o.is_same(&new, within)) {
-                markers.push(marker(new.track, r.model)?);
-            }
-        }
-    }
+    let of = Known { model, radius_px, heaviest, answers };
+    let alike = of_other_models(film, runs, &mut markers, &of)?;
+    markers.splice(answers..answers, alike.clone());
+    let answers = answers + alike.len();
     markers[answers..].sort_by(|a, b| b.track.weight().total_cmp(&a.track.weight()));
     let is_sole = match markers.as_slice() {
         [only] if answers == 1 => only.goes_far() && purity * only.whole(film)? >= SOLE_PART,
         _ => false,
     };
     let pieces = pieces.into_iter().map(|track| Marker { track, model: Some(model), radius_px }).collect();
-    Ok(Survey { markers, answers, pieces, confidence, is_sole })
+    Ok(Survey { markers, answers, pieces, confidence, is_sole, is_one_look_of_many })
+}
+
+/// What is known of the answers when the other models' tracks are looked at.
+struct Known {
+    model: Model,
+    radius_px: f64,
+    heaviest: f64,
+    answers: usize,
+}
+
+/// Adds what moves along other models, but not a second time, to the `markers`, of which the first are the answers. What comes back is made
+/// as the answers are and has another colour: it belongs to them.
+fn of_other_models(
+    film: &dyn Film,
+    runs: impl Iterator<Item = Run>,
+    markers: &mut Vec<Marker>,
+    known: &Known,
+) -> Result<Vec<Marker>> {
+    let longest = markers[..known.answers].iter().map(|m| m.track.count).max().unwrap_or(0);
+    let mut alike: Vec<Marker> = Vec::new();
+    for r in runs {
+        let (count, is_pure) = (r.group.len(), r.purity * r.compact >= MADE_PURE);
+        let tracks = r.group.into_iter().chain(r.others).enumerate();
+        for (k, t) in tracks.filter(|(_, t)| t.weight() >= OTHER_MODEL_PART * known.heaviest) {
+            let within = SAME_RADII * r.model.radius_px().max(known.model.radius_px());
+            let new = Marker { track: t, model: Some(r.model), radius_px: r.model.radius_px() };
+            if markers.iter().chain(&alike).any(|o| o.is_same(&new, within)) {
+                continue;
+            }
+            let new = Marker::of(film, new.track, r.model)?;
+            let is_as_long = new.track.count as f64 >= MADE_PART * longest as f64;
+            let has_their_size = (new.radius_px / known.radius_px).ln().abs() < MADE_ALIKE;
+            let goes_alone = !markers[..known.answers].iter().any(|a| goes_beside(&new.track, &a.track));
+            let belongs = is_pure && k < count && is_as_long && has_their_size && goes_alone;
+            if belongs && new.whole(film)? >= MADE_WHOLE {
+                alike.push(new);
+            } else if !r.by_look {
+                markers.push(new);
+            }
+        }
+    }
+    Ok(alike)
 }
 
 /// Of a run the tracks that answer, others that move, shorter ones of the answers' look, and the weight of the heaviest of all.
@@ -327,75 +407,6 @@ fn answers(winner: Run, width: f64) -> Answers {
     Answers { keep, others, pieces, heaviest }
 }
 
-/// Whether two tracks are in one place in some picture.
-fn overlap(a: &Track, b: &Track, radius_px: f64) -> bool {
-    let places: std::collections::HashMap<usize, &Spot> = a.spots().collect();
-    b.spots().any(|(k, s)| places.get(&k).is_some_and(|o| (o.x - s.x).hypot(o.y - s.y) < radius_px))
-}
-
-/// Whether a track goes beside a longer one and nowhere else, as a shadow or a reflection does: it is offered and not named.
-fn is_companion(t: &Track, of: &Track) -> bool {
-    if (t.count as f64) > COMPANION_PART * of.count as f64 {
-        return false;
-    }
-    let places: std::collections::HashMap<usize, &Spot> = of.spots().collect();
-    let beside: Vec<(&Spot, Spot)> = t
-        .spots()
-        .filter_map(|(k, s)| places.get(&k).map(|o| (s, Spot { x: s.x - o.x, y: s.y - o.y, ..*s })))
-        .collect();
-    let offset = extent(beside.iter().map(|(_, d)| d));
-    let travel = extent(beside.iter().map(|(s, _)| *s));
-    beside.len() as f64 > COMPANION_SEEN * t.count as f64 && offset < COMPANION_OFFSET * travel
-}
-
-/// Joins tracks that are never seen together where the look of two agrees better than those of any other two of which one is seen
-/// while one of them is.
-fn join_by_look(tracks: &mut Vec<Track>, radius_px: f64) {
-    loop {
-        let apart = |a: &Track, b: &Track| {
-            let [peak, area] = [0, 1].map(|k| (a.look[k] - b.look[k]) / LOOK_SCATTER[k]);
-            peak.hypot(area)
-        };
-        let span = |t: &Track| (t.spots().next().map_or(0, |s| s.0), t.spots().last().map_or(0, |s| s.0));
-        let spans: Vec<(usize, usize)> = tracks.iter().map(span).collect();
-        // Two that are seen at one time are two markers, so that only one of them is the same as a third.
-        let meet = |a: usize, b: usize| spans[a].0 <= spans[b].1 && spans[b].0 <= spans[a].1;
-        let follows = |a: &Track, b: &Track| match (a.spots().last(), b.spots().next()) {
-            (Some((end, p)), Some((begin, q))) => {
-                let fastest = |t: &Track| t.pieces.iter().map(|p| p.longest_step_px()).fold(0.0, f64::max);
-                let reach = fastest(a).max(fastest(b)) * begin.saturating_sub(end) as f64 + 3.0 * radius_px;
-                begin > end && (p.x - q.x).hypot(p.y - q.y) <= reach
-            }
-            _ => false,
-        };
-        let n = tracks.len();
-        let pairs: Vec<(f64, usize, usize)> = (0..n)
-            .flat_map(|a| (0..n).map(move |b| (a, b)))
-            .filter(|&(a, b)| a != b && follows(&tracks[a], &tracks[b]))
-            .map(|(a, b)| (apart(&tracks[a], &tracks[b]), a, b))
-            .collect();
-        let gap = |a: usize, b: usize| spans[b].0 - spans[a].1;
-        // One that is seen in between and may be the same decides first.
-        let between = |a: usize, b: usize| {
-            let ends = pairs.iter().filter(|p| p.1 == a && p.0 < SAME_LOOK).map(|p| p.2);
-            ends.into_iter().any(|c| spans[c].1 < spans[b].0)
-        };
-        let clear = |&&(d, a, b): &&(f64, usize, usize)| {
-            let rivals = pairs
-                .iter()
-                .filter(|p| (p.1 == a && p.2 != b && meet(p.2, b)) || (p.2 == b && p.1 != a && meet(p.1, a)));
-            d < SAME_LOOK
-                && !between(a, b)
-                && rivals.map(|p| p.0).fold(f64::INFINITY, f64::min) > d + CLEAR_LOOK
-        };
-        let Some(&(_, a, b)) = pairs.iter().filter(clear).min_by_key(|p| gap(p.1, p.2)) else { return };
-        let mut pieces = tracks[a].pieces.clone();
-        pieces.extend(tracks[b].pieces.iter().cloned());
-        tracks[a] = Track::of(pieces, radius_px);
-        tracks.remove(b);
-    }
-}
-
 /// The strongest spots of the picture in which most stands out, strongest first: for recordings in which nothing moves smoothly.
 ///
 /// # Errors
@@ -442,40 +453,4 @@ fn heaviest_group(all: Vec<Track>) -> (Vec<Track>, Vec<Track>) {
         return (Vec::new(), Vec::new());
     };
     all.into_iter().partition(|t| alike(&t.look, &seed, LOOK))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::tracklet::Tracklet;
-    use super::*;
-
-    /// A stretch of a marker of a peak and an area that goes to and fro.
-    fn stretch(pictures: std::ops::Range<usize>, peak: f64, area: f64) -> Track {
-        let spot = |k: usize| {
-            let x = 100.0 + 40.0 * (0.2 * k as f64).sin();
-            let (y, elongation, direction) = (80.0, 1.0, 0.0);
-            let (length, snr, doubt_px) = (8.0, 30.0, 0.0);
-            (k, Spot { x, y, peak, area, elongation, direction, length, snr, doubt_px })
-        };
-        Track::of(Tracklet::runs(&pictures.map(spot).collect::<Vec<_>>()), 8.0)
-    }
-
-    fn joined(mut tracks: Vec<Track>) -> Vec<usize> {
-        join_by_look(&mut tracks, 8.0);
-        let mut counts: Vec<usize> = tracks.iter().map(|t| t.count).collect();
-        counts.sort_unstable();
-        counts
-    }
-
-    #[test]
-    fn stretches_are_joined_by_their_area_though_their_contrast_changes() {
-        // The first and the last are the smaller one of two that are seen meanwhile.
-        let small = |p: std::ops::Range<usize>, peak: f64| stretch(p, peak, 600.0);
-        let three = vec![small(0..50, 42.0), small(60..200, 51.0), small(230..300, 38.0)];
-        let other = stretch(70..190, 35.0, 900.0);
-        assert_eq!(joined([three.clone(), vec![other]].concat()), [120, 260]);
-        // Of two that are alike nothing tells which it is.
-        let twin = small(70..190, 47.0);
-        assert_eq!(joined([three, vec![twin]].concat()), [50, 70, 120, 140]);
-    }
 }

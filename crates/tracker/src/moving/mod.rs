@@ -5,10 +5,11 @@
 //!
 //! Every picture is looked at by one filter (`response`: centre minus surround) in octaves, colour directions and both signs;
 //! `ground` takes away what stands still, `spot` finds the maxima, `search` does both, `tracklet` links them, `track` joins over
-//! gaps, `choose` lets every way of looking compete by what it explains and `click` by how a track holds through a place that
+//! gaps, `choose` lets every way of looking compete by what it explains (`beside` compares tracks) and `click` by how a track holds through a place that
 //! was pointed at; `patch` follows what is no spot by its picture; `centre` refines the places, `rest` follows what comes to rest, and `marker` does both.
 
 mod backdrop;
+mod beside;
 mod centre;
 mod choose;
 mod click;
@@ -39,7 +40,7 @@ pub use model::Model;
 pub use patch::Lost;
 pub use picture::{Film, Picture};
 pub use response::Direction;
-pub use search::Search;
+pub use search::{Against, Search};
 pub use spot::Spot;
 pub use track::Track;
 pub use tracklet::{End, Tracklet};

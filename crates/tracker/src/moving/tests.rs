@@ -97,7 +97,7 @@ struct Followed {
 fn follow(film: &Drawn) -> Result<Option<Followed>> {
     let limits = Limits::default();
     let Some(search) = Search::learn(film, &limits)? else { return Ok(None) };
-    let mut found = survey(&search)?;
+    let mut found = survey(&search, Against::Ground)?;
     found.markers.truncate(found.answers);
     finish(film, &mut found.markers)?;
     Ok(found.markers.first().map(|m| Followed {
@@ -233,7 +233,8 @@ fn a_wish_to_stop_ends_the_work() {
 /// Markers followed from places that are pointed at.
 fn pointed(film: &Drawn, limits: &Limits, clicks: &[Click]) -> Vec<Result<Marker, Unheld>> {
     let search = Search::learn(film, limits).unwrap().unwrap();
-    let mut followed = follow_clicks(&search, clicks, &survey(&search).unwrap().markers).unwrap();
+    let mut followed =
+        follow_clicks(&search, clicks, &survey(&search, Against::Ground).unwrap().markers).unwrap();
     let mut markers: Vec<Marker> = followed.iter().flatten().cloned().collect();
     finish(film, &mut markers).unwrap();
     let mut finished = markers.into_iter();
@@ -298,7 +299,7 @@ fn region_sign_and_level_say_which_of_several_is_meant() {
     let (film, [small, dark]) = three(36);
     let only = |limits: Limits, truth: fn(usize) -> (f64, f64)| {
         let search = Search::learn(&film, &limits).unwrap().unwrap();
-        let found = survey(&search).unwrap();
+        let found = survey(&search, Against::Ground).unwrap();
         let first = &found.markers[0].track;
         let near = first.spots().filter(|(k, s)| (s.x - truth(*k).0).hypot(s.y - truth(*k).1) < 2.0).count();
         assert!(near > 100, "{limits:?}: {near} of {}", first.count);

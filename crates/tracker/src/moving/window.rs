@@ -36,6 +36,8 @@ pub struct Region {
     pub y: f64,
     /// Its area, px.
     pub area: f64,
+    /// Whether it reaches the border of the picture: what is beyond is not known.
+    pub is_cut: bool,
 }
 
 /// A window of a picture on one octave.
@@ -45,6 +47,8 @@ pub struct Window {
     values: Vec<f32>,
     width: usize,
     height: usize,
+    /// Whether the picture ends with its first and last column, and with its first and last row.
+    ends: [bool; 4],
     /// Place of its first pixel, px of the octave.
     pub x0: usize,
     /// Place of its first pixel, px of the octave.
@@ -64,9 +68,11 @@ impl Window {
         };
         let (x, y) = (range(at[0]), range(at[1]));
         let (x0, y0) = (x.start / scale, y.start / scale);
-        let planes = Planes::of_octave(&film.read_part(picture, x, y)?, octave);
+        let part = film.read_part(picture, x.clone(), y.clone())?;
+        let ends = [x.start == 0, part.width < x.len(), y.start == 0, part.height < y.len()];
+        let planes = Planes::of_octave(&part, octave);
         let (width, height) = (planes.width, planes.height);
-        Ok(Self { planes, values: Vec::new(), width, height, x0, y0 })
+        Ok(Self { planes, values: Vec::new(), width, height, ends, x0, y0 })
     }
 
     /// Looks along a direction, bright (1) or dark (-1). With a backdrop each pixel becomes what it would be before an even
@@ -150,7 +156,8 @@ impl Window {
             let v = ((f64::from(self.values[c]) - level) / (high - level)).clamp(0.0, 1.0);
             (s, sx, sy) = (s + v, sx + v * (c % self.width) as f64, sy + v * (c / self.width) as f64);
         }
-        (s > 0.0).then(|| Region { x: sx / s, y: sy / s, area: cells.len() as f64 })
+        let is_cut = self.is_cut(&cells);
+        (s > 0.0).then(|| Region { x: sx / s, y: sy / s, area: cells.len() as f64, is_cut })
     }
 
     /// Points of the outline of the region of the marker at a place, half way between a pixel inside and one outside.
@@ -209,7 +216,17 @@ impl Window {
         let n = cells.len() as f64;
         let x = cells.iter().map(|c| (c % self.width) as f64).sum::<f64>() / n;
         let y = cells.iter().map(|c| (c / self.width) as f64).sum::<f64>() / n;
-        Region { x, y, area: n }
+        Region { x, y, area: n, is_cut: self.is_cut(cells) }
+    }
+
+    /// Whether a region reaches a border of the picture.
+    fn is_cut(&self, cells: &[usize]) -> bool {
+        let (w, h) = (self.width, self.height);
+        cells.iter().any(|&c| {
+            let (i, j) = (c % w, c / w);
+            let at = [i == 0, i + 1 == w, j == 0, j + 1 == h];
+            at.iter().zip(self.ends).any(|(at, end)| *at && end)
+        })
     }
 
     /// Of the connected regions the one with most pixels near a place.

@@ -9,6 +9,7 @@ mod moving;
 mod moving_bodies;
 mod moving_doubts;
 mod moving_nodes;
+mod moving_rows;
 mod observer;
 mod one_place;
 mod open_names;

@@ -17,7 +17,7 @@ use crate::detect::{Centroid, DetectSettings, Threshold};
 use crate::error::{Error, Fault, Result};
 use crate::frame::SourceInfo;
 use crate::message::Setting;
-use crate::moving::{Limits, Marker, Search, Survey, WorkFilm, finish, survey};
+use crate::moving::{Against, Limits, Marker, Search, Survey, WorkFilm, finish, survey};
 use crate::rig::Rig;
 use crate::source::{self, OpenOptions};
 use crate::table::{NodeSummary, RunEnding, SourceFacts};
@@ -233,8 +233,18 @@ fn follow(film: &WorkFilm, limits: &Limits, wanted: &Wanted, rig: Option<&Rig>) 
 
 /// The tracks that are likeliest meant, or were named by their numbers.
 fn surveyed(film: &WorkFilm, search: &Search, wanted: &Wanted, rig: Option<&Rig>) -> Result<Found> {
-    let Survey { markers, answers, pieces, confidence, is_sole } = survey(search)?;
-    let is_clear = answers > 0 && (confidence >= LEAST_CONFIDENCE || is_sole);
+    let is_clear = |s: &Survey| s.answers > 0 && (s.confidence >= LEAST_CONFIDENCE || s.is_sole);
+    let mut found = survey(search, Against::Ground)?;
+    let mut doubt = found.is_one_look_of_many.then_some("much else moves that is found in the same way");
+    if !is_clear(&found) {
+        // What moves less than its own size is never away from its place: it is not new there.
+        let around = survey(search, Against::Around)?;
+        if around.answers > 0 && around.confidence >= LEAST_CONFIDENCE {
+            (found, doubt) = (around, Some("it is never away from its place by more than its size"));
+        }
+    }
+    let is_clear = is_clear(&found);
+    let Survey { markers, answers, pieces, confidence, .. } = found;
     let mut chosen: Vec<usize> = if is_clear { (0..answers).collect() } else { Vec::new() };
     if let Some(n) = wanted.also.iter().find(|n| !(1..=markers.len()).contains(*n)) {
         return Err(Error::Argument(
@@ -275,8 +285,11 @@ fn surveyed(film: &WorkFilm, search: &Search, wanted: &Wanted, rig: Option<&Rig>
     taken.extend(pieces.into_iter().filter(|_| wanted.is_default() && rig.is_none()));
     finish(film, &mut taken)?;
     let pieces = taken.split_off(count);
-    let how =
-        if wanted.also.is_empty() { Chosen::Likeliest { confidence, others } } else { Chosen::Numbered };
+    let how = if wanted.also.is_empty() {
+        Chosen::Likeliest { confidence, others, doubt }
+    } else {
+        Chosen::Numbered
+    };
     let moving = Moving::of(film, taken, how).and_pieces(film, pieces);
     Ok(Found { moving: Ok(moving), candidates: Some(candidates) })
 }

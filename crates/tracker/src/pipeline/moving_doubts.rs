@@ -3,6 +3,7 @@
 //! Owns: the doubts of [`Moving`]. Must not: follow anything.
 
 use super::moving_nodes::{Chosen, Moving};
+use super::moving_rows::gaps;
 use crate::message::{Message, Setting};
 use crate::rig::Rig;
 
@@ -27,6 +28,14 @@ impl Moving {
             );
             doubtful.push(name);
         }
+        for (node, [missing, all]) in gaps(&self.rows) {
+            let name = rig.nodes[node].name.clone();
+            warnings.push(
+                format!("{name} is not seen in {missing} of the {all} frames from its first to its last")
+                    .into(),
+            );
+            doubtful.push(name);
+        }
         for (node, said) in self.lost(rig.image_px) {
             let name = rig.nodes[node].name.clone();
             warnings.push(format!("{name} {said}: nothing there is certainly it").into());
@@ -43,16 +52,18 @@ impl Moving {
             );
             doubtful.push(name);
         }
-        if let Chosen::Likeliest { confidence, .. } = self.chosen
-            && confidence < SURE_CONFIDENCE
+        if let Chosen::Likeliest { confidence, doubt, .. } = self.chosen
+            && (doubt.is_some() || confidence < SURE_CONFIDENCE)
         {
+            let part = || format!("it explains {:.0} % of what looks like it", 100.0 * confidence);
+            let why = doubt.map_or_else(part, str::to_owned);
             warnings.push(
                 Message::from(format!(
-                    "whether this is what is meant is doubtful: it explains {:.0} % of what looks like it. If it is, say so with ",
-                    100.0 * confidence
+                    "whether this is what is meant is doubtful: {why}. If it is, say so with "
                 )) + Setting::Also.set_to("1"),
             );
-            doubtful = rig.nodes.iter().map(|n| n.name.clone()).collect();
+            doubtful.extend(rig.nodes.iter().map(|n| n.name.clone()));
+            doubtful.dedup();
         }
         doubtful
     }

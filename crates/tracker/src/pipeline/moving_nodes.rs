@@ -5,7 +5,7 @@
 use serde_json::{Value, json};
 
 use super::candidates::words;
-use super::one_place::leave_open;
+use super::moving_rows::rows;
 use super::repeats::copies_words;
 use super::settings::RunSettings;
 use super::summary::{EDITS, MOVING, RunSummary};
@@ -18,7 +18,7 @@ use crate::frame::{Ending, SourceInfo};
 use crate::gaps::Damage;
 use crate::message::{Message, Setting};
 use crate::moving::{Marker, WorkFilm};
-use crate::observation::{Observation, Status};
+use crate::observation::Observation;
 use crate::rig::{Body, Node, RIG_SCHEMA, Rig};
 use crate::store::FrameStamp;
 use crate::table::{NodeTable, Rows, RunEnding, SCHEMA_VERSION, SourceFacts, TableMeta, TableWriter, Tally};
@@ -27,10 +27,12 @@ use crate::wanted::Wanted;
 
 /// A marker this near to the place that a given rig has for a node is that node, in radii.
 const NAMED_RADII: f64 = 1.0;
+
 /// The way in which what is followed was chosen.
 pub(super) enum Chosen {
-    /// The likeliest answer, with its confidence and the number of other things that move.
-    Likeliest { confidence: f64, others: usize },
+    /// The likeliest answer, with its confidence, the number of other things that move, and a clause of why it is doubtful for
+    /// another reason.
+    Likeliest { confidence: f64, others: usize, doubt: Option<&'static str> },
     /// A place that the user pointed at.
     Pointed,
     /// A number of the picture that the user named.
@@ -202,7 +204,7 @@ impl Moving {
             })
             .collect();
         let (confidence, others) = match self.chosen {
-            Chosen::Likeliest { confidence, others } => (Some(confidence), Some(others)),
+            Chosen::Likeliest { confidence, others, .. } => (Some(confidence), Some(others)),
             Chosen::Pointed | Chosen::Numbered => (None, None),
         };
         let detect = DetectSettings { pixel_aspect: facts.pixel_aspect, ..settings.detect.clone() };
@@ -289,15 +291,18 @@ impl Moving {
         let markers = if count == 1 { "marker" } else { "markers" };
         let looks = |m: &Marker| words(m, self.scale);
         let what = match &self.chosen {
-            Chosen::Likeliest { confidence, others } => {
+            Chosen::Likeliest { confidence, others, .. } => {
                 let others = match others {
                     0 => String::new(),
                     1 => "; one more thing moves and is not followed".into(),
                     n => format!("; {n} more things move and are not followed"),
                 };
-                let look = self.markers.first().map_or_else(String::new, looks);
+                let mut all: Vec<String> = self.markers.iter().map(looks).collect();
+                all.dedup();
+                let kinds = if all.len() > 1 { "several looks" } else { "one look" };
+                let look = all.join("; ");
                 format!(
-                    "no markers stand out from an even background: followed what moves, {count} {markers} of one look ({look}), \
+                    "no markers stand out from an even background: followed what moves, {count} {markers} of {kinds} ({look}), \
                      with confidence {confidence:.2} of 1{others}"
                 )
             }
@@ -320,38 +325,11 @@ impl Moving {
     }
 }
 
-/// The nodes of every frame.
-fn rows(film: &WorkFilm, markers: &[Marker]) -> Vec<Vec<Observation>> {
-    let scale = film.shrink() as f64;
-    let unknown = |decoded: bool| if decoded { Observation::MISSING } else { Observation::UNDECODED };
-    let mut rows: Vec<Vec<Observation>> =
-        film.stamps().iter().map(|s| vec![unknown(s.decoded); markers.len()]).collect();
-    for (node, track) in markers.iter().map(|m| &m.track).enumerate() {
-        let mut last = None;
-        for (picture, spot) in track.spots() {
-            let back = last.is_some_and(|l| l + 1 < picture);
-            last = Some(picture);
-            // A copy shows the marker where the frame before it does.
-            for (nth, &row) in film.frames(picture).iter().enumerate() {
-                rows[row][node] = Observation {
-                    x_px: film.recorded_px(spot.x),
-                    y_px: film.recorded_px(spot.y),
-                    sigma_px: (track.sigma_px(spot) * scale) as f32,
-                    area_px: (spot.area * scale * scale) as f32,
-                    status: if back && nth == 0 { Status::Reacquired } else { Status::Seen },
-                };
-            }
-        }
-    }
-    let radius: Vec<f64> = markers.iter().map(|m| m.radius_px * scale).collect();
-    rows.iter_mut().for_each(|row| leave_open(row, &radius));
-    rows
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::moving::{Direction, Model, Track};
+    use crate::observation::Status;
 
     /// A column for each radius, in work pictures of half the size.
     fn moving(radii_px: &[f64], rows: Vec<Vec<Observation>>) -> Moving {
@@ -360,7 +338,7 @@ mod tests {
         Moving {
             names: (0..radii_px.len()).map(|k| format!("n{k}")).collect(),
             markers: radii_px.iter().map(marker).collect(),
-            chosen: Chosen::Likeliest { confidence: 0.5, others: 0 },
+            chosen: Chosen::Likeliest { confidence: 0.5, others: 0, doubt: None },
             scale: 2.0,
             copies: 0,
             decoded: rows.len(),

@@ -8,7 +8,8 @@ use super::unclear::{Found, Unclear, candidates, point_at};
 use crate::error::{Error, Fault, Result};
 use crate::message::{Message, Setting};
 use crate::moving::{
-    Click, End, Lost, Marker, Missed, Search, Survey, Track, Unheld, WorkFilm, finish, follow_clicks, survey,
+    Against, Click, End, Lost, Marker, Missed, Search, Survey, Track, Unheld, WorkFilm, finish,
+    follow_clicks, survey,
 };
 use crate::wanted::Pointed;
 
@@ -58,7 +59,7 @@ pub(super) fn pointed(
         let p = &places[k];
         format!("({:.0}, {:.0}) px in frame {}", p.x_px, p.y_px, p.frame.unwrap_or(first))
     };
-    let Survey { markers: known, answers, confidence, .. } = survey(search)?;
+    let Survey { markers: known, answers, confidence, .. } = survey(search, Against::Ground)?;
     let mut followed = follow_clicks(search, &clicks, &known)?;
     let twice = doubles(&followed, &clicks);
     let scale = film.shrink() as f64;
