@@ -73,8 +73,9 @@ pub struct Survey {
     /// Whether there is nothing but one thing that moves, whole, smoothly and far, though it is seldom of the size that it was
     /// looked for: beside it there are only scraps.
     pub is_sole: bool,
-    /// Whether much else moves along the way of looking that finds the answers: one of its looks explains much, and not all of them.
-    pub is_one_look_of_many: bool,
+    /// The confidence by the ways of looking that explain most of all they see, of those that follow the same: less than `confidence`
+    /// where the winner explains much of one look only.
+    pub usual_confidence: f64,
 }
 
 struct Candidate {
@@ -289,9 +290,9 @@ pub fn survey(search: &Search, against: Against) -> Result<Survey> {
         })
         .collect::<Result<_>>()?;
     runs.sort_by(|a, b| b.score.total_cmp(&a.score));
+    let usual_confidence = usual_confidence(&runs);
     let mut runs = runs.into_iter();
     let Some(winner) = runs.next() else { return Ok(Survey::default()) };
-    let is_one_look_of_many = winner.by_look;
     let (model, purity, confidence) = (winner.model, winner.purity, winner.purity * winner.compact);
     let Answers { keep, others, pieces, heaviest } = answers(winner, search.width);
     let marker = |t: Track, model: Model| Marker::of(film, t, model);
@@ -315,7 +316,20 @@ pub fn survey(search: &Search, against: Against) -> Result<Survey> {
         _ => false,
     };
     let pieces = pieces.into_iter().map(|track| Marker { track, model: Some(model), radius_px }).collect();
-    Ok(Survey { markers, answers, pieces, confidence, is_sole, is_one_look_of_many })
+    Ok(Survey { markers, answers, pieces, confidence, is_sole, usual_confidence })
+}
+
+/// The greatest confidence of the runs, the best first, that are not made for one look and whose heaviest track is the best run's.
+fn usual_confidence(runs: &[Run]) -> f64 {
+    let heaviest = |r: &Run| {
+        let radius_px = r.model.radius_px();
+        r.group.first().map(|t| Marker { track: t.clone(), model: Some(r.model), radius_px })
+    };
+    let Some(best) = runs.first().and_then(heaviest) else { return 0.0 };
+    let same = |r: &&Run| {
+        heaviest(r).is_some_and(|m| m.is_same(&best, SAME_RADII * m.radius_px.max(best.radius_px)))
+    };
+    runs.iter().filter(|r| !r.by_look).filter(same).map(|r| r.purity * r.compact).fold(0.0, f64::max)
 }
 
 /// What is known of the answers when the other models' tracks are looked at.

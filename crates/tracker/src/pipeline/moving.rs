@@ -5,6 +5,7 @@
 use std::sync::atomic::Ordering;
 
 use super::candidates::{Candidates, words};
+use super::moving_doubts::SURE_CONFIDENCE;
 use super::moving_nodes::{Chosen, Moving};
 use super::observer::{Observer, Stage};
 use super::opening::{Attended, on_threads, open};
@@ -235,7 +236,8 @@ fn follow(film: &WorkFilm, limits: &Limits, wanted: &Wanted, rig: Option<&Rig>) 
 fn surveyed(film: &WorkFilm, search: &Search, wanted: &Wanted, rig: Option<&Rig>) -> Result<Found> {
     let is_clear = |s: &Survey| s.answers > 0 && (s.confidence >= LEAST_CONFIDENCE || s.is_sole);
     let mut found = survey(search, Against::Ground)?;
-    let mut doubt = found.is_one_look_of_many.then_some("much else moves that is found in the same way");
+    let mut doubt =
+        (found.usual_confidence < SURE_CONFIDENCE).then_some("much else moves that is found in the same way");
     if !is_clear(&found) {
         // What moves less than its own size is never away from its place: it is not new there.
         let around = survey(search, Against::Around)?;
@@ -243,9 +245,8 @@ fn surveyed(film: &WorkFilm, search: &Search, wanted: &Wanted, rig: Option<&Rig>
             (found, doubt) = (around, Some("it is never away from its place by more than its size"));
         }
     }
-    let is_clear = is_clear(&found);
+    let mut chosen: Vec<usize> = if is_clear(&found) { (0..found.answers).collect() } else { Vec::new() };
     let Survey { markers, answers, pieces, confidence, .. } = found;
-    let mut chosen: Vec<usize> = if is_clear { (0..answers).collect() } else { Vec::new() };
     if let Some(n) = wanted.also.iter().find(|n| !(1..=markers.len()).contains(*n)) {
         return Err(Error::Argument(
             Fault::of(

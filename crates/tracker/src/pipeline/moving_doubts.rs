@@ -11,7 +11,7 @@ use crate::rig::Rig;
 const TELL_SIGMA_RADII: f64 = 0.1;
 
 /// Below this confidence what is followed is named, and whether it is what is meant is doubtful.
-const SURE_CONFIDENCE: f64 = 0.3;
+pub(super) const SURE_CONFIDENCE: f64 = 0.3;
 
 impl Moving {
     /// Names of the nodes of which it is doubtful where their centres are or whether they are what is meant; it is told why.
@@ -55,8 +55,8 @@ impl Moving {
         if let Chosen::Likeliest { confidence, doubt, .. } = self.chosen
             && (doubt.is_some() || confidence < SURE_CONFIDENCE)
         {
-            let part = || format!("it explains {:.0} % of what looks like it", 100.0 * confidence);
-            let why = doubt.map_or_else(part, str::to_owned);
+            let part = format!("it explains {:.0} % of what looks like it", 100.0 * confidence);
+            let why = doubt.filter(|_| confidence >= SURE_CONFIDENCE).map_or(part, str::to_owned);
             warnings.push(
                 Message::from(format!(
                     "whether this is what is meant is doubtful: {why}. If it is, say so with "
