@@ -163,6 +163,11 @@ impl Feed {
         self.ends_broken
     }
 
+    /// Whether reading stopped at damage: how many pictures were to be shown between those after it nothing tells.
+    pub(super) fn is_broken_off(&self) -> bool {
+        self.is_broken_off
+    }
+
     /// Once [`Feed::ends_broken`] is known: whether the file ends inside something that holds pictures, whatever it declares.
     pub(super) fn ends_in_pictures(&self) -> bool {
         self.structure.as_ref().is_some_and(Structure::ends_in_pictures)
