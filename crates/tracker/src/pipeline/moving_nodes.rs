@@ -16,7 +16,7 @@ use crate::edits::{Replay, Seen};
 use crate::error::Result;
 use crate::frame::{Ending, SourceInfo};
 use crate::gaps::Damage;
-use crate::message::{Message, Setting};
+use crate::message::Message;
 use crate::moving::{Marker, WorkFilm};
 use crate::observation::Observation;
 use crate::rig::{Body, Node, RIG_SCHEMA, Rig};
