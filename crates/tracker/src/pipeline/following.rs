@@ -121,10 +121,7 @@ impl<'a> Run<'a> {
         let rig = self.rig(end.is_none(), observer)?;
         self.check_count(&rig)?;
         observer.stage(Stage::Track, Some(self.store.len() as u64));
-        let mut writer = match &self.settings.output {
-            Some(output) => Some(TableWriter::create(output, &rig, self.settings.cells)?),
-            None => None,
-        };
+        let mut writer = self.writer(&rig)?;
         let mut rows = self.settings.collect.then(Rows::default);
         let mut watched = Watched::of(self.settings.rig.as_ref(), &rig);
         let mut replay = self.replay(&rig, end.is_some())?;
@@ -177,11 +174,7 @@ impl<'a> Run<'a> {
         let meta = self.meta(rig, timing, damage, ending, decided.as_ref());
         self.warnings.extend(meta.damage.gaps.dropped_words().map(Message::from));
         self.warnings.extend(decided.map(|d| d.words().into()));
-        if let (Some(last), false) =
-            (self.store.len().checked_sub(1), stop || matches!(meta.ending, RunEnding::Early { .. }))
-        {
-            self.warnings.extend(self.settings.beyond(self.store.stamp(last).index));
-        }
+        self.tell_beyond(stop || matches!(meta.ending, RunEnding::Early { .. }));
         if let Some(writer) = writer {
             writer.finish(&meta)?;
         }
@@ -201,6 +194,19 @@ impl<'a> Run<'a> {
             table: rows.map(|rows| NodeTable { meta: meta.clone(), rows }),
             meta,
         })
+    }
+
+    /// The table that is written, if one was asked for.
+    fn writer(&self, rig: &Rig) -> Result<Option<TableWriter>> {
+        let output = self.settings.output.as_ref();
+        output.map(|output| TableWriter::create(output, rig, self.settings.cells)).transpose()
+    }
+
+    /// Tells frames that were asked for beyond the recording's end, unless reading ended before it.
+    fn tell_beyond(&mut self, ended_early: bool) {
+        if let (Some(last), false) = (self.store.len().checked_sub(1), ended_early) {
+            self.warnings.extend(self.settings.beyond(self.store.stamp(last).index));
+        }
     }
 
     /// The decisions of people, to be made on the rows; `to_end`: the recording was read to its end.

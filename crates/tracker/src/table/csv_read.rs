@@ -116,7 +116,8 @@ pub(super) fn read(path: &Path) -> Result<NodeTable> {
 /// Whether a cell may be the beginning of a number, where those before it are no shorter than this.
 fn is_cut(cell: &str, shortest: usize) -> bool {
     let is_open = cell.ends_with(['.', 'e', 'E', '-', '+']);
-    (cell.parse::<f64>().is_ok() || is_open) && (is_open || cell.len() < shortest) && shortest < usize::MAX
+    let is_short = cell.parse::<f64>().is_ok() && cell.len() < shortest;
+    shortest < usize::MAX && (is_open || is_short)
 }
 
 /// For each of [`COLUMNS`] its place in the file.

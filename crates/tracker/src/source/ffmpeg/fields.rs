@@ -8,7 +8,8 @@ use std::ptr;
 use ffmpeg_next::ffi;
 
 use super::demux::{Demuxer, Packet};
-use crate::error::{Error, Fault, FaultKind};
+use crate::error::{Error, Fault, FaultKind, Result};
+use crate::frame::SourceInfo;
 use crate::message::{Message, Setting};
 use crate::name::{shell_word, text};
 use crate::setting_words::Worded;
@@ -167,8 +168,29 @@ pub(super) fn refusal(name: &str, order: FieldOrder) -> Error {
     )
 }
 
+/// Refuses interlaced pictures, or tells of them where they are to be taken as they are.
+///
+/// # Errors
+/// [`Error::Source`] with the command that makes a picture of each field.
+pub(super) fn tell(
+    order: Option<FieldOrder>,
+    name: &str,
+    interlaced: Interlaced,
+    info: &mut SourceInfo,
+) -> Result<()> {
+    let Some(order) = order else { return Ok(()) };
+    match interlaced {
+        Interlaced::Refuse => Err(refusal(name, order)),
+        Interlaced::AsFrames => {
+            info.details.push(("fields".into(), format!("interlaced, {}", order.words())));
+            info.warnings.push(warning(name, order));
+            Ok(())
+        }
+    }
+}
+
 /// The warning of interlaced film that is read as it is.
-pub(super) fn warning(name: &str, order: FieldOrder) -> Message {
+fn warning(name: &str, order: FieldOrder) -> Message {
     format!(
         "interlaced, {}: its pictures are read whole, as if both fields were filmed at once. If they were not, a marker \
          that moves is in two places; then make a picture of each field with `{}`",

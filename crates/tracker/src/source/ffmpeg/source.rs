@@ -123,15 +123,7 @@ impl FfmpegSource {
         let step = step(&demuxer).round() as i64;
         let references = References::of(parameters.codec_id, demuxer.codec_bytes());
         let feed = Feed::new(demuxer, name, can_reopen, if intra_only { 1 } else { 6 })?;
-        if let Some(order) = feed.field_order(name)? {
-            match options.interlaced {
-                Interlaced::Refuse => return Err(fields::refusal(name, order)),
-                Interlaced::AsFrames => {
-                    info.details.push(("fields".into(), format!("interlaced, {}", order.words())));
-                    info.warnings.push(fields::warning(name, order));
-                }
-            }
-        }
+        fields::tell(feed.field_order(name)?, name, options.interlaced, &mut info)?;
         if feed.has_sums() {
             info.pixel_damage = PixelDamage::of(pixel_damage::FFV1_WITH_SUMS);
         }

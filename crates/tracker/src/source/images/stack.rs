@@ -140,6 +140,16 @@ impl StackSource {
         let aspect = Some(pixel_aspect).filter(|_| pixel_aspect_origin.is_recording());
         let alike = Alike { orientation, aspect };
         let (width, height) = orientation.size(layout.width, layout.height);
+        let whole = |info, pictures| Self {
+            info,
+            alike,
+            pictures,
+            next: 0,
+            empty: Vec::new(),
+            elsewhere,
+            ending: Ending::Complete,
+        };
+        let by = declared.as_ref().map(|d| d.by).or(ome.as_ref().map(|_| "OME-XML"));
         let mut info = SourceInfo {
             name: name.to_owned(),
             container: "TIFF".into(),
@@ -161,13 +171,7 @@ impl StackSource {
             claims: RateClaims::default(),
             converted_from: None,
             size_bytes,
-            details: declared
-                .as_ref()
-                .map(|d| d.by)
-                .or(ome.map(|_| "OME-XML"))
-                .map(|by| ("described by".to_owned(), by.to_owned()))
-                .into_iter()
-                .collect(),
+            details: by.map(|by| ("described by".to_owned(), by.to_owned())).into_iter().collect(),
             warnings,
         };
         let more = declared.filter(|_| !pages.decoder.more_images());
@@ -179,28 +183,12 @@ impl StackSource {
             (info.depth_bits, info.format) = (planes.depth_bits, format(planes.depth_bits));
             let file = File::open(path(name)).map_err(|e| unreadable(e.to_string()))?;
             let raw = RawFrames::new(file, name, planes.stored);
-            return Ok(Self {
-                info,
-                alike,
-                pictures: Pictures::Planes(raw, planes),
-                next: 0,
-                empty: Vec::new(),
-                elsewhere,
-                ending: Ending::Complete,
-            });
+            return Ok(whole(info, Pictures::Planes(raw, planes)));
         }
         let first = tiff_page::read(&mut pages.decoder).map_err(unreadable)?;
         (info.depth_bits, info.format) = (first.depth_bits, format(first.depth_bits));
         info.converted_from = first.converted_from;
-        Ok(Self {
-            info,
-            alike,
-            pictures: Pictures::Pages(Some(Box::new(Pages::open(name)?))),
-            next: 0,
-            empty: Vec::new(),
-            elsewhere,
-            ending: Ending::Complete,
-        })
+        Ok(whole(info, Pictures::Pages(Some(Box::new(Pages::open(name)?)))))
     }
 
     fn read_page(pages: &mut Pages, next: u64) -> std::result::Result<Option<Picture>, String> {
