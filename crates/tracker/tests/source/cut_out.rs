@@ -278,7 +278,8 @@ fn bytes_cut_out_of_mxf_are_told_and_no_picture_is_out_of_its_time() {
             // Of one element nothing tells where it is broken.
             let is_in_time = |f: &Frame| samples(f).is_none_or(|s| (f.ticks, s) == truth[f.index as usize]);
             assert!(name == "o.mxf" || frames.iter().all(is_in_time), "{what}");
-            assert!(frames.len() - undecoded > COUNT / 5, "{what}");
+            // The earliest break is at 0.3 of a file that begins with a header of a tenth, and up to 5 pictures wait for others.
+            assert!(frames.len() - undecoded > COUNT / 8, "{what}");
         }
     }
 }

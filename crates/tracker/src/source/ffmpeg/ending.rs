@@ -81,6 +81,16 @@ impl FfmpegSource {
             || self.ends_in_an_element()
     }
 
+    /// Whether the picture that came last may have others before it which the file lacks: one of the last of a cut film whose
+    /// pictures are reordered and have no times of their own, or one after damage at which reading stopped.
+    pub(super) fn is_unplaced(&self) -> bool {
+        let delay = usize::try_from(self.feed.demuxer.parameters().video_delay).unwrap_or(0);
+        let is_last = delay > 0 && self.stamps.are_counted() && self.order.waiting() <= delay;
+        self.draining
+            && !self.intra_only
+            && (is_last && self.is_cut() || self.feed.is_broken_off() && !self.held.is_empty())
+    }
+
     /// Whether the file is damaged after its last packet, and no length that it declares says that all pictures are there.
     /// A transport stream is cut anywhere by those who record it.
     pub(super) fn ends_in_an_element(&self) -> bool {

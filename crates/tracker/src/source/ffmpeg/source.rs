@@ -395,9 +395,7 @@ impl FfmpegSource {
             && !self.intra_only
             && usual
                 .is_some_and(|(last, longest)| ticks.saturating_sub(last) > longest.saturating_mul(3) / 2);
-        let is_unplaced =
-            self.draining && self.feed.is_broken_off() && !self.intra_only && !self.held.is_empty();
-        let plane = if is_unplaced || after_hole && self.is_cut() { None } else { plane };
+        let plane = if self.is_unplaced() || after_hole && self.is_cut() { None } else { plane };
         let byte = arrival.own.and_then(|p| p.byte);
         let ready = Ready { ticks, plane, colour, byte, number };
         if ready.plane.is_some() {

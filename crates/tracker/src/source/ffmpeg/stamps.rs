@@ -137,6 +137,11 @@ impl Stamps {
         ticks
     }
 
+    /// Whether frames have their times by their order.
+    pub(super) fn are_counted(&self) -> bool {
+        matches!(self.origin, Origin::Decoding { .. })
+    }
+
     /// Time of the last frame and the longest step between two.
     pub(super) fn last(&self) -> Option<(i64, i64)> {
         self.last
