@@ -13,7 +13,7 @@ const ALIKE_PX: f64 = 1.5;
 /// Markers this near to each other, in radii, run together in the picture.
 const MERGING_RADII: f64 = 2.5;
 
-/// What makes names hard to tell in a recording, the likeliest first, a sentence each. `rate_hz` is the rate of the recording, if known;
+/// Causes of names that are hard to tell in a recording, the likeliest first, a sentence each. `rate_hz` is the rate of the recording, if known;
 /// `rows` some of its nodes' frames.
 pub fn causes(rig: &Rig, rows: &Rows, rate_hz: Option<f64>) -> Vec<String> {
     let home = home(rig);

@@ -19,9 +19,9 @@ const ONE_PLACE_PX: f64 = 2.0;
 /// The use of the columns of places that cannot be followed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Columns {
-    /// There is none: each place that can be followed has the name of its number among those that were pointed at.
+    /// No columns: each place that can be followed has the name of its number among those that were pointed at.
     Followed,
-    /// It stays empty: the places are a rig's nodes.
+    /// Empty columns: the places are a rig's nodes.
     All,
 }
 

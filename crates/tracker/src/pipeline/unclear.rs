@@ -26,7 +26,7 @@ impl Unclear {
     }
 }
 
-/// What was looked for.
+/// Outcome of the look at what moves.
 pub(super) struct Found {
     pub(super) moving: Result<Moving, Unclear>,
     pub(super) candidates: Option<Candidates>,
