@@ -99,4 +99,4 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     assert main([*command, "--zero", "horizontal=0.5", "--axis", "crank=A-B"]) == 0
     assert "zero from the picture's horizontal (+- 0.5 and 0.5 and 0.5 deg)" in capsys.readouterr().out
     assert main([*command, "--zero", "horizontal", "--axis", "A-B", "--force"]) == 2
-    assert "'A-B' names no link and two points. Write upper=pivot-elbow" in capsys.readouterr().err
+    assert "'A-B' does not name a link and two points. Write upper=pivot-elbow" in capsys.readouterr().err
