@@ -207,7 +207,7 @@ def test_a_place_that_holds_nothing_does_not_refuse_the_others(tmp_path: Path) -
     run += ["--marker", "3,3@40", "--marker", place(small, 40)]
     done = subprocess.run(run, check=False, capture_output=True, text=True)
     assert done.returncode == 1
-    assert "at (3, 3) px in frame 40" in done.stderr
+    assert "nothing is followed from (3, 3) px in frame 40" in done.stderr
     nodes = dp.read_nodes(tmp_path / "t.parquet")
     # The name is the number of the place, from 0 on.
     assert [node.name for node in nodes.rig.nodes] == ["n1"]

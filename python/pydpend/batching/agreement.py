@@ -14,11 +14,12 @@ from scipy.stats import norm
 
 from pydpend.batching.row import State
 from pydpend.coefficients import FULL, RATIOS, unit
+from pydpend.fit_folder import FitFile
 from pydpend.fit_status import FitStatus
 from pydpend.json_text import write_json
 from pydpend.trials import combine
 
-TRIALS = "trials.json"
+TRIALS = str(FitFile.TRIALS)
 
 APART = 0.01
 """Probability with which one of all recordings that agree would be called apart (Bonferroni: shared out over them)."""

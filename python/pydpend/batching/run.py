@@ -25,7 +25,7 @@ from pydpend.batching.recording import RUNNING, Ended, Fault, failed, lock_of, s
 from pydpend.batching.row import State
 from pydpend.batching.table import TABLE, write_table
 from pydpend.documents import Table
-from pydpend.errors import Text, fault, front_end
+from pydpend.errors import Setting, Text, WrongTypeError, fault, front_end
 from pydpend.json_text import JsonResult, write_json
 from pydpend.output import AnyPath, keeping, results_folder
 from pydpend.rig import Rig
@@ -172,7 +172,7 @@ class Batch(JsonResult):
         )
 
 
-@typed("progress", "options")
+@typed("progress")
 def batch(
     recordings: AnyPath | Sequence[AnyPath],
     output: AnyPath,
@@ -211,6 +211,10 @@ def batch(
         If nothing can be done: a sheet or an option that makes no sense, a folder that is not a batch's or that another
         batch works in, a full disk, a scheduler that is not there. A recording that fails raises nothing.
     """
+    called: object = progress
+    if not (called is None or callable(called)):
+        problem = f"{progress!r} cannot be called"
+        raise WrongTypeError(fault(Setting("progress"), problem, "Give a function of one argument"))
     asked = BatchOptions(**how)
     many = (
         [recordings]

@@ -171,8 +171,10 @@ def zero_for(
             f"the swing goes about a direction about {off} deg from the zero ({meta['from']}): the angles may be "
             "off by that"
         )
-        if not (isinstance(zero, str) and zero == "reference_frame"):
-            # Turns from the reference picture are what they are, wherever the links hang.
+        # A link that seems to swing about a direction a quarter turn away has turned over, which refutes no zero.
+        # Turns from the reference picture are what they are, wherever the links hang.
+        is_swing = bool((apart < np.pi / 2).all())
+        if is_swing and not (isinstance(zero, str) and zero == "reference_frame"):
             notes[-1] += ", and the zero's uncertainty says so"
             meta["sigma_rad"] = np.hypot(stated, apart).tolist()
             # Past `angles` and the check of its arguments, to its caller's line.

@@ -26,6 +26,7 @@ from pydpend.page.frames import Frames
 from pydpend.page.said import arranged, checkable, decision_of
 from pydpend.page.words import PageWords
 from pydpend.reading_options import OpenOptions
+from pydpend.recording_folder import RunFile
 from pydpend.tracking import info, setup, track
 
 MOST_ROWS = 400
@@ -104,7 +105,7 @@ class Session:
                 "edits": [_plain(entry) for entry in entries],
                 "files": {
                     "edits": str(self.edits.path),
-                    "table": str(self.file("nodes.parquet")),
+                    "table": str(self.file(RunFile.NODES)),
                     "rig": str(self.file("rig.toml")),
                 },
                 "saved": self.saved,
@@ -134,7 +135,7 @@ class Session:
         words += self.choice.words()
         if self.edits.entries():
             words += ["--edits", self.edits.path.name]
-        return " ".join([*words, "-o", self.file("nodes.parquet").name])
+        return " ".join([*words, "-o", self.file(RunFile.NODES).name])
 
     def rows(self, first: int, last: int) -> dict[str, Any]:
         """Rows of some frames: of each frame, for each node, x, y, sigma (px) and status."""
@@ -313,12 +314,12 @@ class Session:
         try:
             # In a folder of its own, so that another page of this film may track it at the same time.
             with tempfile.TemporaryDirectory(prefix=".page-", dir=self.folder) as own:
-                table = Path(own) / "nodes.parquet"
+                table = Path(own) / RunFile.NODES
                 nodes = track(self.film, rig, **reading, edits=edits, output=table, progress=told)
                 with self._lock:
                     if work.wanted.is_set():
                         return
-                    os.replace(table, self.file("nodes.parquet"))
+                    os.replace(table, self.file(RunFile.NODES))
         except PydpendError:
             if not choice.marker and rig is None:
                 work.candidates = self._candidates(reading, told)
@@ -331,7 +332,7 @@ class Session:
             if rig is None:
                 nodes.rig.write(self.file("rig.toml"))
             work.warnings = list(nodes.meta.get("warnings", []))
-            self._show(read_nodes(self.file("nodes.parquet")))
+            self._show(read_nodes(self.file(RunFile.NODES)))
             self.saved = True
 
     def _show(self, nodes: Nodes | None) -> None:

@@ -10,7 +10,7 @@ from pydpend.report import damping, recording
 from pydpend.report.page import Block, Code, Heading, Links, Listing, Page, Section, Table, Text
 from pydpend.report.tiles import tiles
 from pydpend.report.words import sentence
-from pydpend.run_folder import FIT_FOLDER, StoredRun, read_run
+from pydpend.run_folder import FIT_FOLDER, README, RECORD, StoredRun, read_run
 
 
 def report_page(folder: str | Path) -> Page:
@@ -80,8 +80,8 @@ def files_beside(run: StoredRun) -> list[str]:
     """The files of a run that people open, from its folder."""
     made = {name for done in run.stages.values() for name in done.files}
     return [
-        "README.txt",
-        "run.json",
+        README,
+        RECORD,
         *sorted(name for name in made if not name.endswith((".png", ".svg", ".mp4"))),
     ]
 

@@ -80,7 +80,7 @@ pub struct Survey {
 
 struct Candidate {
     model: Model,
-    /// What all that moves along it explains of all its spots, and what the best look explains of that look's.
+    /// Parts explained: of all its spots by all that moves along it, and of the best look's spots by that look.
     score: f64,
     look: f64,
     /// Limit for the whole recording.
@@ -135,7 +135,7 @@ fn candidates(search: &Search, against: Against) -> Result<Vec<Candidate>> {
     Ok(out)
 }
 
-/// What a model explains of bursts, each with the index of its first picture and the spots of each; `None` if hardly any.
+/// The spots of bursts that a model explains, each burst with the index of its first picture and the spots of each; `None` if hardly any.
 fn tried(model: Model, bursts: &[(usize, Vec<Vec<Spot>>)], width: f64) -> Option<Candidate> {
     let radius = model.radius_px();
     let (mut moved, mut all, mut standing) = (Vec::new(), Vec::new(), Vec::new());
@@ -332,7 +332,7 @@ fn usual_confidence(runs: &[Run]) -> f64 {
     runs.iter().filter(|r| !r.by_look).filter(same).map(|r| r.purity * r.compact).fold(0.0, f64::max)
 }
 
-/// What is known of the answers when the other models' tracks are looked at.
+/// Facts known of the answers when the other models' tracks are looked at.
 struct Known {
     model: Model,
     radius_px: f64,

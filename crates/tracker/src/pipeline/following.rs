@@ -52,13 +52,13 @@ impl Watched {
         }
     }
 
-    /// What the tracker saw, before a person's edits.
+    /// Takes the rows that the tracker saw, before a person's edits.
     fn seen(&mut self, observations: &[Observation]) {
         self.sizes.push(observations);
         self.repeats.push(observations);
     }
 
-    /// What is written, with a person's edits.
+    /// Takes the rows that are written, with a person's edits.
     fn written(&mut self, frame: u64, time_s: f64, observations: &[Observation]) {
         self.tally.push(observations);
         self.open_names.push(frame, time_s, observations);

@@ -54,7 +54,7 @@ pub(super) fn comes_first(settings: &RunSettings) -> bool {
 /// # Errors
 /// Those of [`run`] but for the source's.
 pub(super) fn run_first(settings: &RunSettings, observer: &mut dyn Observer) -> Result<Outcome> {
-    match run(settings, observer) {
+    match run(settings, false, observer) {
         Err(Error::Source(fault)) => {
             Ok(Outcome::Unclear(Unclear::new(fault.problem.to_string(), fault.advice)))
         }
@@ -126,12 +126,12 @@ pub(super) fn is_seldom(n: &NodeSummary) -> bool {
 }
 
 /// Follows what moves in a recording and writes the table, if it is clear what is meant. The observer is told what else was
-/// found.
+/// found. With `only_whole` a rig's nodes are followed only if each of them can be: the markers that stand out are a result already.
 ///
 /// # Errors
 /// Those of reading, and of the table; [`Error::Argument`] for what was pointed at and is not there; [`Error::Interrupted`] if
 /// the observer asks to stop.
-pub(super) fn run(settings: &RunSettings, observer: &mut dyn Observer) -> Result<Outcome> {
+pub(super) fn run(settings: &RunSettings, only_whole: bool, observer: &mut dyn Observer) -> Result<Outcome> {
     let options = OpenOptions { colour: true, ..settings.open.clone() };
     let mut source = open(&settings.input, &options, observer)?;
     let info = source.info().clone();
@@ -157,7 +157,8 @@ pub(super) fn run(settings: &RunSettings, observer: &mut dyn Observer) -> Result
             let film = WorkFilm::read(source.as_mut(), frames.clone(), &attended.stop, &mut tell)?;
             let limits = limits(settings, &info, film.shrink());
             on_threads(settings.threads, || {
-                let mut found = follow(&film, &limits, &wanted, settings.rig.as_ref())?;
+                let rig = settings.rig.as_ref().map(|rig| (rig, only_whole));
+                let mut found = follow(&film, &limits, &wanted, rig)?;
                 if let (Ok(moving), None) = (&mut found.moving, &settings.rig) {
                     moving.find_bodies(&facts, &attended.stop)?;
                 }
@@ -192,21 +193,21 @@ fn limits(settings: &RunSettings, info: &SourceInfo, shrink: usize) -> Limits {
     }
 }
 
-/// Follows what is wanted, or else what is likeliest meant; with a rig, what is at the places of its nodes.
-fn follow(film: &WorkFilm, limits: &Limits, wanted: &Wanted, rig: Option<&Rig>) -> Result<Found> {
+/// Follows what is wanted, or else what is likeliest meant; with a rig, what is at the places of its nodes (`true`: of all of them).
+fn follow(film: &WorkFilm, limits: &Limits, wanted: &Wanted, rig: Option<(&Rig, bool)>) -> Result<Found> {
     let Some(search) = Search::learn(film, limits)? else {
         let why = Unclear::new("it is too short to tell what moves", "");
         return Ok(Found::unclear(why, Candidates::default()));
     };
     let mut found = if wanted.marker.is_empty() {
-        surveyed(film, &search, wanted, rig)?
+        surveyed(film, &search, wanted, rig.map(|r| r.0))?
     } else {
         pointed(film, &search, &wanted.marker, Columns::Followed)?
     };
     if let Ok(moving) = &mut found.moving {
         moving.unite(&wanted.same)?;
     }
-    let Some(rig) = rig else { return Ok(found) };
+    let Some((rig, only_whole)) = rig else { return Ok(found) };
     let named = found.moving.as_mut().is_ok_and(|m| m.name_by(rig));
     let places: Option<Vec<Pointed>> = rig.reference_frame.map(|frame| {
         let at = |x_px, y_px| Pointed { x_px, y_px, frame: Some(frame) };
@@ -217,6 +218,11 @@ fn follow(film: &WorkFilm, limits: &Limits, wanted: &Wanted, rig: Option<&Rig>) 
         // The rig's own places are as good as any that are pointed at.
         Some(places) if wanted.is_default() => {
             found = pointed(film, &search, &places, Columns::All)?;
+            if only_whole && found.moving.as_ref().is_ok_and(|m| !m.is_whole()) {
+                let why = "not all that the rig has moves where its nodes are";
+                found.moving =
+                    Err(Unclear::new(why, "Point at it with " + Setting::Marker + ", without the rig"));
+            }
             if let Ok(moving) = &mut found.moving {
                 moving.name_in_order(rig);
             }

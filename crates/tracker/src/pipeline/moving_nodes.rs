@@ -88,6 +88,11 @@ impl Moving {
         self
     }
 
+    /// Whether all that was pointed at is followed.
+    pub fn is_whole(&self) -> bool {
+        self.refused.is_empty()
+    }
+
     /// With tracks that may be pieces of its columns.
     pub fn and_pieces(mut self, film: &WorkFilm, pieces: Vec<Marker>) -> Self {
         self.pieces = rows(film, &pieces);

@@ -35,7 +35,7 @@ pub fn run(settings: &RunSettings, observer: &mut dyn Observer) -> Result<RunSum
     }
     let unclear = match unclear {
         Some(unclear) => unclear,
-        None => match moving::run(settings, observer) {
+        None => match moving::run(settings, markers.is_ok(), observer) {
             Ok(Outcome::Followed(summary)) => return Ok(*summary),
             Ok(Outcome::Unclear(unclear)) => unclear,
             Err(Error::Interrupted) => return Err(Error::Interrupted),
@@ -83,7 +83,7 @@ fn run_named(settings: &RunSettings, observer: &mut dyn Observer) -> Result<RunS
         Begun::Done(summary) => return Ok(*summary),
         Begun::Open(source, _) => drop(source),
     }
-    match moving::run(settings, observer)? {
+    match moving::run(settings, false, observer)? {
         Outcome::Followed(summary) => {
             settings.output.as_ref().map_or(Ok(()), |output| state::remove(output))?;
             Ok(*summary)
