@@ -84,7 +84,7 @@ def flags() -> dict[str, set[str]]:
     return {f"pydpend {name}": set(options_of(p)) for name, p in _parsers()[1].items()}
 
 
-PYTHON_ONLY = {"link_length_sigma_m"}
+PYTHON_ONLY = {"link_length_sigma_m", "progress"}
 """Settings that no command has."""
 
 
